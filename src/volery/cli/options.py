@@ -29,6 +29,15 @@ Speed = Annotated[
     str, typer.Option(metavar="max|FACTOR", help="Simulated seconds per second, for simulated vehicles.")
 ]
 
+LogFile = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Write what happens in the run into this file, line by line."),
+]
+LogLevel = Annotated[
+    str,
+    typer.Option(metavar="error|warning|info|debug", help="Least severity of a line of the log file."),
+]
+
 OnGraph = Annotated[str, typer.Option("--graph", metavar="ros1|ros2", help="ROS graph.")]
 Topics = Annotated[
     list[str] | None, typer.Option("--topic", metavar="NAME", help="Only this topic; may be repeated.")

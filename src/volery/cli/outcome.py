@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from rich.traceback import Traceback
@@ -11,6 +13,8 @@ from volery.cli.command import BAD_INPUT, BAD_INPUT_ERRORS, FAILED, OK
 from volery.cli.console import Output
 from volery.report.terminal import summary_table
 from volery.requirements.record import RequirementRecord
+from volery.run.event_log import LogOptions, parse_level
+from volery.run.recording import make_folder
 from volery.run.result import Run
 
 RUNS = Path("runs")
@@ -22,6 +26,38 @@ def next_folder(name: str) -> Path:
     taken = [path.name.removeprefix(f"{stem}-") for path in RUNS.glob(f"{stem}-*")]
     number = max((int(text) for text in taken if text.isdigit()), default=0) + 1
     return RUNS / f"{stem}-{number}"
+
+
+@contextmanager
+def run_folder(out: Path | None, name: str) -> Iterator[Path]:
+    """Make the folder of a run before anything that takes time; remove it if it stays empty.
+
+    Args:
+        out: The folder; None for a new one in ``RUNS``.
+        name: Name of a new folder, without its number.
+
+    Raises:
+        UsageError: The folder cannot be written.
+    """
+    folder = out or next_folder(name)
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    make_folder(folder)
+    try:
+        yield folder
+    finally:
+        with suppress(OSError):  # it is not empty
+            for one in missing:
+                one.rmdir()
+
+
+def read_log_options(file: Path | None, level: str) -> LogOptions | None:
+    """Return the options of the log that ``--log-file`` asks for, or None.
+
+    Raises:
+        UsageError: There is no such level.
+    """
+    severity = parse_level(level)
+    return None if file is None else LogOptions(file, severity)
 
 
 def show_outcome(output: Output, run: Run) -> int:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from time import perf_counter
+from typing import Protocol
 
 from rich.console import Group, RenderableType
 from rich.live import Live
@@ -20,7 +21,17 @@ from volery.run.progress import Progress
 DRAWING_PERIOD_S = 0.1
 """Wall seconds between two drawings: to draw takes longer than to simulate one second."""
 
+LINE_PERIOD_S = 10.0
+"""Wall seconds between two lines of a run where no terminal can be drawn on, such as a log of CI."""
+
 Show = Callable[[Progress], None]
+
+
+class Drawings(Protocol):
+    """Shows the progress of one or several runs."""
+
+    def show(self, title: str, progress: Progress) -> None:
+        """Show the progress of the run called *title*."""
 
 
 class RateLimited:
@@ -52,6 +63,27 @@ class LiveProgress:
         self._live.update(Group(*self._drawn.values()))
 
 
+class LineProgress:
+    """Lines of text for one or several runs, where no terminal can be drawn on."""
+
+    def __init__(self, output: Output, read_clock: Callable[[], float] = perf_counter) -> None:
+        self._output = output
+        self._clock = read_clock
+        self._start = read_clock()
+        self._last: dict[str, float] = {}
+
+    def show(self, title: str, progress: Progress) -> None:
+        """Print a line if the last one of the run called *title* is old enough."""
+        now = self._clock()
+        if now - self._last.get(title, self._start) < LINE_PERIOD_S:
+            return
+        self._last[title] = now
+        of = f" of at most {clock(progress.limit)[:-4]}" if progress.limit else ""
+        pace = to_seconds(progress.now) / (now - self._start)
+        parcels = "".join(f", {count} {state}" for state, count in progress.parcels.items())
+        self._output.note(f"{title}: {clock(progress.now)[:-4]}{of}, {pace:,.1f}× real time{parcels}")
+
+
 def draw_progress(title: str, progress: Progress, wall_s: float) -> RenderableType:
     """Return one line for the run and one for each vehicle."""
     simulated = to_seconds(progress.now)
@@ -71,10 +103,13 @@ def draw_progress(title: str, progress: Progress, wall_s: float) -> RenderableTy
 
 
 @contextmanager
-def live_progress(output: Output) -> Iterator[LiveProgress | None]:
-    """Draw on the terminal within the context; yield None if progress is not shown."""
-    if not output.shows_progress:
+def live_progress(output: Output) -> Iterator[Drawings | None]:
+    """Draw on the terminal within the context, or print lines; yield None if progress is not shown."""
+    if output.quiet:
         yield None
+        return
+    if not output.notes.is_terminal:
+        yield LineProgress(output)
         return
     with Live(console=output.notes, transient=True, refresh_per_second=8) as live:
         yield LiveProgress(live)

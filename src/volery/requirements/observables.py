@@ -38,7 +38,10 @@ PERIOD_TOLERANCE = 0.1
 """A release is in time if it is at most this share of the period late."""
 
 LANDINGS = ("land", "return_home")
-"""Operations that end on the ground."""
+"""Operations that end on the ground. The landing at the end of a run, ``come_to_rest``, is not judged."""
+
+AT_THE_END = "come_to_rest"
+"""Operation by which the run itself brings a vehicle down when its components have ended."""
 
 TRAVELS = ("goto", "drive")
 """Operations that go to a point."""
@@ -232,7 +235,10 @@ def _least_battery(vehicle: str, setup: RunSetup) -> Observer:
 
 
 def _failed_operations(vehicle: str, setup: RunSetup) -> Observer:
-    return _count(Operation, lambda event: event.vehicle == vehicle and event.outcome != OK)
+    return _count(
+        Operation,
+        lambda event: event.vehicle == vehicle and event.outcome != OK and event.operation != AT_THE_END,
+    )
 
 
 # -- the application

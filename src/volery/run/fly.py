@@ -20,7 +20,7 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.run.assembly.vehicles import ObservedVehicles, OpenedVehicles, VehicleSettings, open_vehicles
 from volery.run.ending import Ending
-from volery.run.progress import LostLinkReporter, ProgressReporter
+from volery.run.progress import LostLinkReporter, ProgressReporter, Tell
 from volery.run.recording import Recording
 from volery.run.result import DEFAULT_OPTIONS, Options, Run
 from volery.trace.attachments import (
@@ -126,13 +126,30 @@ class _Flight:
         setup, attachments = self._setup(urls, options.seed)
         self._recording = Recording(setup, options.out, attachments)
         kernel.record = self._recording.stream
+        if options.log is not None:
+            self._recording.log_into(options.log)
         if options.tell is not None:
             self._recording.stream.tap(LostLinkReporter(options.tell))
+            self._tell_home(options.tell, urls, stated.home)
         self._states = self._opened.fleet or ObservedVehicles(kernel, self._opened.vehicles)
         self._states.sample()
         if options.show is not None:
             self._recording.stream.tap(ProgressReporter(kernel, 0, self._states.progress, options.show))
         self._flying = len(self._opened.vehicles)
+
+    def _tell_home(self, tell: Tell, urls: Sequence[str], home: Position | None) -> None:
+        """Report where simulated vehicles fly if neither the mission nor an address states it."""
+        if (
+            self._opened.fleet is None
+            or home is not None
+            or all("home" in parse(url).options for url in urls)
+        ):
+            return
+        here = self._opened.fleet.frame
+        position = Position(here.latitude, here.longitude, AMSL(here.amsl))
+        tell(
+            f"no HOME is stated: it flies at {position}; HOME = Position(...) in the mission's file moves it"
+        )
 
     def _load(self, mission: Mission | str | Path, seed: int) -> Mission:
         """Return the mission; in virtual time a file gets virtual ``time`` and ``random`` modules."""

@@ -19,6 +19,7 @@ from volery.base.registry import Registry
 from volery.base.time import Ns
 from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RUN_FILE, RunRecord, Status, write_record
+from volery.run.event_log import EventLog, LogOptions
 from volery.trace.attachments import RunSetup
 from volery.trace.events import Stream, Verdict
 from volery.trace.mcap_writer import TRACE_FILE, Attachment, McapWriter
@@ -80,6 +81,7 @@ class Recording:
         self._start = perf_counter()
         self._trace: McapWriter | None = None
         self._timeline: TimelineWriter | None = None
+        self._log: EventLog | None = None
         self.stream.tap(self.accounts)
         if self.folder is not None:
             _forget_earlier_run(self.folder)
@@ -88,13 +90,20 @@ class Recording:
             self.stream.tap(self._trace)
             self.stream.tap(self._timeline)
 
+    def log_into(self, wanted: LogOptions) -> None:
+        """Write the lines of a log from now on. Raises ``UsageError`` if the file cannot be written."""
+        self._log = EventLog(wanted)
+        self.stream.tap(self._log)
+
     def finish(self, status: Status, reason: str, ended: Ns, verdicts: Iterable[Verdict]) -> RunRecord:
         """Record the verdicts, close the files, write the documents and return the record."""
         for verdict in verdicts:
             self.stream(verdict)
         if self._trace is not None:
             self._trace.outcome(status, reason)
-        for writer in (self._trace, self._timeline):
+        if self._log is not None:
+            self._log.outcome(ended, status, reason)
+        for writer in (self._trace, self._timeline, self._log):
             if writer is not None:
                 writer.close()
                 self.problems += [writer.problem] if writer.problem else []

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from volery.base.errors import VoleryError
 from volery.base.time import MS, Ns
+from volery.run.event_log import LogOptions
 from volery.run.progress import Show, Tell
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ class Options:
         tell: Receives single lines that the user should read at once.
         graph: ``ros1`` or ``ros2`` to run the components as processes on that graph, at a pace of 1 unless
             ``pace`` is given; empty for the embedded graph.
+        log: File into which the run writes what happens, line by line, or None.
         traces: Folder in which C++ components record the basic blocks that they enter, without being charged.
     """
 
@@ -73,6 +75,7 @@ class Options:
     tell: Tell | None = None
     graph: str = ""
     traces: Path | None = None
+    log: LogOptions | None = None
 
 
 DEFAULT_OPTIONS = Options()

@@ -155,6 +155,8 @@ class _Simulation:
         kernel.record = self._recording.stream
         self._observers = Observers(system.requirements, setup)
         self._recording.stream.tap(self._observers)
+        if options.log is not None:
+            self._recording.log_into(options.log)
         if system.limits.until is not None:
             self._goal = Observers((system.limits.until,), setup)
             self._recording.stream.tap(self._goal)

@@ -182,6 +182,33 @@ def test_a_folder_that_cannot_be_written(starter):
 
 
 @pytest.mark.timeout(600)
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_demo_that_is_ended_leaves_no_process(tmp_path, number):
+    """SIGTERM ends both simulations in order, with their files; after SIGKILL they end by themselves."""
+    command = [*COMMAND, "demo", "--out", "demo"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    traces = [tmp_path / "demo" / name / "trace.mcap" for name in ("fast", "slow")]
+    workers = []
+    try:
+        until(lambda: all(one.exists() and one.stat().st_size > 100_000 for one in traces), process)
+        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        workers = [os.pidfd_open(int(one)) for one in children]
+        assert len(workers) >= 2
+        process.send_signal(number)
+        process.wait(timeout=WITHIN_S)
+        for worker in workers:  # readable when it has ended
+            assert select.select([worker], [], [], WITHIN_S)[0]
+    finally:
+        process.kill()
+        for worker in workers:
+            os.close(worker)
+    if number == signal.SIGTERM:
+        assert process.returncode == 1
+        assert (tmp_path / "demo" / "comparison.html").exists()
+    records = [json.loads((one.parent / "run.json").read_text()) for one in traces]
+    assert [one["outcome"]["reason"] for one in records] == ["SIGTERM received"] * 2
+
+
 def test_the_demo_shows_both_allocations_and_is_no_failure(tmp_path):
     command = [*COMMAND, "demo", "--out", "demo"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=590, check=False)

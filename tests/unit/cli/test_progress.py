@@ -6,7 +6,7 @@ from rich.console import Console
 
 from volery.base.time import MINUTE, S
 from volery.cli.console import Output
-from volery.cli.progress import draw_progress, run_progress
+from volery.cli.progress import LINE_PERIOD_S, LineProgress, draw_progress, run_progress
 from volery.run.progress import Progress, VehicleProgress
 
 PROGRESS = Progress(
@@ -26,9 +26,19 @@ def test_it_tells_time_speed_vehicles_and_parcels():
     assert "on the ground" in said
 
 
-def test_progress_is_not_drawn_into_a_pipe():
-    with run_progress(Output(notes=Console(file=io.StringIO())), "x") as show:
+def test_nothing_is_shown_quietly():
+    with run_progress(Output(quiet=True, notes=Console(file=io.StringIO())), "x") as show:
         assert show is None
+
+
+def test_a_pipe_gets_a_line_now_and_then():
+    said, now = io.StringIO(), [0.0]
+    lines = LineProgress(Output(notes=Console(file=said)), lambda: now[0])
+    for now[0] in (1.0, LINE_PERIOD_S, LINE_PERIOD_S + 1.0):
+        lines.show("delivery", PROGRESS)
+    assert said.getvalue() == (
+        "delivery: 0:01:23 of at most 0:15:00, 8.3× real time, 1 delivered, 2 in the air\n"
+    )
 
 
 def test_a_terminal_is_drawn_on():

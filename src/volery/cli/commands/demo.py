@@ -1,38 +1,46 @@
 """``volery demo`` and ``volery new``: the examples that come with volery.
 
 The demo runs the delivery service on two allocations at once, each in a process of its own. Ctrl-C reaches
-every process of the terminal: each simulation ends in order and this process waits for them.
+every process of the terminal, and SIGTERM is forwarded: each simulation ends in order and this process waits
+for them. If this process is killed they receive SIGTERM.
 """
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
+import os
 import shutil
 import signal
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 import volery
-from volery.base.errors import UsageError
+from volery.base.errors import UsageError, VoleryError
 from volery.base.extras import require_extra
 from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output
 from volery.cli.options import Seed
 
 if TYPE_CHECKING:
-    from volery.cli.progress import LiveProgress
+    from volery.cli.progress import Drawings
     from volery.requirements.record import RunRecord
     from volery.run.progress import Progress
 
 commands = Commands("First steps")
 
 DEMO_MODEL, STARTER_MODEL = "delivery", "starter"
+PR_SET_PDEATHSIG = 1
+
 POLL_PERIOD_S = 0.1
 """Wall seconds between two reads of the progress that the processes send."""
 
@@ -142,38 +150,67 @@ def run_all(output: Output, jobs: Mapping[str, Job]) -> dict[str, JobOutcome]:
     reports = context.SimpleQueue()
     with (
         live_progress(output) as drawings,
-        _interrupts_ignored(),
-        ProcessPoolExecutor(len(jobs), context, _Reports.open, (reports if drawings else None,)) as pool,
+        ProcessPoolExecutor(
+            len(jobs), context, _begin_process, (reports if drawings else None, os.getpid())
+        ) as pool,
+        _signals_left_to_processes(),
     ):
         futures = {name: pool.submit(_run, name, job) for name, job in jobs.items()}
         _draw_until_done(list(futures.values()), reports, drawings)
-    return {name: future.result() for name, future in futures.items()}
+    try:
+        return {name: future.result() for name, future in futures.items()}
+    except BrokenProcessPool as error:  # ended while it started, by a signal or for want of memory
+        raise VoleryError("a process that ran a simulation was ended from outside") from error
 
 
-def _draw_until_done(futures: list[Future[JobOutcome]], reports: Any, drawings: LiveProgress | None) -> None:
+def _draw_until_done(futures: list[Future[JobOutcome]], reports: Any, drawings: Drawings | None) -> None:
     while wait(futures, timeout=POLL_PERIOD_S).not_done:
         while drawings is not None and not reports.empty():
             drawings.show(*reports.get())
 
 
 @contextmanager
-def _interrupts_ignored() -> Iterator[None]:
-    """Leave SIGINT to the processes that run the simulations; the terminal sends it to them as well."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _signals_left_to_processes() -> Iterator[None]:
+    """Leave SIGINT and SIGTERM to the processes that run the simulations.
+
+    The terminal sends SIGINT to them as well; SIGTERM is forwarded.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def forward(number: int, frame: FrameType | None) -> None:
+        for child in multiprocessing.active_children():
+            child.terminate()
+
+    before = {
+        signal.SIGINT: signal.signal(signal.SIGINT, signal.SIG_IGN),
+        signal.SIGTERM: signal.signal(signal.SIGTERM, forward),
+    }
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _begin_process(queue: Any, parent: int) -> None:
+    """Begin a process that runs simulations: where it reports, and its end with *parent*."""
+    _Reports.open(queue, parent)
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:  # it died before
+        os.kill(os.getpid(), signal.SIGTERM)
 
 
 class _Reports:
-    """The queue for progress, set once when a process starts: a queue cannot be sent later."""
+    """The queue for progress and the process that reads it, set once when a process starts: a queue cannot be sent later."""
 
     queue: Any = None
+    parent = 0
 
     @classmethod
-    def open(cls, queue: Any) -> None:
-        cls.queue = queue
+    def open(cls, queue: Any, parent: int) -> None:
+        cls.queue, cls.parent = queue, parent
 
     @classmethod
     def sender(cls, name: str) -> Callable[[Progress], None] | None:
@@ -190,5 +227,7 @@ def _run(name: str, job: Job) -> JobOutcome:
 
     options = Options(fidelity="code", seed=job.seed, out=job.out, show=_Reports.sender(name))
     run = simulate(job.model, options, allocation=job.allocation)
+    if os.getppid() != _Reports.parent:  # it was killed: nothing would end this process
+        os._exit(FAILED)
     problems = [] if run.completed else [f"{run.record.outcome.status}: {run.record.outcome.reason}"]
     return JobOutcome(run.record, job.out, (*problems, *run.problems))

@@ -10,7 +10,7 @@ import typer
 from volery.base.errors import UsageError
 from volery.cli.command import Commands
 from volery.cli.console import Output
-from volery.cli.options import Out, Seed, Speed, parse_speed
+from volery.cli.options import LogFile, LogLevel, Out, Seed, Speed, parse_speed
 
 commands = Commands("Fly")
 
@@ -44,14 +44,15 @@ def fly(
         ),
     ] = None,
     out: Out = None,
+    log_file: LogFile = None,
+    log_level: LogLevel = "info",
 ) -> int:
     """Fly a mission on a simulated or a real vehicle; the mission file is the same for both."""
-    from volery.cli.outcome import next_folder, show_outcome
+    from volery.cli.outcome import read_log_options, run_folder, show_outcome
     from volery.cli.progress import run_progress
     from volery.run.assembly.fences import read_fence
     from volery.run.fly import Restrictions
     from volery.run.fly import fly as run_flight
-    from volery.run.recording import make_folder
     from volery.run.result import Options
 
     if not mission.is_file():
@@ -63,9 +64,19 @@ def fly(
         highest=ceiling,
         battery_reserve=_share(reserve) if reserve is not None else None,
     )
-    folder = make_folder(out or next_folder(mission.stem))
-    with run_progress(output, f"{mission.name} on {', '.join(on)}") as show:
-        options = Options(fidelity="hardware", seed=seed, pace=pace, out=folder, show=show, tell=output.note)
+    with (
+        run_folder(out, mission.stem) as folder,
+        run_progress(output, f"{mission.name} on {', '.join(on)}") as show,
+    ):
+        options = Options(
+            fidelity="hardware",
+            seed=seed,
+            pace=pace,
+            out=folder,
+            show=show,
+            tell=output.note,
+            log=read_log_options(log_file, log_level),
+        )
         run = run_flight(mission, on, options, restrictions)
     return show_outcome(output, run)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +14,8 @@ from volery.cli.console import Output
 from volery.cli.options import (
     Allocation,
     Fidelity,
+    LogFile,
+    LogLevel,
     Model,
     Out,
     Overrides,
@@ -42,27 +45,34 @@ def simulate(
         ),
     ] = "",
     out: Out = None,
+    log_file: LogFile = None,
+    log_level: LogLevel = "info",
 ) -> int:
     """Run a model in virtual time and judge its requirements.
 
     Exit status: 0 if the run completed and met every requirement, 2 for bad input, 1 otherwise.
     """
     require_extra("simulation", "simulated runs")
-    from volery.cli.outcome import next_folder, show_outcome
+    from volery.cli.outcome import read_log_options, run_folder, show_outcome
     from volery.cli.progress import run_progress
     from volery.model.system_loader import load
     from volery.run.assembly.vocabulary import vocabulary
-    from volery.run.recording import make_folder
     from volery.run.result import Options
     from volery.run.simulate import simulate as run_simulation
 
     pace = parse_speed(speed)
     system = load(model, vocabulary(), scenario, allocation, overrides or ())
-    folder = make_folder(out or next_folder(system.name))  # before anything that takes time
     title = " · ".join(filter(None, (system.name, system.allocation, system.scenario)))
-    with run_progress(output, title) as show:
+    with run_folder(out, system.name) as folder, run_progress(output, title) as show:
         options = Options(
-            fidelity=fidelity, seed=seed, pace=pace, out=folder, show=show, tell=output.note, graph=graph
+            fidelity=fidelity,
+            seed=seed,
+            pace=pace,
+            out=folder,
+            show=show,
+            tell=output.note,
+            graph=graph,
+            log=read_log_options(log_file, log_level),
         )
         run = run_simulation(system, options)
     return show_outcome(output, run)
@@ -75,9 +85,10 @@ def report(
 ) -> int:
     """Write the report of a run again from its trace, or compare several runs.
 
-    Also writes the report of a run that was killed.
+    Also writes the report of a run that was killed. The comparison of several is written as a page into the
+    folder that contains them.
     """
-    from volery.report.html_report import recover
+    from volery.report.html_report import recover, write_comparison
     from volery.report.terminal import comparison_table, summary_table
 
     found = [recover(folder) for folder in folders]
@@ -92,4 +103,8 @@ def report(
         output.note(f"report: {one.report}")
         if one.lost:
             output.note(f"  {one.lost}")
+    if len(folders) > 1:
+        common = Path(os.path.commonpath([folder.resolve().parent for folder in folders]))
+        shown = Path(os.path.relpath(common))
+        output.note(f"side by side: {write_comparison(folders, shown)}")
     return OK

@@ -1,11 +1,15 @@
 """`volery report` on run folders, whole and cut short."""
 
+import io
 import json
 
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from volery.cli.main import app
+from volery.report.html_report import recover
+from volery.report.terminal import comparison_table
 from volery.requirements.accounts import Accounts
 from volery.requirements.record import write_record
 from volery.ros.messages.store import definition
@@ -51,6 +55,30 @@ def test_several_are_compared(folder, tmp_path):
     assert result.exit_code == 0, result.output
     assert "fast" in result.stdout
     assert "slow" in result.stdout
+
+
+def test_the_comparison_is_written_as_a_page(folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    make_run(tmp_path / "slow", 600.0)
+    result = report("fast", "slow")
+    assert "side by side: comparison.html" in result.stderr
+    page = (tmp_path / "comparison.html").read_text()
+    assert "fast/report.html" in page
+
+
+def test_one_report_writes_no_comparison(folder, tmp_path):
+    assert report(folder).exit_code == 0
+    assert not (tmp_path / "comparison.html").exists()
+
+
+def test_the_comparison_fits_80_columns_with_whole_words(folder, tmp_path):
+    records = [recover(one).record for one in (folder, make_run(tmp_path / "slow", 600.0))]
+    console = Console(file=io.StringIO(), width=80)
+    console.print(comparison_table(records, ["fast", "slow"]))
+    said = console.file.getvalue()
+    assert max(len(line) for line in said.splitlines()) <= 80
+    for word in ("utilisation", "frequency", "rpi4-cortex-a72", "rover_north", "planned", "energy"):
+        assert word in said
 
 
 def test_json_is_the_record_and_nothing_else(folder, tmp_path):
