@@ -65,14 +65,16 @@ def test_no_message_upsets_it(sent: list[Frame], where: str) -> None:
         link.send(Frame(name, {"ac_id": AIRCRAFT, **fields}, 0, 0))
 
     if where != "ground":
-        send("SETTING", index=1, value=0.0)
+        send("SETTING", index=4, value=0.0)
         send("BLOCK", block_id=4)
         kernel.run(8 * S)
     if where == "guided":
-        send("SETTING", index=3, value=19.0)
+        send("SETTING", index=5, value=19.0)
     for frame in sent:
         link.send(frame)
         kernel.run(kernel.now() + 100 * MS)
+    send("SETTING", index=0, value=0.0)  # the default list of messages
+    kernel.run(kernel.now() + 100 * MS)
     received.clear()
     kernel.run(kernel.now() + 3 * S)
     assert {"ROTORCRAFT_FP", "ROTORCRAFT_STATUS", "ROTORCRAFT_NAV_STATUS"} <= {one.name for one in received}

@@ -53,8 +53,14 @@ def set_ground_reference(nav: Navigation) -> None:
 
 
 def on_ground(nav: Navigation) -> bool:
-    """Return whether the vehicle is on the ground (NavDetectGround)."""
-    return nav.vehicle.estimate.landed
+    """Return whether a landing from the air has reached the ground (NavDetectGround)."""
+    return nav.vehicle.estimate.landed and nav.vehicle.firmware_state.landing_from_air
+
+
+def touch_down_here(nav: Navigation) -> None:
+    """Move TD to the vehicle; from the ground no touch-down is detected later."""
+    nav.vehicle.firmware_state.landing_from_air = in_flight(nav.vehicle)
+    nav.set_here("TD")
 
 
 def stage_lasted(seconds: float) -> Condition:
@@ -107,7 +113,7 @@ PLAN = FlightPlan(
             ),
         ),
         Block("circle CAM", (Circle("CAM"),)),
-        Block("land here", (Once(lambda nav: nav.set_here("TD")),)),
+        Block("land here", (Once(touch_down_here),)),
         Block("land", (Go("TD"),)),
         Block(
             "flare",
@@ -115,5 +121,6 @@ PLAN = FlightPlan(
             ((on_ground, "Holding point"), (lambda nav: not in_flight(nav.vehicle), "landed")),
         ),
         Block("landed", (Idle(),)),
+        Block("HOME", (Stay("HOME"),)),
     ),
 )

@@ -1,13 +1,12 @@
 """Handlers of the messages from the ground segment.
 
 Nothing is acknowledged: a setting is answered by its value, a moved waypoint by its position; everything else
-shows in the telemetry only.
+shows in the telemetry only. EMERGENCY_CMD has no effect and RC_4CH no longer exists in the observed version.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import isfinite
 from typing import Any
 
 from volery.base.frames import ned_to_enu
@@ -26,8 +25,6 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 
 Fields = dict[str, Any]
 
-KILL_ALL, STANDBY, LAND = range(3)
-"""Values of EMERGENCY_CMD.cmd."""
 MANUAL_BELOW, AUTO2_ABOVE = -FULL // 2, FULL // 2
 """Limits of the mode switch."""
 
@@ -40,20 +37,22 @@ def on_ping(vehicle: Vehicle, _fields: Fields) -> None:
 def on_setting(vehicle: Vehicle, fields: Fields) -> None:
     """Handle SETTING: write, and send the new value."""
     value = parameters.write_setting(vehicle, fields["index"], fields["value"])
-    if value is not None:
-        vehicle.output.send_event("DL_VALUE", {"index": fields["index"], "value": value})
+    vehicle.output.send_event("DL_VALUE", {"index": fields["index"], "value": value})
 
 
 def on_get_setting(vehicle: Vehicle, fields: Fields) -> None:
     """Handle GET_SETTING."""
     value = parameters.read_setting(vehicle, fields["index"])
-    if value is not None:
-        vehicle.output.send_event("DL_VALUE", {"index": fields["index"], "value": value})
+    vehicle.output.send_event("DL_VALUE", {"index": fields["index"], "value": value})
 
 
 def on_block(vehicle: Vehicle, fields: Fields) -> None:
-    """Handle BLOCK, which changes the block in any mode; only NAV flies it."""
-    state_of(vehicle).navigation.jump(fields["block_id"])
+    """Handle BLOCK, which changes the block in any mode; only NAV flies it.
+
+    A number beyond the plan means its last block.
+    """
+    navigation = state_of(vehicle).navigation
+    navigation.jump(min(fields["block_id"], len(navigation.plan.blocks) - 1))
 
 
 def on_move_waypoint(vehicle: Vehicle, fields: Fields) -> None:
@@ -66,40 +65,13 @@ def on_move_waypoint(vehicle: Vehicle, fields: Fields) -> None:
 
 
 def on_guided(vehicle: Vehicle, fields: Fields) -> None:
-    """Handle GUIDED_SETPOINT_NED, which is ignored in every mode but GUIDED."""
+    """Handle GUIDED_SETPOINT_NED: ignored in every mode but GUIDED, and obeyed there whatever it says."""
     manoeuvre = vehicle.manoeuvre
-    values = fields["x"], fields["y"], fields["z"]
-    if isinstance(manoeuvre, Guided) and all(map(isfinite, (*values, fields["yaw"]))):
-        manoeuvre.follow(fields["flags"], values, fields["yaw"])
-
-
-def on_emergency(vehicle: Vehicle, fields: Fields) -> None:
-    """Handle EMERGENCY_CMD: motors off, block Standby, or FAILSAFE."""
-    command = fields["cmd"]
-    if command == KILL_ALL:
-        modes.set_mode(vehicle, modes.KILL)
-    elif command == STANDBY:
-        state_of(vehicle).navigation.go_to_block("Standby")
-        modes.set_mode(vehicle, modes.NAV)
-    elif command == LAND:
-        modes.set_mode(vehicle, modes.FAILSAFE)
+    if isinstance(manoeuvre, Guided):
+        manoeuvre.follow(fields["flags"], (fields["x"], fields["y"], fields["z"]), fields["yaw"])
 
 
 # -- sticks
-
-
-def on_sticks(vehicle: Vehicle, fields: Fields) -> None:
-    """Handle RC_4CH: counts of 1/128; the switch is 0, 1 or 2."""
-    _receive(
-        vehicle,
-        StickFrame(
-            bounded(PER_COUNT * fields["roll"]),
-            bounded(PER_COUNT * fields["pitch"]),
-            bounded(PER_COUNT * fields["yaw"]),
-            bounded(PER_COUNT * min(127, fields["throttle"]), 0),
-            bounded(FULL * (fields["mode"] - 1)),
-        ),
-    )
 
 
 def on_channels(vehicle: Vehicle, fields: Fields) -> None:
@@ -141,13 +113,11 @@ def _switch(vehicle: Vehicle, position: int) -> None:
 
 HANDLERS: Mapping[str, Callable[[Vehicle, Fields], None]] = {
     "BLOCK": on_block,
-    "EMERGENCY_CMD": on_emergency,
     "GET_SETTING": on_get_setting,
     "GUIDED_SETPOINT_NED": on_guided,
     "JOYSTICK_RAW": on_joystick,
     "MOVE_WP": on_move_waypoint,
     "PING": on_ping,
-    "RC_4CH": on_sticks,
     "RC_UP": on_channels,
     "SETTING": on_setting,
 }

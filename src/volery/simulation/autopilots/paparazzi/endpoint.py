@@ -13,13 +13,13 @@ from volery.simulation.autopilots.paparazzi.rotorcraft_state import state_of
 from volery.simulation.autopilots.paparazzi.telemetry import (
     PERIODIC_MESSAGES,
     PeriodicMessage,
-    rotorcraft_status,
+    is_listed,
 )
 from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import Text
 
-ANSWER_DELAY: Ns = 5 * MS
-"""Time between the arrival of a message and its effect."""
+ANSWER_DELAY: Ns = 15 * MS
+"""Time between the arrival of a message and its effect: recorded 5 to 40 ms."""
 PHASE: Ns = 20 * MS
 """Offset between the first messages of two kinds."""
 AUTOPILOT = 0
@@ -73,12 +73,10 @@ class PaparazziEndpoint:
         self._active = True
 
     def _begin(self, periodic: PeriodicMessage) -> None:
-        send = partial(self._send_periodic, periodic)
-        send()
-        self._clocks.append(self._kernel.every(periodic.period, send))
+        self._clocks.append(self._kernel.every(periodic.period, partial(self._send_periodic, periodic)))
 
     def _send_periodic(self, periodic: PeriodicMessage) -> None:
-        if self._links:
+        if self._links and is_listed(self._vehicle, periodic.name):
             fields = periodic.build(self._vehicle)
             if fields is not None:
                 self.send_event(periodic.name, fields)
@@ -101,9 +99,7 @@ class PaparazziEndpoint:
         """Send nothing: settings are sent periodically."""
 
     def mode_changed(self) -> None:
-        """Send ROTORCRAFT_STATUS at once."""
-        if self._active:
-            self.send_event("ROTORCRAFT_STATUS", rotorcraft_status(self._vehicle))
+        """Send nothing: the next ROTORCRAFT_STATUS shows the mode, as recorded."""
 
     def home_changed(self) -> None:
         """Send nothing: INS_REF is sent periodically."""

@@ -1,7 +1,8 @@
 """Paparazzi's rotorcraft firmware: modes and boot, composed as a firmware, and the list of assumptions.
 
-Protocol and rules follow public definitions and sources of the static autopilot; there is no recording of a
-flight to compare with. The figures of an airframe file stand in ``parameters.FIGURES``.
+Protocol and rules follow public definitions and sources of the static autopilot, and recordings of version 6.2
+in its own simulator NPS (stock example ``ardrone2``). The figures of an airframe file stand in
+``parameters.FIGURES``.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ from volery.simulation.autopilots.vehicle_state import (
 TICK: Ns = S // 16
 """Navigation and all other periodic work run at 16 Hz."""
 
-READY: Ns = 2 * S
+READY: Ns = 100 * MS
 HOLDING_POINT = PLAN.block_number("Holding point")
 
 MODES = {
@@ -121,46 +122,35 @@ ROTORCRAFT = Firmware(
 )
 
 ASSUMED: Mapping[str, str] = {
-    "aircraft": "the stock rotorcraft: settings, blocks and waypoints of the files in "
+    "aircraft": "the stock rotorcraft: blocks, waypoints and the first six of some 85 settings, in "
     "`links/stock_rotorcraft`",
-    "switching on": "telemetry after 2 s, attitude aligned after 4 s, first fix after 12 s; the "
-    "start-up mode is NAV",
-    "Geo init": "lasts 10 s, then sets origin and home position at the vehicle; in the air it has no effect",
-    "transmitter": "none; manual control by RC_4CH, RC_UP (roll, pitch, yaw, throttle, mode) or "
+    "switching on": "a fix at once, attitude aligned after 0.3 s",
+    "Geo init": "sets origin and home position at the vehicle; in the air it has no effect",
+    "transmitter": "none; manual control by RC_UP (roll, pitch, yaw, throttle, mode) or "
     "JOYSTICK_RAW (switch at AUTO2)",
     "sticks": "right, nose up and clockwise are positive; a frame acts at once, the last one holds "
     "while the radio is LOST",
     "modes": "KILL, FAILSAFE, HOME, ATTITUDE_DIRECT, ATTITUDE_RC_CLIMB, ATTITUDE_Z_HOLD, HOVER_Z_HOLD, "
     "NAV and GUIDED are built in; others are refused without a report",
-    "HOME": "flies straight to the waypoint HOME at its height and stays there; it does not land",
-    "FAILSAFE": "level descent that drifts with the wind; left by the setting `mode`, or by a "
-    "transmitter in MANUAL",
-    "KILL": "stops the motors anywhere; they start again only in another mode and with `kill_throttle` 0",
-    "kill_throttle": "starts motors in every mode but KILL, on the ground and in the air",
-    "arming_status": "ARMED; else the reason of the last refusal (KILLED, AHRS_NOT_ALLIGNED, "
-    "LOW_BATTERY); else NO_RC, WAITING or UNARMED_IN_AUTO",
+    "FAILSAFE": "left by the setting `mode`, or by a transmitter in MANUAL",
     "in flight": "motors on, and the landed detector of the simulated flight stack does not detect the "
     "ground",
     "NAV": "flies at the airframe's speeds with the heading at entry; on lines and circles it follows a "
     "point 12 m ahead",
-    "block Takeoff": "climbs vertically at NAV_CLIMB_VSPEED to 2 m, then continues with Standby",
-    "block land here": "moves TD below the vehicle, descends to TD's height, then at NAV_DESCEND_VSPEED "
-    "to the ground, where Holding point stops the motors",
     "blocks in other modes": "execute, except for starting and stopping motors; NAV continues from "
     "their present state",
-    "GUIDED": "begins by holding position and heading; a set-point 0.3 m above, or a climb above 0.1 "
-    "m/s, takes off; on the ground the motors idle and stay on",
+    "GUIDED": "keeps an aircraft on the ground whose set-point is 0.2 m below it, or sinks",
     "GUIDED_SETPOINT_NED": "offsets count from the estimate at arrival; body velocities are rotated "
-    "once; values that are not finite are ignored",
+    "once; a yaw that is not finite changes nothing",
     "GUIDED_FULL_NED, REMOTE_GPS_LOCAL": "not supported",
     "MISSION_...": "not supported: the stock plan flies no uploaded mission",
     "guided in NAV": "does not occur: the stock plan has no guided instruction",
-    "EMERGENCY_CMD": "KILL: mode KILL; STANDBY: mode NAV in block Standby; LAND: mode FAILSAFE",
-    "MOVE_WP": "acts at once and is answered by WP_MOVED_ENU; ignored before there is an origin",
-    "telemetry": "ATTITUDE and ROTORCRAFT_RADIO_CONTROL every 0.5 s, DL_VALUE 1.1 s and WP_MOVED_ENU "
-    "1.3 s in turn; ROTORCRAFT_STATUS also when the mode changes",
-    "satellites lost in GUIDED": "no effect: the vehicle flies on with the estimate",
-    "sea level": "coincides with the ellipsoid",
-    "battery": "measured without error; it counts only with FAILSAFE_ON_BAT_CRITICAL",
+    "MOVE_WP": "is ignored before there is an origin",
+    "telemetry modes": "1 to 9 are lists without ROTORCRAFT_FP and ROTORCRAFT_NAV_STATUS, as was "
+    "recorded of 3",
+    "satellites lost in GUIDED": "no effect: the vehicle flies on with the estimate, which drifts; "
+    "`ardrone2` freezes its position, `bebop` goes on by inertia without error",
+    "sea level": "is 49.85 m below the ellipsoid's height, as at the place of the recordings",
+    "battery": "measured without error",
 }
 """Subject and assumption, as in docs/paparazzi.md."""

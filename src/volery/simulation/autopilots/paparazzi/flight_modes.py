@@ -6,17 +6,105 @@ Set-points of GUIDED are a position or a velocity for each axis, and never expir
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, sin
+from math import cos, isfinite, sin
 
 from volery.base.frames import Vector, enu_to_ned, wrap
+from volery.base.time import MS, Ns, from_seconds, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ManualFlight, Stabilize
 from volery.simulation.autopilots.paparazzi.flight_plan import Demand, Vertical
+from volery.simulation.autopilots.paparazzi.guidance_loops import SUBSTEP, GuidanceLoops, as_obeyed
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import state_of
 from volery.simulation.autopilots.vehicle_state import IDLE, Manoeuvre, Vehicle
 
-LIFT_OFF_M, LIFT_OFF_M_S = 0.3, 0.1
-"""Height [m] and climb rate [m/s] above which a set-point takes a standing vehicle off the ground."""
+LIFT_OFF_M = 0.3
+"""Height [m] above which the plan's target takes a standing vehicle off the ground."""
+
+BELOW_M, SINKING_M_S = 0.2, 0.1
+"""Distance below the vehicle [m] and sink rate [m/s] from which a set-point of GUIDED keeps it on the ground."""
+
+OFFSET_AT_LIFT_OFF = 0.35
+"""Height to which GUIDED lifts a standing aircraft when its motors run; observed 0.4 to 0.5 m [m]."""
+
+FOLLOW_GAIN, FOLLOW_LEAD = 0.4, 0.45
+"""How the flight stack follows the guidance loops: gain [1/s] and lead [s]."""
+
+FOLLOW_ACCEL, FOLLOW_JERK, FASTEST = 10.0, 80.0, 15.0
+"""Limits of the flight stack [m/s^2, m/s^3, m/s]; the guidance loops limit the motion."""
+
+
+class Guidance(Manoeuvre):
+    """A manoeuvre that the firmware's guidance loops fly, with their overshoot."""
+
+    RESTART_AFTER: Ns = 500 * MS
+    """Time without a step after which the loops start anew."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._loops: GuidanceLoops | None = None
+        self._last_step_ns: Ns = 0
+
+    def fly_loops(
+        self,
+        plane: tuple[float, float],
+        down: float,
+        *,
+        plane_is_velocity: bool,
+        down_is_velocity: bool,
+        yaw: float | None,
+        yaw_rate: float | None = None,
+    ) -> None:
+        """Move the loops to now and follow them.
+
+        Args:
+            plane: North and east of the goal [m], or their velocities [m/s].
+            down: Down of the goal [m], or the velocity [m/s].
+            plane_is_velocity: Whether ``plane`` is a velocity; likewise ``down_is_velocity``.
+            down_is_velocity: Whether ``down`` is a velocity.
+            yaw: Heading [rad], or None for a rate.
+            yaw_rate: Turn rate [rad/s].
+        """
+        vehicle, tuning, estimate = self.vehicle, self.vehicle.tuning, self.vehicle.estimate
+        loops = self._moved_loops()
+        for _ in range(self._substeps()):
+            if plane_is_velocity:
+                loops.plane.step_at(plane, tuning.speed)
+            else:
+                loops.plane.step_to(plane, tuning.speed)
+            if down_is_velocity:
+                loops.height.step_at(-down, tuning.speed_up, tuning.speed_down)
+            else:
+                loops.height.step_to(-down, tuning.speed_up, tuning.speed_down)
+        vehicle.drive(
+            Setpoint(
+                Control.VELOCITY,
+                velocity=loops.correction(estimate.position, FOLLOW_GAIN, FOLLOW_LEAD),
+                yaw=yaw,
+                yaw_rate=yaw_rate,
+                speed=FASTEST,
+                speed_up=FASTEST,
+                speed_down=FASTEST,
+                accel=FOLLOW_ACCEL,
+                accel_z=FOLLOW_ACCEL,
+                tilt=tuning.tilt,
+                jerk=FOLLOW_JERK,
+            )
+        )
+
+    def _moved_loops(self) -> GuidanceLoops:
+        vehicle, estimate = self.vehicle, self.vehicle.estimate
+        late = vehicle.kernel.now() - self._last_step_ns > self.RESTART_AFTER
+        if self._loops is None or late or self._loops.away_from(estimate.position):
+            offset = 0.0 if vehicle.ground.lifted else OFFSET_AT_LIFT_OFF
+            self._loops = GuidanceLoops(estimate.position, estimate.velocity, offset)
+            self._last_step_ns = vehicle.kernel.now()
+        return self._loops
+
+    def _substeps(self) -> int:
+        now = self.vehicle.kernel.now()
+        steps = round(to_seconds(now - self._last_step_ns) / SUBSTEP)
+        self._last_step_ns += from_seconds(steps * SUBSTEP)
+        return steps
 
 
 class Killed(Manoeuvre):
@@ -28,20 +116,19 @@ class Killed(Manoeuvre):
 
 
 class FailsafeDescent(Manoeuvre):
-    """FAILSAFE: level descent at FAILSAFE_DESCENT_SPEED, drifting with the wind."""
-
-    landing = True
+    """FAILSAFE: level, drifting with the wind, at FAILSAFE_DESCENT_SPEED; v6.2 keeps its height."""
 
     def step(self) -> None:
         """Command the descent."""
         speed = self.vehicle.parameters["FAILSAFE_DESCENT_SPEED"]
+        self.landing = speed > 0.0
         tuning = self.vehicle.tuning
         self.vehicle.drive(
             Setpoint(Control.CLIMB, climb=-speed, speed_down=max(0.1, speed), accel_z=tuning.accel_z)
         )
 
 
-class FlyPlan(Manoeuvre):
+class FlyPlan(Guidance):
     """NAV: fly what the flight plan demands."""
 
     def enter(self) -> None:
@@ -63,26 +150,20 @@ class FlyPlan(Manoeuvre):
 
     def step(self) -> None:
         """Command the demand."""
-        demand, tuning = self.demand, self.vehicle.tuning
+        demand = self.demand
         self.landing = demand.vertical is Vertical.CLIMB and demand.climb < 0.0
         self.target = None if demand.vertical is Vertical.THROTTLE else enu_to_ned(demand.goal)
         if demand.vertical is Vertical.THROTTLE:
             self.vehicle.drive(IDLE)
             return
         climbs = demand.vertical is Vertical.CLIMB
-        self.vehicle.drive(
-            Setpoint(
-                Control.POSITION_CLIMB if climbs else Control.POSITION,
-                position=enu_to_ned(demand.target),
-                climb=demand.climb,
-                yaw=state_of(self.vehicle).navigation.heading,
-                speed=tuning.speed,
-                speed_up=tuning.speed_up,
-                speed_down=tuning.speed_down,
-                accel=tuning.accel,
-                accel_z=tuning.accel_z,
-                tilt=tuning.tilt,
-            )
+        north, east, down = enu_to_ned(demand.target)
+        self.fly_loops(
+            (north, east),
+            -demand.climb if climbs else down,
+            plane_is_velocity=False,
+            down_is_velocity=climbs,
+            yaw=state_of(self.vehicle).navigation.heading,
         )
 
 
@@ -156,7 +237,7 @@ class GuidedSetpoint:
     yaw_is_rate: bool = False
 
 
-class Guided(Manoeuvre):
+class Guided(Guidance):
     """GUIDED: hold the last set-point; at first the position where the mode was entered."""
 
     def __init__(self, vehicle: Vehicle) -> None:
@@ -184,11 +265,11 @@ class Guided(Manoeuvre):
         return self.vehicle.estimate.position
 
     def takeoff_requested(self) -> bool:
-        """Return whether the set-point climbs or is above the vehicle."""
+        """Return whether the set-point is not below the vehicle: with motors on it lifts off by itself."""
         setpoint = self._setpoint
         if setpoint.height_is_velocity:
-            return setpoint.down < -LIFT_OFF_M_S
-        return setpoint.down < self._position[2] - LIFT_OFF_M
+            return setpoint.down < SINKING_M_S
+        return setpoint.down < self._position[2] + BELOW_M
 
     def follow(self, flags: int, values: Vector, yaw: float) -> None:
         """Apply GUIDED_SETPOINT_NED.
@@ -201,9 +282,9 @@ class Guided(Manoeuvre):
             values: North, east, down as the flags define them [m or m/s].
             yaw: Heading, offset or rate, clockwise [rad or rad/s].
         """
-        setpoint = self._plane(flags, values[0], values[1])
-        setpoint = self._height(setpoint, flags, values[2])
-        self._hold(self._turned(setpoint, flags, yaw))
+        north, east, down = (as_obeyed(value) for value in values)
+        setpoint = self._height(self._plane(flags, north, east), flags, down)
+        self._hold(self._turned(setpoint, flags, yaw) if isfinite(yaw) else setpoint)
         if self.vehicle.armed:
             self.vehicle.run_manoeuvre()
 
@@ -239,22 +320,14 @@ class Guided(Manoeuvre):
 
     def step(self) -> None:
         """Command the set-point."""
-        wanted, tuning = self._setpoint, self.vehicle.tuning
-        self.vehicle.drive(
-            Setpoint(
-                _CONTROLS[wanted.plane_is_velocity, wanted.height_is_velocity],
-                position=(wanted.north, wanted.east, wanted.down),
-                velocity=(wanted.north, wanted.east, wanted.down),
-                climb=-wanted.down,
-                yaw=None if wanted.yaw_is_rate else wanted.yaw,
-                yaw_rate=wanted.yaw if wanted.yaw_is_rate else None,
-                speed=tuning.speed,
-                speed_up=tuning.speed_up,
-                speed_down=tuning.speed_down,
-                accel=tuning.accel,
-                accel_z=tuning.accel_z,
-                tilt=tuning.tilt,
-            )
+        wanted = self._setpoint
+        self.fly_loops(
+            (wanted.north, wanted.east),
+            wanted.down,
+            plane_is_velocity=wanted.plane_is_velocity,
+            down_is_velocity=wanted.height_is_velocity,
+            yaw=None if wanted.yaw_is_rate else wanted.yaw,
+            yaw_rate=wanted.yaw if wanted.yaw_is_rate else None,
         )
 
     def carrot(self) -> tuple[Vector, float]:
@@ -262,12 +335,3 @@ class Guided(Manoeuvre):
         wanted, here = self._setpoint, self.vehicle.estimate
         plane = here.position[:2] if wanted.plane_is_velocity else (wanted.north, wanted.east)
         return (*plane, self._target_down()), here.attitude[2] if wanted.yaw_is_rate else wanted.yaw
-
-
-_CONTROLS = {
-    (False, False): Control.POSITION,
-    (False, True): Control.POSITION_CLIMB,
-    (True, False): Control.VELOCITY_HEIGHT,
-    (True, True): Control.VELOCITY,
-}
-"""Control by whether plane and height are velocities."""

@@ -7,7 +7,7 @@ switch. A refusal is not reported: the mode in the telemetry stays the same.
 
 from __future__ import annotations
 
-from volery.base.time import Ns, S
+from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import RADIO_OK, state_of
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -20,11 +20,14 @@ WITHOUT_RADIO = (NAV, MODULE, FLIP, GUIDED)
 UNSUPERVISED = (KILL, HOME, FAILSAFE, *WITHOUT_RADIO)
 """Modes in which lost radio control has no effect."""
 
-NO_RC, WAITING, ARMED, KILLED, UNARMED_IN_AUTO, NOT_ALIGNED, LOW_BATTERY = 0, 1, 3, 5, 9, 15, 17
+BATTERY_PATIENCE: Ns = 5 * S
+"""Time for which the battery is critical before it counts, as recorded."""
+
+NO_RC, ARMED = 0, 3
 """Values of ROTORCRAFT_STATUS.arming_status that occur here."""
 
 
-ALIGNED_AFTER: Ns = 4 * S
+ALIGNED_AFTER: Ns = 300 * MS
 """Uptime at which the attitude is aligned."""
 
 
@@ -51,6 +54,7 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
     if mode is not vehicle.mode:
         if number == KILL:
             vehicle.disarm()
+        state_of(vehicle).mode_since_ns = vehicle.kernel.now()
         vehicle.enter_mode(mode)
     return True
 
@@ -65,40 +69,26 @@ def set_motors(vehicle: Vehicle, on: bool) -> None:
     """Start or stop the motors.
 
     They do not start in KILL, before the attitude is aligned, or with a critical battery that is a failsafe.
-    The arming status shows the reason.
     """
-    state = state_of(vehicle)
     if not on:
-        state.refused = None
         if vehicle.armed:
             vehicle.disarm()
         return
-    state.refused = _refusal(vehicle)
-    if state.refused is None and not vehicle.armed:
+    refused = vehicle.mode.number == KILL or not aligned(vehicle) or battery_critical(vehicle)
+    if not refused and not vehicle.armed:
         vehicle.arm()
 
 
-def _refusal(vehicle: Vehicle) -> int | None:
-    if vehicle.mode.number == KILL:
-        return KILLED
-    if not aligned(vehicle):
-        return NOT_ALIGNED
-    return LOW_BATTERY if battery_critical(vehicle) else None
-
-
 def battery_critical(vehicle: Vehicle) -> bool:
-    """Return whether the battery is below CRITIC_BAT_LEVEL, if the airframe makes that a failsafe."""
-    wanted = vehicle.parameters["FAILSAFE_ON_BAT_CRITICAL"] > 0.0
-    return wanted and vehicle.estimate.battery_volts < vehicle.parameters["CRITIC_BAT_LEVEL"]
+    """Return whether the battery has been below CRITIC_BAT_LEVEL for 5 s, if the airframe minds that."""
+    if vehicle.parameters["FAILSAFE_ON_BAT_CRITICAL"] <= 0.0:
+        return False
+    state, now = state_of(vehicle), vehicle.kernel.now()
+    if vehicle.estimate.battery_volts >= vehicle.parameters["CRITIC_BAT_LEVEL"]:
+        state.battery_good_ns = now
+    return now - state.battery_good_ns >= BATTERY_PATIENCE
 
 
 def arming_status(vehicle: Vehicle) -> int:
-    """Return ROTORCRAFT_STATUS.arming_status."""
-    state = state_of(vehicle)
-    if vehicle.armed:
-        return ARMED
-    if state.refused is not None:
-        return state.refused
-    if state.radio.status(vehicle) != RADIO_OK:
-        return NO_RC
-    return UNARMED_IN_AUTO if not vehicle.mode.pilot else WAITING
+    """Return ROTORCRAFT_STATUS.arming_status: as recorded it says only whether there is radio control."""
+    return ARMED if state_of(vehicle).radio.status(vehicle) == RADIO_OK else NO_RC

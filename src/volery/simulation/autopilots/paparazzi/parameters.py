@@ -1,7 +1,7 @@
 """Figures of the airframe as parameters, and settings that a ground station reads and writes by number.
 
-Names are the firmware's own where it has one. No value is recorded: they are documented defaults of the
-firmware, or assumptions (docs/paparazzi.md). The numbers of settings are those of the stock rotorcraft.
+Names are the firmware's own where it has one. Values are observed of the stock rotorcraft, documented defaults
+of the firmware, or assumptions (docs/paparazzi.md). The numbers of settings are those of the stock rotorcraft.
 Values outside the bounds of a setting are accepted, as in the firmware: only the ground station checks the
 bounds.
 """
@@ -38,24 +38,24 @@ class Figure(NamedTuple):
 FIGURES: Mapping[str, Figure] = {
     "MODE_STARTUP": Figure(13.0, "mode after switching on: NAV"),
     MANUAL_SWITCH: Figure(4.0, "mode at the transmitter's MANUAL: ATTITUDE_DIRECT"),
-    AUTO1_SWITCH: Figure(12.0, "mode at AUTO1: HOVER_Z_HOLD"),
+    AUTO1_SWITCH: Figure(9.0, "mode at AUTO1: ATTITUDE_Z_HOLD"),
     AUTO2_SWITCH: Figure(13.0, "mode at AUTO2, the setting `auto2`: NAV"),
     "MAX_DIST_FROM_HOME": Figure(FARTHEST_M, "m from HOME at which NAV becomes HOME"),
     "FAILSAFE_MODE_DISTANCE": Figure(
-        1.5 * FARTHEST_M, "m from HOME beyond which it becomes FAILSAFE instead"
+        1.2 * FARTHEST_M, "m from HOME beyond which it becomes FAILSAFE instead"
     ),
-    "FAILSAFE_DESCENT_SPEED": Figure(1.5, "m/s in FAILSAFE"),
+    "FAILSAFE_DESCENT_SPEED": Figure(0.0, "m/s down in FAILSAFE: v6.2 keeps its height; 1.5 is intended"),
     "FAILSAFE_ON_BAT_CRITICAL": Figure(0.0, "1: a critical battery is FAILSAFE, and keeps motors off"),
     "CRITIC_BAT_LEVEL": Figure(0.0, "V that are critical; 3.1 V a cell of its battery"),
     "GEOFENCE_DATALINK_LOST_TIME": Figure(0.0, "s of silence after which NAV becomes HOME; 0: never"),
     "GEOFENCE_MAX_ALTITUDE": Figure(0.0, "m above the origin at which NAV becomes HOME; 0: none"),
-    "GPS_TIMEOUT": Figure(2.0, "s without a fix after which satellites are lost"),
+    "GPS_TIMEOUT": Figure(0.3, "s without a fix after which satellites are lost"),
     "RC_LOST_TIME": Figure(0.5, "s without sticks: LOST"),
     "RC_REALLY_LOST_TIME": Figure(1.0, "s without sticks: REALLY_LOST, in modes of sticks FAILSAFE"),
     "GUIDANCE_H_REF_MAX_SPEED": Figure(5.0, "m/s in the plane"),
     "GUIDANCE_H_REF_MAX_ACCEL": Figure(2.5, "m/s^2 in the plane"),
-    "GUIDANCE_V_REF_MAX_CLIMB": Figure(2.5, "m/s up"),
-    "GUIDANCE_V_REF_MAX_DESCENT": Figure(1.5, "m/s down"),
+    "GUIDANCE_V_REF_MAX_CLIMB": Figure(3.0, "m/s up"),
+    "GUIDANCE_V_REF_MAX_DESCENT": Figure(3.0, "m/s down"),
     "GUIDANCE_V_REF_MAX_ACCEL": Figure(1.0, "m/s^2 up and down"),
     "STABILIZATION_ATTITUDE_SP_MAX_PHI": Figure(30.0, "degrees of lean"),
     "STABILIZATION_ATTITUDE_SP_MAX_R": Figure(90.0, "degrees/s of turn by stick"),
@@ -119,37 +119,45 @@ def _parameter(name: str) -> Variable:
     return Variable(lambda vehicle: vehicle.parameters[name], write)
 
 
-def _nothing(_vehicle: Vehicle, _value: float) -> None:
-    """Ignore a write: the simulation has no such hardware."""
+def _set_telemetry_mode(vehicle: Vehicle, value: float) -> None:
+    vehicle.firmware_state.telemetry_mode = int(value)
+
+
+def _stored(number: int) -> Variable:
+    """Return a setting that is only stored: a number beyond the known settings, or hardware without a model."""
+
+    def write(vehicle: Vehicle, value: float) -> None:
+        vehicle.firmware_state.stored_settings[number] = value
+
+    return Variable(lambda vehicle: vehicle.firmware_state.stored_settings.get(number, 0.0), write)
 
 
 VARIABLES = {
-    "auto2": _parameter(AUTO2_SWITCH),
-    "kill_throttle": Variable(
+    "telemetry_mode_Main": Variable(
+        lambda vehicle: float(vehicle.firmware_state.telemetry_mode), _set_telemetry_mode
+    ),
+    "autopilot_mode_auto2": _parameter(AUTO2_SWITCH),
+    "autopilot.kill_throttle": Variable(
         lambda vehicle: float(not vehicle.armed), lambda vehicle, value: set_motors(vehicle, value == 0.0)
     ),
-    "autopilot_power_switch": Variable(lambda _vehicle: 1.0, _nothing),
-    "mode": Variable(
+    "autopilot.mode": Variable(
         lambda vehicle: float(vehicle.mode.number),
         lambda vehicle, value: set_mode_by_datalink(vehicle, int(value)),
     ),
 }
-"""Settings by the names of the stock rotorcraft."""
+"""Settings by the variables of the stock rotorcraft."""
 
-NUMBERED = {one.number: VARIABLES[one.name] for one in stock_aircraft().settings}
-
-
-def read_setting(vehicle: Vehicle, number: int) -> float | None:
-    """Return the value of a setting, or None if the number is unknown."""
-    variable = NUMBERED.get(number)
-    return None if variable is None else variable.read(vehicle)
+NUMBERED = {one.number: VARIABLES.get(one.variable, _stored(one.number)) for one in stock_aircraft().settings}
 
 
-def write_setting(vehicle: Vehicle, number: int, value: float) -> float | None:
-    """Write a setting, and return its new value, or None if the number is unknown."""
-    variable = NUMBERED.get(number)
-    if variable is None:
-        return None
+def read_setting(vehicle: Vehicle, number: int) -> float:
+    """Return the value of a setting; a number without a setting answers as well, at first with 0."""
+    return NUMBERED.get(number, _stored(number)).read(vehicle)
+
+
+def write_setting(vehicle: Vehicle, number: int, value: float) -> float:
+    """Write a setting, and return its new value; a number without a setting answers what was written."""
+    variable = NUMBERED.get(number, _stored(number))
     if isfinite(value):
         variable.write(vehicle, value)
     return variable.read(vehicle)

@@ -1,6 +1,6 @@
 """State that only the rotorcraft firmware keeps: radio control, GPS fix, datalink counters.
 
-There is no transmitter: sticks arrive by datalink (RC_4CH, RC_UP, JOYSTICK_RAW). A frame makes the radio
+There is no transmitter: sticks arrive by datalink (RC_UP, JOYSTICK_RAW). A frame makes the radio
 control OK at once; silence makes it LOST, then REALLY_LOST. Sticks are -9600..9600, throttle 0..9600; right,
 nose up and clockwise are positive.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from volery.base.time import Ns, S
+from volery.base.time import MS, Ns
 from volery.simulation.autopilots.paparazzi.flight_plan import Navigation
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -19,7 +19,7 @@ RADIO_OK, RADIO_LOST, RADIO_REALLY_LOST = 0, 1, 2
 FULL = 9600
 """Full deflection (MAX_PPRZ)."""
 PER_COUNT = FULL // 128
-"""Deflection of one count in RC_4CH and RC_UP."""
+"""Deflection of one count in RC_UP."""
 
 
 class StickFrame(NamedTuple):
@@ -72,8 +72,6 @@ class RotorcraftState:
 
     navigation: Navigation
     radio: RadioControl = field(default_factory=RadioControl)
-    refused: int | None = None
-    """Arming status of the last refused start of the motors, or None."""
     last_fix_ns: Ns = NEVER
     """Time of the last 3D fix."""
     last_uplink_ns: Ns = NEVER
@@ -83,6 +81,16 @@ class RotorcraftState:
     last_sent_waypoint: int = 0
     """Number of the waypoint that was last sent periodically; likewise of settings."""
     last_sent_setting: int = -1
+    telemetry_mode: int = 0
+    """Setting ``telemetry_mode_Main``: 0 is the default list of periodic messages."""
+    stored_settings: dict[int, float] = field(default_factory=dict)
+    """Values of settings without an effect, by number."""
+    mode_since_ns: Ns = NEVER
+    """Time of the last change of mode."""
+    battery_good_ns: Ns = NEVER
+    """Time at which the battery was last above its critical level."""
+    landing_from_air: bool = False
+    """Whether the block ``land here`` was entered in flight."""
 
 
 def state_of(vehicle: Vehicle) -> RotorcraftState:
@@ -93,7 +101,7 @@ def state_of(vehicle: Vehicle) -> RotorcraftState:
 
 
 FIX_3D = 3
-ACQUIRED_AFTER = 12 * S
+ACQUIRED_AFTER = 300 * MS
 """Uptime of the first fix."""
 
 

@@ -1,7 +1,7 @@
 """Periodic messages of a rotorcraft: their fields and periods.
 
 Periods are those of the default rotorcraft telemetry. Scales: positions 2^-8 m, velocities 2^-19 m/s, angles
-2^-12 rad; ECEF cm, degrees 1e-7, altitudes mm. Mean sea level and ellipsoid coincide here.
+2^-12 rad; ECEF cm, degrees 1e-7, altitudes mm.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from volery.base.frames import Vector, enu_to_ned, geodetic_to_ecef, ned_to_enu
 from volery.base.time import MS, Ns, S, to_seconds
+from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.simulation.autopilots.paparazzi import modes, rotorcraft_state
 from volery.simulation.autopilots.paparazzi.flight_modes import Guided
 from volery.simulation.autopilots.paparazzi.flight_plan import Vertical
@@ -24,10 +25,8 @@ Fields = dict[str, Any]
 
 POSITION, SPEED, ANGLE = 1 << 8, 1 << 19, 1 << 12
 """Counts in a metre, in a metre per second, in a radian."""
-MAIN_LOOP_HZ = 512 // 4
-"""Value of ROTORCRAFT_STATUS.frame_rate."""
-MD5SUM = tuple(range(0x10, 0x20))
-"""Placeholder for the checksum of the configuration in ALIVE."""
+ABOVE_ELLIPSOID_M = 49.85
+"""Height of mean sea level above the ellipsoid, as recorded; the simulated world has no geoid model."""
 GUIDANCE = {
     modes.KILL: (0, 0),
     modes.FAILSAFE: (0, 3),
@@ -37,7 +36,7 @@ GUIDANCE = {
     modes.ATTITUDE_Z_HOLD: (0, 4),
     modes.HOVER_Z_HOLD: (1, 4),
     modes.NAV: (2, 5),
-    modes.GUIDED: (3, 8),
+    modes.GUIDED: (3, 6),
 }
 """ROTORCRAFT_STATUS.ap_h_mode and ap_v_mode by mode."""
 
@@ -84,12 +83,6 @@ def _carrot(vehicle: Vehicle) -> tuple[Vector, float]:
     return enu_to_ned(demand.target), navigation.heading
 
 
-def attitude(vehicle: Vehicle) -> Fields:
-    """Return ATTITUDE."""
-    roll, pitch, yaw = vehicle.estimate.attitude
-    return {"phi": roll, "psi": yaw, "theta": pitch}
-
-
 def _centimetres(name: str, vector: Vector, fields: Fields) -> None:
     for axis, value in zip("xyz", vector, strict=True):
         fields[name.format(axis)] = to_counts(value, 100.0)
@@ -102,16 +95,18 @@ def gps_int(vehicle: Vehicle) -> Fields:
     fields: Fields = {
         "lat": to_counts(fix.latitude, 1e7),
         "lon": to_counts(fix.longitude, 1e7),
-        "alt": to_counts(fix.amsl, 1000.0),
+        "alt": to_counts(fix.amsl + ABOVE_ELLIPSOID_M, 1000.0),
         "hmsl": to_counts(fix.amsl, 1000.0),
         "pacc": to_unsigned(fix.h_acc * 100.0, 32),
         "sacc": to_unsigned(fix.speed_acc * 100.0, 32),
         "tow": to_unsigned(vehicle.uptime() // MS, 32),
         "pdop": to_unsigned(fix.eph * 100.0),
-        "numsv": fix.satellites if kind else 0,
+        "numsv": fix.satellites if kind else 1,
         "fix": kind,
     }
-    _centimetres("ecef_{}", geodetic_to_ecef(fix.latitude, fix.longitude, fix.amsl), fields)
+    _centimetres(
+        "ecef_{}", geodetic_to_ecef(fix.latitude, fix.longitude, fix.amsl + ABOVE_ELLIPSOID_M), fields
+    )
     _centimetres("ecef_{}d", _to_ecef(fix.velocity, fix.latitude, fix.longitude), fields)
     return fields
 
@@ -137,11 +132,11 @@ def ins_ref(vehicle: Vehicle) -> Fields | None:
     fields: Fields = {
         "lat0": to_counts(latitude, 1e7),
         "lon0": to_counts(longitude, 1e7),
-        "alt0": to_counts(amsl, 1000.0),
+        "alt0": to_counts(amsl + ABOVE_ELLIPSOID_M, 1000.0),
         "hmsl0": to_counts(amsl, 1000.0),
         "baro_qfe": vehicle.estimate.pressure * 100.0,
     }
-    _centimetres("ecef_{}0", geodetic_to_ecef(latitude, longitude, amsl), fields)
+    _centimetres("ecef_{}0", geodetic_to_ecef(latitude, longitude, amsl + ABOVE_ELLIPSOID_M), fields)
     return fields
 
 
@@ -150,7 +145,7 @@ def rotorcraft_status(vehicle: Vehicle) -> Fields:
     plane, height = GUIDANCE[vehicle.mode.number]
     return {
         "rc_status": state_of(vehicle).radio.status(vehicle),
-        "frame_rate": MAIN_LOOP_HZ,
+        "frame_rate": 0,
         "gps_status": rotorcraft_state.fix_type(vehicle),
         "ap_mode": vehicle.mode.number,
         "ap_in_flight": int(modes.in_flight(vehicle)),
@@ -160,7 +155,7 @@ def rotorcraft_status(vehicle: Vehicle) -> Fields:
         "ap_v_mode": height,
         "cpu_time": to_unsigned(to_seconds(vehicle.uptime())),
         "vsupply": vehicle.estimate.battery_volts,
-        "vboard": vehicle.estimate.battery_volts,
+        "vboard": 0.0,
     }
 
 
@@ -180,7 +175,7 @@ def nav_status(vehicle: Vehicle) -> Fields:
 
 def alive(_vehicle: Vehicle) -> Fields:
     """Return ALIVE."""
-    return {"md5sum": MD5SUM}
+    return {"md5sum": stock_aircraft().fingerprint}
 
 
 def energy(vehicle: Vehicle) -> Fields:
@@ -211,12 +206,6 @@ def datalink_report(vehicle: Vehicle) -> Fields:
     }
 
 
-def radio_control(vehicle: Vehicle) -> Fields:
-    """Return ROTORCRAFT_RADIO_CONTROL."""
-    radio = state_of(vehicle).radio
-    return {**radio.frame._asdict(), "kill": FULL, "status": radio.status(vehicle)}
-
-
 def waypoint(vehicle: Vehicle, number: int) -> Fields:
     """Return WP_MOVED_ENU of that waypoint."""
     east, north, up = state_of(vehicle).navigation.waypoints[number]
@@ -235,12 +224,14 @@ def next_waypoint(vehicle: Vehicle) -> Fields:
     return waypoint(vehicle, state.last_sent_waypoint)
 
 
-def next_setting(vehicle: Vehicle) -> Fields | None:
+def next_setting(vehicle: Vehicle) -> Fields:
     """Return DL_VALUE of the settings in turn."""
     state = state_of(vehicle)
     state.last_sent_setting = (state.last_sent_setting + 1) % len(NUMBERED)
-    value = read_setting(vehicle, state.last_sent_setting)
-    return None if value is None else {"index": state.last_sent_setting, "value": value}
+    return {
+        "index": state.last_sent_setting,
+        "value": read_setting(vehicle, state.last_sent_setting),
+    }
 
 
 class PeriodicMessage(NamedTuple):
@@ -258,8 +249,6 @@ def _period(seconds: float) -> Ns:
 PERIODIC_MESSAGES = (
     PeriodicMessage("ROTORCRAFT_FP", _period(0.25), rotorcraft_fp),
     PeriodicMessage("GPS_INT", _period(0.25), gps_int),
-    PeriodicMessage("ATTITUDE", _period(0.5), attitude),
-    PeriodicMessage("ROTORCRAFT_RADIO_CONTROL", _period(0.5), radio_control),
     PeriodicMessage("DL_VALUE", _period(1.1), next_setting),
     PeriodicMessage("ROTORCRAFT_STATUS", _period(1.2), rotorcraft_status),
     PeriodicMessage("WP_MOVED_ENU", _period(1.3), next_waypoint),
@@ -269,4 +258,18 @@ PERIODIC_MESSAGES = (
     PeriodicMessage("INS_REF", _period(5.1), ins_ref),
     PeriodicMessage("DATALINK_REPORT", _period(5.1), datalink_report),
 )
-"""Sorted by period, which is the order of messages that are due together."""
+"""Sorted by period, which is the order of messages that are due together.
+
+The observed aircraft also sends INS (4 Hz), AHRS_REF_QUAT (2 Hz), AIR_DATA, STATE_FILTER_STATUS and
+AUTOPILOT_VERSION, of which nothing here makes use.
+"""
+
+OTHER_MODES = range(1, 10)
+"""Values of ``telemetry_mode_Main`` that are other lists of messages. Beyond them no periodic message is sent."""
+NOT_IN_OTHER_MODES = frozenset({"ROTORCRAFT_FP", "ROTORCRAFT_NAV_STATUS"})
+
+
+def is_listed(vehicle: Vehicle, message: str) -> bool:
+    """Return whether a periodic message is in the list that ``telemetry_mode_Main`` selects."""
+    mode = state_of(vehicle).telemetry_mode
+    return mode == 0 or (mode in OTHER_MODES and message not in NOT_IN_OTHER_MODES)

@@ -93,8 +93,9 @@ class Craft:
         self.send("GUIDED_SETPOINT_NED", flags=flags, x=x, y=y, z=z, yaw=yaw)
 
     def sticks(self, *, mode: int = 2, **deflections: int) -> None:
-        """One frame of RC_4CH."""
-        self.send("RC_4CH", mode=mode, **deflections)
+        """One frame of RC_UP; the switch is 0, 1 or 2."""
+        axes = (deflections.get(name, 0) for name in ("roll", "pitch", "yaw", "throttle"))
+        self.send("RC_UP", channels=(*axes, 127 * (mode - 1), 127))
 
     def last(self, name: str) -> dict[str, Any]:
         """The fields of the last message of that name."""
@@ -140,14 +141,15 @@ class Craft:
         self.block("Start Engine")
         self.block("Takeoff")
         self.until(lambda: self.block_name == "Standby" and self.up > 4.8, 20.0)
-        self.run(3.0)
+        self.run(18.0)  # it swings about its waypoint
 
     def guided(self, down: float = -10.0) -> None:
         """In GUIDED, in the air above the origin."""
         self.set("mode", 19.0)
         self.set("kill_throttle", 0.0)
         self.guide(0, 0.0, 0.0, down)
-        self.until(lambda: abs(self.position[2] - down) < 0.2, 40.0)
+        self.until(lambda: abs(self.position[2] - down) < 0.5, 40.0)
+        self.run(16.0)  # a height fades in slowly
 
 
 @pytest.fixture

@@ -38,13 +38,18 @@ def test_every_exception_and_jump_leads_to_a_block() -> None:
 
 
 def test_after_switching_on_it_waits_for_satellites_then_settles(make: Make) -> None:
+    """Observed: telemetry after 0.1 s, the first status after 0.4 s, the fix at once, ready after 13.3 s."""
     craft = make(warm=False)
+    craft.flight.block_gps()
+    craft.run(0.45)
+    assert craft.count("ROTORCRAFT_STATUS") == 1
     craft.run(8.0)
     assert craft.block_name == "Wait GPS"
     assert craft.last("ROTORCRAFT_STATUS")["gps_status"] == 0
-    assert craft.last("GPS_INT")["numsv"] == 0
+    assert craft.last("GPS_INT")["numsv"] == 1
     assert craft.count("INS_REF") == 0
-    craft.run(8.0)
+    craft.flight.block_gps(blocked=False)
+    craft.run(3.0)
     assert craft.block_name == "Geo init"
     craft.until(lambda: craft.block_name == "Holding point", 10.0)
     craft.run(5.2)
@@ -80,7 +85,7 @@ def test_go_leads_on_when_it_is_near(craft: Any) -> None:
     craft.block("go_p2")
     goal = waypoint(craft, "p2")
     craft.until(lambda: craft.block_name == "stay_p1", 40.0)
-    assert dist(craft.position[:2], goal[:2]) == pytest.approx(3.0, abs=0.6)
+    assert dist(craft.position[:2], goal[:2]) == pytest.approx(3.0, abs=1.2)
     craft.run(20.0)
     assert craft.position == pytest.approx(waypoint(craft, "p1"), abs=0.4)
 
@@ -113,7 +118,7 @@ def test_the_route_comes_back_to_its_start(craft: Any) -> None:
     assert craft.position == pytest.approx(waypoint(craft, "p1"), abs=0.4)
 
 
-@pytest.mark.parametrize("radius", [8.0, -8.0])
+@pytest.mark.parametrize("radius", [5.0, -5.0])
 def test_a_circle_is_flown_clockwise_for_a_positive_radius(make: Make, radius: float) -> None:
     craft = make(parameters={"DEFAULT_CIRCLE_RADIUS": radius})
     craft.in_the_air()
@@ -125,7 +130,7 @@ def test_a_circle_is_flown_clockwise_for_a_positive_radius(make: Make, radius: f
         craft.run(0.2)
         here, velocity = craft.position, craft.autopilot.vehicle.estimate.velocity
         away = here[0] - north, here[1] - east
-        assert hypot(*away) == pytest.approx(8.0, abs=2.5)
+        assert hypot(*away) == pytest.approx(5.0, abs=2.5)
         turning.append(away[0] * velocity[1] - away[1] * velocity[0])
     assert all((turn > 0.0) == (radius > 0.0) for turn in turning)
     assert craft.last("ROTORCRAFT_NAV_STATUS")["horizontal_mode"] == 2
@@ -189,10 +194,22 @@ def test_a_block_is_not_flown_in_guided_but_runs(craft: Any) -> None:
     assert craft.armed
 
 
-def test_a_block_that_is_none_changes_nothing(craft: Any) -> None:
-    craft.send("BLOCK", block_id=99)
+def test_a_block_beyond_the_plan_is_its_last_one(craft: Any) -> None:
+    """Recorded: BLOCK 50 leads to block 17, HOME."""
+    craft.send("BLOCK", block_id=50)
+    craft.run(1.7)
+    assert craft.block_name == "HOME"
+    assert craft.last("ROTORCRAFT_NAV_STATUS")["cur_block"] == 17
+
+
+def test_land_here_on_the_ground_leaves_the_motors_on(craft: Any) -> None:
+    """Observed: the blocks run through to 16, landed, which stops no motors."""
+    craft.set("kill_throttle", 0.0)
     craft.run(1.0)
-    assert craft.block_name == "Holding point"
+    craft.block("land here")
+    craft.run(4.0)
+    assert craft.block_name == "landed"
+    assert craft.armed
 
 
 def test_a_moved_waypoint_is_flown_to_and_reported(craft: Any) -> None:

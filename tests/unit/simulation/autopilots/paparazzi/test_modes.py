@@ -16,7 +16,7 @@ from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.paparazzi import FIRMWARE
 from volery.simulation.world.body_specs import Rover
 
-NO_RC, ARMED, KILLED, NOT_ALIGNED = 0, 3, 5, 15
+NO_RC = 0
 Make = Callable[..., Any]
 
 
@@ -46,7 +46,10 @@ def test_without_a_transmitter_these_modes_are_set_by_datalink(craft: Any, numbe
     craft.until(lambda: craft.up > 3.0, 20.0)
     craft.set("mode", number)
     assert craft.last("DL_VALUE")["value"] == number
-    assert craft.last("ROTORCRAFT_STATUS")["ap_mode"] == number
+    craft.run(1.2)
+    status = craft.last("ROTORCRAFT_STATUS")
+    assert status["ap_mode"] == number
+    assert status["ap_v_mode"] == {0: 0, 1: 3, 2: 5, 13: 5, 19: 6}[number]
 
 
 @pytest.mark.parametrize("number", [3, 4, 6, 9, 12, 14, 17, 18, 20, 255, -1])
@@ -54,25 +57,32 @@ def test_others_are_refused_in_silence(craft: Any, number: int) -> None:
     """Modes of sticks, modes that it was built without, and what is no mode."""
     craft.set("mode", number)
     assert craft.mode == "NAV"
-    assert craft.last("DL_VALUE") == {"index": 3, "value": 13.0}
+    assert craft.last("DL_VALUE") == {"index": 5, "value": 13.0}
 
 
-def test_a_changed_mode_is_reported_at_once(craft: Any) -> None:
-    craft.run(1.0)
+def test_a_changed_mode_waits_for_the_next_status_but_a_failsafe_does_not(craft: Any) -> None:
+    """Observed: 65 changes by setting 0.04 to 1.2 s later; a FAILSAFE that it chooses itself 8 to 36 ms."""
+    craft.in_the_air()
     before = craft.count("ROTORCRAFT_STATUS")
     craft.set("mode", 19)
-    assert craft.count("ROTORCRAFT_STATUS") == before + 1
+    assert craft.count("ROTORCRAFT_STATUS") <= before + 1
+    craft.run(1.2)
+    assert craft.last("ROTORCRAFT_STATUS")["ap_mode"] == 19
+    craft.set("mode", 13)
+    craft.run(1.2)
+    craft.flight.block_gps()
+    craft.until(lambda: craft.mode == "FAILSAFE", 2.0)
+    craft.run(0.02)
+    assert craft.last("ROTORCRAFT_STATUS")["ap_mode"] == 1
 
 
 def test_before_its_attitude_is_aligned_no_other_mode_is_flown(make: Make) -> None:
     craft = make(warm=False)
-    craft.run(2.2)
+    craft.run(0.12)
     craft.set("mode", 19)
     assert craft.mode == "NAV"
     craft.set("kill_throttle", 0.0)
     assert not craft.armed
-    craft.run(1.3)
-    assert craft.last("ROTORCRAFT_STATUS")["arming_status"] == NOT_ALIGNED
     craft.run(10.0)
     craft.set("mode", 19)
     craft.set("kill_throttle", 0.0)
@@ -83,7 +93,7 @@ def test_motors_go_on_and_off_by_setting(craft: Any) -> None:
     craft.set("kill_throttle", 0.0)
     craft.run(1.2)
     status = craft.last("ROTORCRAFT_STATUS")
-    assert (status["ap_motors_on"], status["ap_in_flight"], status["arming_status"]) == (1, 0, ARMED)
+    assert (status["ap_motors_on"], status["ap_in_flight"], status["arming_status"]) == (1, 0, NO_RC)
     craft.set("kill_throttle", 1.0)
     craft.run(1.2)
     assert craft.last("ROTORCRAFT_STATUS")["ap_motors_on"] == 0
@@ -93,7 +103,7 @@ def test_motors_stay_off_in_kill(craft: Any) -> None:
     craft.set("mode", 0)
     craft.set("kill_throttle", 0.0)
     craft.run(1.3)
-    assert craft.last("ROTORCRAFT_STATUS")["arming_status"] == KILLED
+    assert craft.last("ROTORCRAFT_STATUS")["arming_status"] == NO_RC
     assert not craft.armed
     craft.set("mode", 13)
     craft.set("kill_throttle", 0.0)
@@ -127,15 +137,13 @@ def test_it_can_be_flown_again_after_a_kill(craft: Any) -> None:
     assert craft.up == pytest.approx(5.0, abs=0.3)
 
 
-@pytest.mark.parametrize(("command", "mode"), [(0, "KILL"), (1, "NAV"), (2, "FAILSAFE"), (9, "GUIDED")])
-def test_emergency_commands(craft: Any, command: int, mode: str) -> None:
+@pytest.mark.parametrize("command", [0, 1, 2, 9])
+def test_emergency_commands_have_no_effect(craft: Any, command: int) -> None:
     craft.guided()
     craft.send("EMERGENCY_CMD", cmd=command)
-    craft.run(0.3)
-    assert craft.mode == mode
-    assert craft.armed == (mode != "KILL")
-    if command == 1:
-        assert craft.block_name == "Standby"
+    craft.run(1.3)
+    assert craft.mode == "GUIDED"
+    assert craft.armed
 
 
 def test_home_flies_to_home_and_stays_there(craft: Any) -> None:
@@ -149,7 +157,19 @@ def test_home_flies_to_home_and_stays_there(craft: Any) -> None:
     assert craft.last("ROTORCRAFT_NAV_STATUS")["dist_home"] < 0.3
 
 
-def test_failsafe_sinks_and_becomes_kill_on_the_ground(craft: Any) -> None:
+def test_failsafe_keeps_its_height(craft: Any) -> None:
+    """Observed in v6.2: the height is held for more than 60 s, and KILL never comes in the air."""
+    craft.in_the_air()
+    height = craft.up
+    craft.set("mode", 1)
+    craft.run(60.0)
+    assert craft.mode == "FAILSAFE"
+    assert craft.armed
+    assert craft.up == pytest.approx(height, abs=1.0)
+
+
+def test_failsafe_with_a_descent_becomes_kill_on_the_ground(make: Make) -> None:
+    craft = make(parameters={"FAILSAFE_DESCENT_SPEED": 1.5})
     craft.in_the_air()
     craft.set("mode", 1)
     craft.run(1.5)
@@ -159,8 +179,11 @@ def test_failsafe_sinks_and_becomes_kill_on_the_ground(craft: Any) -> None:
     assert craft.flight.truth().contact_speed < 2.5
 
 
-def test_failsafe_on_the_ground_is_kill_at_once(craft: Any) -> None:
+def test_failsafe_on_the_ground_is_kill_soon(craft: Any) -> None:
+    """Observed without a fix: motors on, FAILSAFE, and KILL 0.8 s later."""
     craft.set("mode", 1)
+    assert craft.mode == "FAILSAFE"
+    craft.run(0.9)
     assert craft.mode == "KILL"
 
 
@@ -169,6 +192,8 @@ def test_a_critical_battery_is_a_failsafe_only_where_the_airframe_says_so(
     make: Make, wanted: float, mode: str, armed: bool
 ) -> None:
     craft = make(parameters={"FAILSAFE_ON_BAT_CRITICAL": wanted, "CRITIC_BAT_LEVEL": 50.0})
+    craft.run(2.0)
     craft.set("mode", 13)
     craft.set("kill_throttle", 0.0)
+    craft.run(1.0)
     assert (craft.mode, craft.armed) == (mode, armed)

@@ -38,7 +38,7 @@ def test_the_default_periods(craft: Any, name: str) -> None:
 def test_position_velocity_and_attitude_have_their_scales(craft: Any) -> None:
     craft.guided()
     craft.guide(0x60, 1.5, -2.5, -0.5, 0.75)
-    craft.run(6.0)
+    craft.run(16.0)
     fp, estimate = craft.last("ROTORCRAFT_FP"), craft.autopilot.vehicle.estimate
     north, east, down = estimate.position
     assert [fp["east"] / 256, fp["north"] / 256, fp["up"] / 256] == pytest.approx(
@@ -72,7 +72,7 @@ def test_local_frame_and_satellites_name_the_same_place(craft: Any) -> None:
 def test_the_fixs_velocity_is_along_the_earths_axes(craft: Any) -> None:
     craft.guided()
     craft.guide(0x60, 3.0, 1.0, -0.5)
-    craft.run(6.0)
+    craft.run(16.0)
     first = craft.last("GPS_INT")
     craft.run(2.0)
     second = craft.last("GPS_INT")
@@ -105,7 +105,30 @@ def test_settings_are_read_and_written_by_number(craft: Any) -> None:
     craft.send("GET_SETTING", index=200)
     craft.send("SETTING", index=auto2, value=float("nan"))
     craft.run(0.05)
-    assert [frame.fields["value"] for frame in craft.received if frame.name == "DL_VALUE"] == [19.0]
+    answers = [frame.fields for frame in craft.received if frame.name == "DL_VALUE"]
+    assert [one["value"] for one in answers if one["index"] == 200] == [1.0, 1.0]  # recorded: answered, too
+    assert [one["value"] for one in answers if one["index"] == auto2] == [19.0]
+
+
+def test_settings_are_numbered_as_generated_for_the_stock_aircraft() -> None:
+    """Observed of ardrone2: the telemetry mode is 0; kill_throttle has no shortname."""
+    named = {one.variable: one.number for one in stock_aircraft().settings}
+    assert named["telemetry_mode_Main"] == 0
+    assert [named[f"autopilot{rest}"] for rest in ("_mode_auto2", ".kill_throttle", ".mode")] == [3, 4, 5]
+
+
+@pytest.mark.parametrize(
+    ("mode", "silent"), [(3, {"ROTORCRAFT_FP", "ROTORCRAFT_NAV_STATUS"}), (19, set(PERIODS))]
+)
+def test_another_telemetry_mode_is_another_list(craft: Any, mode: int, silent: set[str]) -> None:
+    """Recorded of scaled_sensors (3); observed of a number that is no mode: all periodic telemetry stops."""
+    craft.set("telemetry_mode_Main", mode)
+    craft.received.clear()
+    craft.run(6.0)
+    assert {name for name in PERIODS if not craft.count(name)} == silent
+    craft.send("PING")
+    craft.run(0.05)
+    assert craft.count("PONG") == 1
 
 
 def test_settings_and_waypoints_are_sent_in_turn(craft: Any) -> None:
