@@ -69,6 +69,8 @@ class ReceiveStatistics:
     frames_v1: int = 0
     """Frames of the older protocol version, which is decoded but never sent."""
     unknown: int = 0
+    refused: int = 0
+    """Frames whose signature is missing, wrong or replayed, on a signed link."""
     corrupt: int = 0
     text: int = 0
     garbage: int = 0

@@ -1,12 +1,14 @@
 """MAVLink as bytes: frames encoded as MAVLink 2, and a tolerant parser for MAVLink 1 and 2.
 
 Real links carry boot texts, noise and other protocols. The parser skips and counts everything that is no
-frame, so that ``problem`` can describe what arrives instead. Signatures are neither written nor checked.
+frame, so that ``problem`` can describe what arrives instead. Signatures are neither written nor checked here,
+but in ``mavlink_signing``.
 """
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 
 from volery.links.link import Codec, Frame, NonFrameBytes, ReceiveStatistics
 from volery.links.mavlink_messages import MessageType, message_type, message_type_of
@@ -109,11 +111,20 @@ def frame_length(data: Octets, start: int) -> int:
     return header.length if header.valid(data) else 0
 
 
-class MavlinkParser:
-    """Splits a stream of bytes, fed in any portions, into MAVLink frames."""
+Acceptance = Callable[[bytes, str, int, int], bool]
+"""Decides about a frame by its bytes, its message, and the sender's system and component."""
 
-    def __init__(self) -> None:
+
+class MavlinkParser:
+    """Splits a stream of bytes, fed in any portions, into MAVLink frames.
+
+    Args:
+        accepts: Decides which valid frames are received, by their signature; None for all.
+    """
+
+    def __init__(self, accepts: Acceptance | None = None) -> None:
         self.statistics = ReceiveStatistics()
+        self._accepts = accepts
         self._rest = b""  # may become a frame
         self._other = NonFrameBytes(self.statistics)
 
@@ -124,7 +135,8 @@ class MavlinkParser:
         frames: list[Frame] = []
         at, size = 0, len(octets)
         while at < size:
-            taken = self._parse_usual(octets, at, frames) or self._parse_other(octets, at, frames)
+            taken = 0 if self._accepts else self._parse_usual(octets, at, frames)
+            taken = taken or self._parse_other(octets, at, frames)
             if not taken:
                 break
             at += taken
@@ -168,6 +180,11 @@ class MavlinkParser:
         if header.kind is None:
             statistics.unknown += 1
             return header.length
+        if self._accepts is not None:
+            raw = bytes(octets[start : start + header.length])
+            if not self._accepts(raw, header.kind.name, header.system, header.component):
+                statistics.refused += 1
+                return header.length
         if header.version_1:
             statistics.frames_v1 += 1
         else:
@@ -185,6 +202,8 @@ class MavlinkParser:
         received = self.statistics
         if received.frames or not received.octets:
             return ""
+        if received.refused:
+            return f"{received.refused} frames were refused: they are not signed with the key of this link"
         if received.frames_v1:
             return "MAVLink 1 only: set SERIALx_PROTOCOL=2 (ArduPilot) or MAV_PROTO_VER=2 (PX4) for this port"
         text = self._other.only_text()

@@ -34,7 +34,7 @@ from volery.run.assembly.simulated_vehicles import SimulatedVehicle, parse_simul
 from volery.run.assembly.vehicle_nodes import open_simulated_driver
 from volery.run.assembly.vehicles import EMBEDDED, RealGraphs, for_driver
 from volery.trace.events import Record, ignore
-from volery.vehicles.address import LOCAL_ADDRESS, LOCAL_PORT, REPLY_PORT, Address, open_link, parse
+from volery.vehicles.address import LOCAL_ADDRESS, LOCAL_PORT, REPLY_PORT, SIGNING, Address, open_link, parse
 from volery.vehicles.driver import drivers
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ class Bridge:
         if address.transport == "sim":
             vehicle = parse_simulated(address, address.driver)
             return _fleet(self.kernel, vehicle, wanted.seed).link_for(vehicle)
-        address.only("baud", LOCAL_ADDRESS, "system", LOCAL_PORT, REPLY_PORT)
+        address.only("baud", LOCAL_ADDRESS, "system", LOCAL_PORT, REPLY_PORT, SIGNING)
         return open_link(self.kernel, address, drivers.load(address.driver).codec)
 
     def _interpreter(self, address: Address, wanted: BridgeOptions) -> Link:

@@ -15,7 +15,7 @@ from volery.run.assembly.simulated_vehicles import SimulatedVehicle
 from volery.run.assembly.vehicle_nodes import graph_access
 from volery.simulation.autopilots.firmware import firmwares
 from volery.trace.events import Event, LinkState
-from volery.vehicles.address import Address, listen, parse_listen
+from volery.vehicles.address import SIGNING, Address, listen, parse_listen
 
 
 def has_links(autopilot: str) -> bool:
@@ -33,6 +33,7 @@ class VehicleServer:
         address: Where to serve it; None for the addresses at which ground stations expect its firmware.
         speed: Simulated seconds per second.
         seed: Seed of the simulation.
+        signing: File with the key of signed MAVLink; empty for unsigned.
         notice: Receives a line for the user when a link has no room for a client.
 
     Raises:
@@ -46,6 +47,7 @@ class VehicleServer:
         *,
         speed: float = 1.0,
         seed: int = 1,
+        signing: str = "",
         notice: Callable[[str], None] = lambda line: None,
     ) -> None:
         self._notice = notice
@@ -57,6 +59,8 @@ class VehicleServer:
         self.protocol = codec.name
         usual = self.fleet.family(name).default_links
         stations = [(parse_listen(text), use) for text, use in usual] if address is None else [(address, "")]
+        if signing:
+            stations = [(one.with_option(SIGNING, signing), use) for one, use in stations]
         self.addresses = [one for one, _ in stations]
         self.links: list[CodedLink] = []
         for place, (one, use) in enumerate(stations):

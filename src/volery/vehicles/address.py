@@ -19,7 +19,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from types import MappingProxyType
 from urllib.parse import SplitResult, parse_qsl, urlsplit
 
@@ -28,6 +29,7 @@ from volery.kernel.api import Kernel
 from volery.links.coded_link import CodedLink
 from volery.links.link import Codec
 from volery.links.mavlink_codec import MAVLINK
+from volery.links.mavlink_signing import SignedMavlink, read_key
 from volery.links.serial_link import SerialLink
 from volery.links.tcp_link import TcpClient, TcpServer
 from volery.links.udp_link import UdpLink, UdpServer
@@ -44,13 +46,15 @@ USUAL_BAUD = {"pprzlink": 115_200}
 """Default baud rate by protocol, where it differs."""
 LOCAL_ADDRESS = "bind"
 """Option of a UDP address without a host: the local address to listen at, else all addresses."""
+SIGNING = "signing"
+"""Option of a MAVLink address: the file with the key of the link."""
 LOCAL_PORT = "from"
 """Option of a UDP address with a host: the local port to send from and listen at."""
 REPLY_PORT = "uplink"
 """Option of a UDP address without a host: port for replies, if it differs from the sender's."""
 LAST_PORT = 65_535
 
-MAVLINK_OPTIONS = ("attitude", "baud", LOCAL_ADDRESS, "rate", "system", "texts")
+MAVLINK_OPTIONS = ("attitude", "baud", LOCAL_ADDRESS, "rate", SIGNING, "system", "texts")
 """Options of MAVLink drivers: ``rate`` of the position and ``attitude`` in Hz, ``system`` id, and
 ``texts=unrecorded`` if the autopilot records its texts itself, as a simulated one does.
 """
@@ -84,6 +88,10 @@ class Address:
 
     def __str__(self) -> str:
         return self.text
+
+    def with_option(self, name: str, value: str) -> Address:
+        """Return the same address with one more option."""
+        return replace(self, options=MappingProxyType({**self.options, name: value}))
 
     def number(self, option: str, default: float) -> float:
         """Return an option as a number; ``UsageError`` names an option that is not a number."""
@@ -220,6 +228,7 @@ def open_link(kernel: Kernel, address: Address, codec: Codec = MAVLINK, *, share
     Raises:
         UsageError: another transport, an invalid baud rate, or a port that is in use.
     """
+    codec = _signed(address, codec)
     if address.transport == "tcp":
         return TcpClient(kernel, address.host, _port(address), address.text, codec)
     if address.transport == "udp":
@@ -252,12 +261,23 @@ def listen(
         on_connect: called when a TCP client connects.
         codec: codec of the frames.
     """
+    codec = _signed(address, codec)
     if address.transport == "tcp":
-        address.only()
+        address.only(SIGNING)
         host, port = address.host, _port(address)
         return TcpServer(kernel, host, port, address.text, on_connect=on_connect, codec=codec)
-    address.only(*(() if address.host else (LOCAL_ADDRESS,)), LOCAL_PORT)
+    address.only(*(() if address.host else (LOCAL_ADDRESS,)), LOCAL_PORT, SIGNING)
     return _udp(kernel, address, codec)
+
+
+def _signed(address: Address, codec: Codec) -> Codec:
+    """Return the codec of a link: a signed one if the address names a key."""
+    file = address.options.get(SIGNING)
+    if file is None:
+        return codec
+    if codec is not MAVLINK:
+        raise UsageError(f"{address}: {codec.name} has no signatures; {SIGNING} is for MAVLink")
+    return SignedMavlink(read_key(Path(file)))
 
 
 def _udp(kernel: Kernel, address: Address, codec: Codec) -> UdpLink:

@@ -43,6 +43,10 @@ def serve(
             metavar="ros1|ros2", help="Serve the vehicle as a node of that ROS graph, if it has one."
         ),
     ] = "",
+    signing: Annotated[
+        str,
+        typer.Option(metavar="FILE", help="Key of signed MAVLink, 64 hexadecimal digits; default unsigned."),
+    ] = "",
     seed: Seed = 1,
 ) -> int:
     """Serve one simulated vehicle to ground stations, MAVSDK, MAVProxy or a script, until Ctrl-C."""
@@ -59,12 +63,12 @@ def serve(
     server: VehicleServer | VehicleNodeServer
     if not graph and has_links(autopilot):
         address = None if listen is None else parse_listen(listen)
-        server = VehicleServer(vehicle, address, speed=speed, seed=seed, notice=output.note)
+        server = VehicleServer(vehicle, address, speed=speed, seed=seed, signing=signing, notice=output.note)
         lines = [
             f"serving {autopilot} ({kind}) at {speed:g}× real time; Ctrl-C stops it",
             *how_to_connect(server.protocol, server.addresses, autopilot),
         ]
-    elif not graph or listen is not None:
+    elif not graph or listen is not None or signing:
         raise UsageError(
             f"{autopilot}: a simulated {autopilot} is reached over a ROS graph, not over a link. Serve it on "
             f"real ROS with --graph ros1 (a roscore must run) or --graph ros2, or fly it without a server: "
