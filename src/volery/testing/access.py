@@ -191,6 +191,7 @@ class ByGraph(Access):
     ) -> None:
         self._kernel = kernel
         self._vehicle, self._autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
+        self._home = drivers.load(self._autopilot).home_options(wanted.home)
         random = stream(seed, f"wire/{self._vehicle}")
         self._wire = self.control = _HandOnNode(kernel, random, wanted.faults)
         self._graph = private_graph(kernel, self._wire, as_bytes=wanted.faults is not None)
@@ -222,7 +223,8 @@ class ByGraph(Access):
         how = graph_access(self._autopilot, vehicle)
         name = f"commander_{next(self._numbers)}"
         node = self._graph.node(name, f"/{vehicle}", context=ExecutionContext(name))
-        driver = how.open_driver(self._kernel, node, vehicle, {"namespace": how.namespace, **options})
+        options = {"namespace": how.namespace, **self._home, **options}
+        driver = how.open_driver(self._kernel, node, vehicle, options)
         return driver, node.name
 
 

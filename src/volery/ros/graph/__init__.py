@@ -38,7 +38,7 @@ from volery.ros.graph.interface import (
     Work,
     free,
 )
-from volery.ros.graph.services import ServiceError
+from volery.ros.graph.services import CallFailedError, ServiceError
 
 __all__ = [
     "AS_OFFERED",
@@ -50,6 +50,7 @@ __all__ = [
     "SENSOR_DATA",
     "TRANSIENT_LOCAL",
     "VOLATILE",
+    "CallFailedError",
     "Client",
     "Cost",
     "EmbeddedGraph",

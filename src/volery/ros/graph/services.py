@@ -15,13 +15,36 @@ from volery.ros.graph.interface import Handler, Work
 from volery.ros.messages import cdr_size, service
 from volery.trace.events import Call
 
+HANDLER_FAILED = "its handler "
+"""Beginning of the problem of a call that the server has failed."""
+ROSPY_FAILED = "responded with an error"
+"""Part of the same problem in the words of rospy's client."""
+
+
+class CallFailedError(Exception):
+    """Raised by a handler to fail the call, as a handler of roscpp that returns false; nothing else fails."""
+
 
 class ServiceError(VoleryError):
-    """A service call failed: there is no server, its handler raised, or no answer came in time."""
+    """A service call failed: there is no server, its handler raised, or no answer came in time.
+
+    Attributes:
+        service: Name of the service.
+        what: What happened.
+        by_server: Whether the server itself has ended the call with an error.
+    """
 
     def __init__(self, name: str, what: str) -> None:
         self.service, self.what = name, what
+        self.by_server = what.startswith(HANDLER_FAILED) or ROSPY_FAILED in what
         super().__init__(f"service {name}: {what}")
+
+
+def failure_text(error: Exception) -> str:
+    """Return the problem of a call whose handler has raised *error*."""
+    if isinstance(error, CallFailedError):
+        return f"{HANDLER_FAILED}failed the call: {error}"
+    return f"{HANDLER_FAILED}raised {type(error).__name__}: {error}"
 
 
 class Exchange:
@@ -88,10 +111,10 @@ class EmbeddedService:
         except Exception as error:
             with self.node.kernel:
                 self._pending.remove(exchange)
-                self._send_back(
-                    exchange, exchange.fail, f"its handler raised {type(error).__name__}: {error}", 0
-                )
-            raise
+                self._send_back(exchange, exchange.fail, failure_text(error), 0)
+            if not isinstance(error, CallFailedError):
+                raise
+            return
         with self.node.kernel:
             self._pending.remove(exchange)
             content = self.node.graph.copy(answer)

@@ -12,9 +12,42 @@ OLD_NAMES, NEW_NAMES = "dji_sdk", "dji_osdk_ros"
 HEALTHY_GPS = 4
 """Least ``gps_health`` at which position, velocity and the local reference are reliable."""
 
-M100 = "M100"
-HARDWARE: Mapping[str, int] = {"A3": 0x03020100, "N3": 0x03030100, "M100": 0x03010A00, "M600": 0x03040100}
-"""Answers of ``query_drone_version``; only the version of the M100 is documented."""
+
+class Source(NamedTuple):
+    """A behaviour of the aircraft that is documented, and by whom."""
+
+    what: str
+    whom: str
+
+
+GUIDES, HEADERS = "guides of DJI", "headers of DJI's library"
+"""Sources that are named often; # is the number of a thread at Onboard-SDK or Onboard-SDK-ROS (ROS)."""
+
+A3, N3, M100, M600, M210, M300 = "A3", "N3", "M100", "M600", "M210", "M300"
+
+
+class HardwareVersion(NamedTuple):
+    """Answer of ``query_drone_version``; only the version of the M100 is known."""
+
+    name: str
+    version: int
+
+
+HARDWARE: Mapping[str, HardwareVersion] = {
+    A3: HardwareVersion("A3", 0x03020100),
+    N3: HardwareVersion("N3", 0x03030100),
+    M100: HardwareVersion("M100", 0x03010A00),
+    M600: HardwareVersion("PM820V3PRO", 0x03020900),
+    M210: HardwareVersion("PM410", 0x03030000),
+    M300: HardwareVersion("PM430", 0x03000100),
+}
+"""Hardware versions by type of aircraft."""
+_NAMES_OF_HARDWARE: Mapping[str, str] = {"PM820": M600, "PM410": M210, "PM420": M210, "PM430": M300}
+
+
+def aircraft_of(hardware: str) -> str:
+    """Return the type of aircraft with a ``hardware`` name, which is the name itself where none is known."""
+    return next((name for start, name in _NAMES_OF_HARDWARE.items() if hardware.startswith(start)), hardware)
 
 
 class DisplayMode(IntEnum):
@@ -110,3 +143,81 @@ GO_HOME_ALTITUDES = Range(20.0, 500.0)
 
 MISSION_SPEEDS = Range(2.0, 15.0)
 """Speeds of a waypoint mission, m/s."""
+
+
+# -- values of ``ack_data``
+
+
+class TaskAck(IntEnum):
+    """Answers to tasks and to requests for the motors, of all aircraft except the M100."""
+
+    OK = 0
+    MOTORS_ON = 1
+    MOTORS_OFF = 2
+    IN_AIR = 3
+    NOT_IN_AIR = 4
+    NO_HOME_POINT = 5
+    BAD_GPS = 6
+    SIMULATOR = 7
+    ALREADY_RUNNING = 8
+    NOT_RUNNING = 9
+
+
+class M100TaskAck(IntEnum):
+    """Answers to tasks of the M100 and of an M600 with old firmware."""
+
+    FAILED = 1
+    OK = 2
+
+
+class M100MotorsAck(IntEnum):
+    """Answers to requests for the motors of the M100."""
+
+    OK = 0
+    NEEDS_AUTHORITY = 1
+    ALREADY_DONE = 2
+    IN_AIR = 3
+
+
+class AuthorityAck(IntEnum):
+    """Answers to a request for the control authority."""
+
+    WRONG_SWITCH_POSITION = 0
+    RELEASED = 1
+    OBTAINED = 2
+    OBTAINING = 3
+    RELEASING = 4
+    NEEDS_P = 5
+    NEEDS_F = 6
+    IOC_MODE = 0xC9
+
+
+class MissionAck(IntEnum):
+    """Answers to requests for waypoint missions."""
+
+    OK = 0
+    TOO_HIGH = 0xC0
+    TOO_LOW = 0xC1
+    FAR_FROM_HOME = 0xC7
+    FAR_FROM_HERE = 0xC9
+    RTK_NOT_READY = 0xCD
+    NOT_AT_F = 0xD0
+    NEEDS_AUTHORITY = 0xD1
+    BAD_GPS = 0xD8
+    LOW_BATTERY = 0xD9
+    NOT_TAKEN_OFF = 0xDA
+    CROSSES_NO_FLY_ZONE = 0xDD
+    NO_HOME_POINT = 0xDE
+    PATH_TOO_LONG = 0xE2
+    POINTS_TOO_CLOSE = 0xE5
+    POINTS_TOO_FAR_APART = 0xE6
+    BUSY = 0xF0
+
+
+NO_CODE = 255
+"""``ack_data`` of a refusal for which no code is known."""
+
+
+def ack_name(table: type[IntEnum], code: int) -> str:
+    """Return the words for a code, or an empty text if the table does not have it."""
+    return table(code).name.lower().replace("_", " ") if code in set(table) else ""

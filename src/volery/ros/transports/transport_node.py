@@ -22,7 +22,7 @@ from volery.ros.graph.callbacks import CallbackGroup
 from volery.ros.graph.embedded_node import LocalNode
 from volery.ros.graph.graph_context import GraphContext, NodeContext
 from volery.ros.graph.interface import AS_OFFERED, DEFAULT, Callback, Group, Handler, Node, QoS, Work
-from volery.ros.graph.services import ServiceError
+from volery.ros.graph.services import CallFailedError, ServiceError, failure_text
 from volery.ros.graph.topics import WARNING
 from volery.ros.messages import Message, ServiceType, message_class, service
 from volery.ros.messages.cdr import copied_to_cdr
@@ -210,8 +210,10 @@ class TransportService:
                 )
             content = answer.copy()
         except Exception as error:
-            self._end(respond, None, f"its handler raised {type(error).__name__}: {error}")
-            raise
+            self._end(respond, None, failure_text(error))
+            if not isinstance(error, CallFailedError):
+                raise
+            return
         self._end(respond, content, "")
 
     def _end(self, respond: OnResponse, answer: Message | None, problem: str) -> None:

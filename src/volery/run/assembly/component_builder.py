@@ -39,6 +39,7 @@ from volery.run.assembly.fences import fence_of
 from volery.run.assembly.vehicle_nodes import graph_access, node_name, serve_on_graph
 from volery.run.ending import Ending, Landable
 from volery.vehicles import Drone, Rover, Vehicle
+from volery.vehicles.driver import drivers
 
 if TYPE_CHECKING:
     from volery.run.assembly.simulated_fleet import SimulatedFleet
@@ -289,8 +290,10 @@ class Builder:
         return vehicle
 
     def _open(self, node: Node, name: str, interface: str) -> Drone | Rover:
-        served = graph_access(self._autopilot(name), name)
-        driver = served.open_driver(self._kernel, node, name, {"namespace": served.namespace})
+        vehicle = next(one for one in self._system.vehicles if one.name == name)
+        served = graph_access(vehicle.autopilot, name)
+        home = drivers.load(vehicle.autopilot).home_options(vehicle.at.position)
+        driver = served.open_driver(self._kernel, node, name, {"namespace": served.namespace, **home})
         truth = self._truth(name) if self._truth else None
         if interface == "Drone":
             return Drone(self._kernel, name, driver, fence=self._fence, truth=truth)

@@ -182,7 +182,8 @@ class PrivateGraph:
 
     def __init__(self, kernel: Kernel, fleet: SimulatedFleet, wanted: SimulatedVehicle, seed: int) -> None:
         self._kernel = kernel
-        self._vehicle = wanted.vehicle.name
+        self._vehicle, self._autopilot = wanted.vehicle.name, wanted.vehicle.autopilot
+        self._home = wanted.home
         access = graph_access(wanted.vehicle.autopilot, self._vehicle)
         if wanted.names:
             access = replace(access, namespace=f"/{self._vehicle}/{wanted.names}")
@@ -198,8 +199,9 @@ class PrivateGraph:
     def open(self, commander: str = "commander", **options: str) -> Driver:
         """Return a driver of the vehicle, on a node called *commander*."""
         context = ExecutionContext(f"{commander} of {self._vehicle}")
+        home = drivers.load(self._autopilot).home_options(self._home)
         node = self.graph.node(commander, f"/{self._vehicle}", context=context)
-        options = {"namespace": self._access.namespace, **options}
+        options = {"namespace": self._access.namespace, **home, **options}
         return self._access.open_driver(self._kernel, node, self._vehicle, options)
 
 

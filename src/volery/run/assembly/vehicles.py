@@ -157,7 +157,7 @@ def _open_real(
     kernel = WallKernel()
     by_graph = {name: one for name, one in addresses.items() if one.transport in GRAPHS}
     links = _RealLinks(kernel, {name: one for name, one in addresses.items() if name not in by_graph})
-    graphs = RealGraphs(kernel)
+    graphs = RealGraphs(kernel, stated.home)
     try:
         vehicles = []
         for name, address in addresses.items():
@@ -171,10 +171,16 @@ def _open_real(
 
 
 class RealGraphs:
-    """Real ROS graphs, each opened once, with one node of volery for each vehicle."""
+    """Real ROS graphs, each opened once, with one node of volery for each vehicle.
 
-    def __init__(self, kernel: Kernel) -> None:
+    Args:
+        kernel: Kernel of the graphs.
+        home: Home position of the vehicles as stated, for autopilots that do not know its altitude.
+    """
+
+    def __init__(self, kernel: Kernel, home: Position | None = None) -> None:
         self._kernel = kernel
+        self._home = home
         self._open: dict[str, RosGraph] = {}
 
     def graph(self, name: str) -> RosGraph:
@@ -185,7 +191,8 @@ class RealGraphs:
 
     def driver(self, name: str, address: Address) -> Driver:
         """Return the driver of the vehicle *name*; the path of the address is the namespace."""
-        open_driver = drivers.load(address.driver).on_graph
+        factory = drivers.load(address.driver)
+        open_driver = factory.on_graph
         if open_driver is None:
             raise UsageError(f"{address}: {address.driver} is reached over a link, not over a ROS graph")
         node = self.graph(address.transport).node(
@@ -193,6 +200,7 @@ class RealGraphs:
         )
         namespace = address.path.rstrip("/")
         stated = {"namespace": namespace} if namespace else {}
+        stated |= factory.home_options(self._home)
         return open_driver(self._kernel, node, name, {**stated, **address.options})
 
     def close(self) -> None:

@@ -5,7 +5,8 @@ Only topics with subscribers are built and published, which saves hundreds of me
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Mapping
 from functools import partial
 from math import cos, radians
 from typing import Any, NamedTuple
@@ -15,23 +16,39 @@ from volery.base.frames import attitude_ned_to_enu, frd_to_flu, ned_to_enu
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Handle
 from volery.kernel.task import ExecutionContext
-from volery.ros.graph import DEFAULT, LATCHED, Node, Publisher, QoS, RosGraph, Work
+from volery.kernel.waiting import sleep
+from volery.ros.graph import DEFAULT, LATCHED, CallFailedError, Node, Publisher, QoS, RosGraph, Work
 from volery.ros.messages import message_class
-from volery.ros.messages.dji_constants import M100, NEW_NAMES, OLD_NAMES, SETPOINT, SETPOINT_TOPICS
+from volery.ros.messages.dji_constants import (
+    A3,
+    M100,
+    M600,
+    N3,
+    NEW_NAMES,
+    OLD_NAMES,
+    SETPOINT,
+    SETPOINT_TOPICS,
+)
 from volery.simulation.autopilots.dji.flight_controller import FlightController, controller_of
-from volery.simulation.autopilots.dji.sdk_services import Services
+from volery.simulation.autopilots.dji.sdk_services import Answer, Services
 from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import Text
 
-FAST, NORMAL, SLOW = 10 * MS, 20 * MS, 200 * MS
-"""Periods of the node's three groups of topics: 100, 50 and 5 Hz."""
+INERTIAL, FAST, NORMAL, SLOW = 2_500_000, 10 * MS, 20 * MS, 200 * MS
+"""Periods of the node's groups of topics: 400, 100, 50 and 5 Hz."""
 
 EARTH_M = 6_378_137.0
 """Earth radius of the flat-earth conversion of the local position [m]."""
 
-FIX, NO_FIX, GPS = 0, -1, 1
-SWITCH_SCALE = 8000.0 / 500.0
-"""Scale from pulse widths to the mode switch in ``rc``: -8000 P, 0 A, 8000 F. Assumed."""
+FIX, GPS = 0, 1
+"""The node never reports another status than a fix."""
+
+SWITCH_AT_F: Mapping[str, float] = {A3: -1.0, N3: -1.0, M100: 8000.0}
+"""Value of the mode switch in ``rc`` at F by type of aircraft; at A it is 0, at P the opposite."""
+OTHER_AT_F = -10_000.0
+"""The same for other aircraft: the size is known, the sign is assumed."""
+AXES: Mapping[str, int] = {A3: 12, N3: 12}
+"""Number of axes in ``rc`` where it is not six."""
 
 Builder = Callable[[FlightController, Ns], Any]
 """Returns a message stamped with a ROS time, or None while there is none."""
@@ -76,11 +93,17 @@ def _imu(controller: FlightController, stamp: Ns) -> Any:
 
 
 def _rates(controller: FlightController, stamp: Ns) -> Any:
+    """Return the angular rates; an M100 does not send them."""
+    if controller.aircraft == M100:
+        return None
     rates = frd_to_flu(controller.vehicle.estimate.rates)
     return message_class("geometry_msgs/msg/Vector3Stamped")(_header(stamp, "body_FLU"), _vector(rates))
 
 
 def _acceleration(controller: FlightController, stamp: Ns) -> Any:
+    """Return the acceleration over ground; an M100 does not send it."""
+    if controller.aircraft == M100:
+        return None
     acceleration = ned_to_enu(controller.vehicle.estimate.acceleration)
     kind = message_class("geometry_msgs/msg/Vector3Stamped")
     return kind(_header(stamp, "ground_ENU"), _vector(acceleration))
@@ -101,19 +124,16 @@ def _display_mode(controller: FlightController, _stamp: Ns) -> Any:
     return None if controller.aircraft == M100 else _byte(controller.mode)
 
 
-def _fix(stamp: Ns, place: tuple[float, float, float], good: bool) -> Any:
+def _fix(stamp: Ns, place: tuple[float, float, float]) -> Any:
     made: Any = message_class("sensor_msgs/msg/NavSatFix")(_header(stamp, "/gps"))
-    made.status.status, made.status.service = (FIX if good else NO_FIX), GPS
+    made.status.status, made.status.service = FIX, GPS
     made.latitude, made.longitude, made.altitude = place
     return made
 
 
 def _gps_position(controller: FlightController, stamp: Ns) -> Any:
-    """Return the position with its altitude AMSL."""
-    vehicle = controller.vehicle
-    if not vehicle.estimate.position_ok:
-        return _fix(stamp, (0.0, 0.0, 0.0), good=False)
-    return _fix(stamp, vehicle.estimate.geodetic, good=True)
+    """Return the position with its pressure altitude."""
+    return _fix(stamp, controller.place())
 
 
 def _local_position(controller: FlightController, stamp: Ns) -> Any:
@@ -121,29 +141,37 @@ def _local_position(controller: FlightController, stamp: Ns) -> Any:
     reference = controller.reference
     if reference is None:
         return None
-    latitude, longitude, amsl = controller.vehicle.estimate.geodetic
+    latitude, longitude, altitude = controller.place()
     made: Any = message_class("geometry_msgs/msg/PointStamped")(_header(stamp, "/local"))
     made.point.x = radians(longitude - reference[1]) * EARTH_M * cos(radians(reference[0]))
     made.point.y = radians(latitude - reference[0]) * EARTH_M
-    made.point.z = amsl - reference[2]
+    made.point.z = altitude - reference[2]
     return made
 
 
 def _local_frame_ref(controller: FlightController, stamp: Ns) -> Any:
     reference = controller.reference
-    return None if reference is None else _fix(stamp, reference, good=True)
+    return None if reference is None else _fix(stamp, reference)
 
 
 def _height(controller: FlightController, _stamp: Ns) -> Any:
-    return message_class("std_msgs/msg/Float32")(controller.vehicle.height)
+    """Return what the topic shows, which is a height above the take-off point for few aircraft only."""
+    return message_class("std_msgs/msg/Float32")(controller.height_below())
 
 
 def _rc(controller: FlightController, stamp: Ns) -> Any:
     """Return roll, pitch, yaw, throttle (-1..1), mode switch and gear."""
     pulses = controller.vehicle.rc.pulses()
     roll, pitch, throttle, yaw, switch = ((pulse - 1500) / 500.0 for pulse in pulses[:5])
-    axes = [roll, pitch, yaw, throttle, switch * 500.0 * SWITCH_SCALE, 0.0]
+    switch *= SWITCH_AT_F.get(controller.aircraft, OTHER_AT_F)
+    axes = [roll, pitch, yaw, throttle, switch]
+    axes += [0.0] * (AXES.get(controller.aircraft, 6) - len(axes))
     return message_class("sensor_msgs/msg/Joy")(_header(stamp, ""), axes, [])
+
+
+def _rc_connection(controller: FlightController, _stamp: Ns) -> Any:
+    """Return whether the transmitter is received; an M600 with its usual firmware does not tell."""
+    return None if controller.aircraft == M600 else _byte(int(controller.rc_connected))
 
 
 def _battery(controller: FlightController, stamp: Ns) -> Any:
@@ -160,7 +188,7 @@ def _battery(controller: FlightController, stamp: Ns) -> Any:
 
 TOPICS: tuple[Topic, ...] = (
     Topic("attitude", "geometry_msgs/msg/QuaternionStamped", FAST, _attitude),
-    Topic("imu", "sensor_msgs/msg/Imu", FAST, _imu),
+    Topic("imu", "sensor_msgs/msg/Imu", INERTIAL, _imu),
     Topic("angular_velocity_fused", "geometry_msgs/msg/Vector3Stamped", FAST, _rates),
     Topic("acceleration_ground_fused", "geometry_msgs/msg/Vector3Stamped", FAST, _acceleration),
     Topic("flight_status", "std_msgs/msg/UInt8", NORMAL, lambda one, _: _byte(one.status)),
@@ -171,7 +199,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic("height_above_takeoff", "std_msgs/msg/Float32", NORMAL, _height),
     Topic("velocity", "geometry_msgs/msg/Vector3Stamped", NORMAL, _velocity),
     Topic("rc", "sensor_msgs/msg/Joy", NORMAL, _rc),
-    Topic("rc_connection_status", "std_msgs/msg/UInt8", NORMAL, lambda _one, _stamp: _byte(1)),
+    Topic("rc_connection_status", "std_msgs/msg/UInt8", NORMAL, _rc_connection),
     Topic("battery_state", "sensor_msgs/msg/BatteryState", SLOW, _battery),
 )
 """All periodic topics except ``flight_anomaly``, whose type depends on the package."""
@@ -201,6 +229,11 @@ class _TopicGroup:
         self._subscribed: list[tuple[Topic, Publisher]] = []
         self._round = 0
 
+    @property
+    def wanted(self) -> bool:
+        """Whether any of the topics has a subscriber."""
+        return any(publisher.subscribers() for _, publisher in self._listed)
+
     def publish(self) -> None:
         """Publish the topics that have subscribers, as a framework callback."""
         if self._round % self._check_every == 0:
@@ -223,6 +256,9 @@ class DjiEndpoint:
         self._kernel = vehicle.kernel
         self._on = False
         self._clocks: list[Handle] = []
+        self._inertial: Handle | None = None
+        self._requests: deque[Work] = deque()  # of the node of 4.1, which answers one after the other
+        self._busy = False
         self._packages: dict[Ns, _TopicGroup] = {}
         self._graph: RosGraph | None = None
         self._node: Node | None = None
@@ -269,17 +305,18 @@ class DjiEndpoint:
         self._advertise(node, package)
         self._listen(node, package)
         services = Services(self.controller, self._publish_reference)
-        group = node.group(self._start)
+        group = node.group(self._start_next if package == NEW_NAMES else self._start)
         for served in services.table(package):
             node.serve(served.name, served.type, partial(self._answer, served.answer), group)
         if self._on:
             self.start()
 
     def _advertise(self, node: Node, package: str) -> None:
-        listed: dict[Ns, list[tuple[Topic, Publisher]]] = {FAST: [], NORMAL: [], SLOW: []}
+        listed: dict[Ns, list[tuple[Topic, Publisher]]] = {INERTIAL: [], FAST: [], NORMAL: [], SLOW: []}
         for topic in topics(package):
             publisher = node.advertise(f"{package}/{topic.name}", topic.type, topic.qos)
-            listed[topic.period].append((topic, publisher))
+            slower = topic.period == INERTIAL and self.controller.aircraft == M100
+            listed[FAST if slower else topic.period].append((topic, publisher))
         self._packages = {period: _TopicGroup(self, period, some) for period, some in listed.items()}
         self._reference = node.advertise(f"{package}/{REFERENCE.name}", REFERENCE.type, REFERENCE.qos)
 
@@ -310,9 +347,30 @@ class DjiEndpoint:
         """Start a task for a request."""
         self._kernel.spawn(work.run, f"{self._vehicle.name} (service)", self._place, self._kernel.root)
 
-    def _answer(self, answer: Any, request: Any) -> Any:
+    def _start_next(self, work: Work) -> None:
+        """Queue a request; the node of 4.1 runs in one thread."""
+        self._requests.append(work)
+        if not self._busy:
+            self._busy = True
+            self._kernel.spawn(
+                self._run_requests, f"{self._vehicle.name} (services)", self._place, self._kernel.root
+            )
+
+    def _run_requests(self) -> None:
+        """Answer the queued requests in order."""
+        while self._requests:
+            self._requests.popleft().run()
+        self._busy = False
+
+    def _answer(self, answer: Answer, request: Any) -> Any:
         with self._kernel.guard:
-            return answer(request)
+            response, finished = answer(request)
+        if finished is not None:
+            while not finished():
+                sleep(self._kernel, NORMAL)
+        if response is None:
+            raise CallFailedError("the aircraft has refused")
+        return response
 
     # -- protocol endpoint
 
@@ -320,8 +378,11 @@ class DjiEndpoint:
         """Start publishing after power-on."""
         self.stop()
         self._on = True
-        every = self._kernel.every
-        self._clocks = [every(period, package.publish) for period, package in self._packages.items()]
+        for period, group in self._packages.items():
+            if period == INERTIAL:
+                self._clocks.append(self._kernel.every(SUBSCRIBER_CHECK_PERIOD, self._follow_demand))
+            else:
+                self._clocks.append(self._kernel.every(period, group.publish))
 
     def stop(self) -> None:
         """Stop publishing."""
@@ -329,6 +390,20 @@ class DjiEndpoint:
         for clock in self._clocks:
             clock.cancel()
         self._clocks.clear()
+        self._stop_inertial()
+
+    def _follow_demand(self) -> None:
+        """Run the clock of the fastest group only while it has subscribers: it is four times as costly."""
+        group = self._packages[INERTIAL]
+        if not group.wanted:
+            self._stop_inertial()
+        elif self._inertial is None:
+            self._inertial = self._kernel.every(INERTIAL, group.publish)
+
+    def _stop_inertial(self) -> None:
+        if self._inertial is not None:
+            self._inertial.cancel()
+            self._inertial = None
 
     def close(self) -> None:
         """Leave the graph."""

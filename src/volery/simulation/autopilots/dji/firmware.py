@@ -8,22 +8,42 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from volery.base.time import MS, S, to_seconds
-from volery.ros.messages.dji_constants import GO_HOME_ALTITUDES, DisplayMode
-from volery.simulation.autopilots.dji.endpoint import SWITCH_SCALE, DjiEndpoint
+from volery.ros.messages.dji_constants import (
+    GO_HOME_ALTITUDES,
+    GUIDES,
+    HEADERS,
+    NO_CODE,
+    DisplayMode,
+    Source,
+)
+from volery.simulation.autopilots.dji.endpoint import DjiEndpoint
 from volery.simulation.autopilots.dji.flight_controller import (
+    CONFIRM_BELOW_M,
     ENGINE_START_TIME,
     F_ABOVE,
     FINISHED_LANDING_TIME,
+    LONGEST_PATH_M,
     MAX_WAYPOINTS,
     MIN_WAYPOINTS,
+    NO_RC_HEIGHT_M,
+    NO_RC_RADIUS_M,
     P_BELOW,
+    RANGE_M,
+    RC_LOST_AFTER,
     STAY_ACTION,
     SWITCH,
     FlightController,
     controller_of,
 )
-from volery.simulation.autopilots.dji.parameters import SUPPORTED, parameters, tuning
-from volery.simulation.autopilots.dji.sdk_services import ACCEPTED, REFUSED
+from volery.simulation.autopilots.dji.parameters import (
+    M600_LAND_FAST,
+    M600_LAND_SLOW,
+    M600_SLOW_BELOW,
+    SLOW_BELOW,
+    SUPPORTED,
+    parameters,
+    tuning,
+)
 from volery.simulation.autopilots.dji.sdk_setpoints import (
     LIFT_OFF_M,
     LIFT_OFF_M_S,
@@ -61,6 +81,16 @@ def _take_off(vehicle: Vehicle) -> Manoeuvre:
     return TakeOff(vehicle, vehicle.parameters["TAKEOFF_HEIGHT"])
 
 
+class Landing(Land):
+    """Descent to the ground; with LAND_WAITS it waits low above it until a program confirms."""
+
+    def sink(self) -> float:
+        """Return the descent rate at the present height [m/s]."""
+        vehicle = self.vehicle
+        waits = vehicle.parameters["LAND_WAITS"] > 0.0 and not controller_of(vehicle).landing_confirmed
+        return 0.0 if waits and vehicle.height < CONFIRM_BELOW_M else super().sink()
+
+
 MISSION_RULES = MissionRules(
     first_item=0,
     item_begins=lambda vehicle, number, item: controller_of(vehicle).item_begins(number, item),
@@ -78,7 +108,7 @@ MODES = {
         Mode(DisplayMode.ATTITUDE, "ATTITUDE", NO_BITS, AltitudeHold, pilot=True),
         Mode(DisplayMode.P_GPS, "P_GPS", NO_BITS, Loiter, pilot=True),
         Mode(DisplayMode.AUTO_TAKEOFF, "AUTO_TAKEOFF", NO_BITS, _take_off),
-        Mode(DisplayMode.AUTO_LANDING, "AUTO_LANDING", NO_BITS, Land),
+        Mode(DisplayMode.AUTO_LANDING, "AUTO_LANDING", NO_BITS, Landing),
         Mode(DisplayMode.NAVI_MISSION, "NAVI_MISSION", NO_BITS, _mission, needs_position=True),
         Mode(DisplayMode.NAVI_GO_HOME, "NAVI_GO_HOME", NO_BITS, Return, needs_position=True),
         Mode(DisplayMode.NAVI_SDK_CTRL, "NAVI_SDK_CTRL", NO_BITS, SdkControl),
@@ -136,26 +166,85 @@ ASSUMED: Mapping[str, str] = {
     "switching on": f"the node publishes after {to_seconds(READY):g} s, the position is known after "
     f"{to_seconds(ORIGIN):g} s and trusted after {to_seconds(POSITION):g} s",
     "activation": "any key succeeds; the node of 4.1 activates automatically",
-    "authority": "given to any number of programs at once while the mode switch is at F and the "
-    "aircraft is activated",
-    "mode switch": f"channel {SWITCH} of the transmitter: F above {F_ABOVE}, P below {P_BELOW}, A "
-    f"between; `rc` shows {-500 * SWITCH_SCALE:g} at P, 0 at A, {500 * SWITCH_SCALE:g} at F; any "
-    "change withdraws the authority, and in flight the aircraft hovers",
+    "two programs": "both have the authority at once",
+    "transmitter": f"channel {SWITCH} is the mode switch: F above {F_ABOVE}, P below {P_BELOW}, A between; "
+    "it begins where the authority is granted; `rc` keeps its values while the transmitter is off",
     "start of the motors": f"ENGINE_START for {to_seconds(ENGINE_START_TIME):g} s; sets the home position",
-    "an M100": "has no `display_mode`, and shows FINISHED_LANDING for "
-    f"{to_seconds(FINISHED_LANDING_TIME):g} s",
-    "`gps_health`": "5 once the position is trusted, 3 with a fix before that, else 0",
-    "set-points": "no effect during a take-off, and while the aircraft goes home or lands by its own "
-    "decision; they end tasks of a program",
+    "an M100": f"shows FINISHED_LANDING for {to_seconds(FINISHED_LANDING_TIME):g} s",
+    "silence of the program": "brakes and hovers in P_GPS",
     "set-points on the ground": f"take off above {LIFT_OFF_M:g} m, {LIFT_OFF_M_S:g} m/s or "
     f"{LIFT_OFF_PERCENT:g} % of thrust",
     "set-points not flown": "angular rates, and thrust with anything but angles",
-    "without a position": "ground-relative set-points hover level; P_GPS becomes ATTITUDE",
-    "missions": f"{MIN_WAYPOINTS} to {MAX_WAYPOINTS} waypoints; action {STAY_ACTION} stays for a number "
-    "of milliseconds; they start in flight only",
-    "`ack_data`": f"{ACCEPTED} where accepted, {REFUSED} where refused",
+    "set-points and going home": "do not end it, also if a program has asked for it",
+    "without satellites": "P_GPS becomes ATTITUDE",
+    "speed towards a position": "the law that was seen of an M600 holds for all",
+    "landing": f"slow below {SLOW_BELOW:g} m above home",
+    "downward range of an M210": f"latches beyond {RANGE_M:g} m",
+    "`ack_data`": f"{NO_CODE} where a request is refused and no code is known",
     "altitude for going home": f"from {GO_HOME_ALTITUDES.lowest:g} to {GO_HOME_ALTITUDES.highest:g} m",
-    "battery": "measured without error; a low one goes home, a critical one lands, and set-points do "
-    "not end that",
+    "battery": "measured without error",
 }
 """Subject and assumption, as in docs/dji.md."""
+
+DOCUMENTED: Mapping[str, Source] = {
+    "authority": Source("A3 and N3 at P, M100 at F, M210 at P or F, M600 at each position", GUIDES),
+    "mode switch": Source(
+        "any move takes the authority; `rc` shows it on its fifth axis: +1, 0, -1 for P, A, F of an A3 or "
+        "N3, which have 12 axes; -8000, 0, 8000 of an M100; up to 10000 of others",
+        f"{GUIDES}; node 3.8",
+    ),
+    "`gps_position`": Source(
+        "altitude by pressure, tens of metres off; without satellites the place stays, messages go on, the "
+        "status is always a fix",
+        f"{HEADERS}; users (Onboard-SDK #216, #258, #488; ROS #132)",
+    ),
+    "`gps_health`": Source("0 until the home point is set, then the signal level", f"{HEADERS}; node 3.8"),
+    "`height_above_takeoff`": Source(
+        "0 on an A3, N3 and M600; the distance to the ground on an M210, which latches; a height on an M100",
+        f"{HEADERS}; users (Onboard-SDK #160, #218; ROS #161, #461)",
+    ),
+    "task 4": Source(
+        "climbs to about 1.2 m, only while the motors stand; an M100 whose motors turn accepts and stays",
+        f"{GUIDES}; support (ROS #15)",
+    ),
+    "motors": Source("a program stops them on the ground only; 4.1 has a kill switch", f"{GUIDES}; node 4.1"),
+    "set-points and landing": Source("do not end it", "support (ROS #44)"),
+    "set-points and position": Source(
+        "need GPS, without which only height and heading act; half the offset is flown each second, "
+        "at 3 m/s at most",
+        f"{HEADERS}; support (Onboard-SDK #459, of an M600)",
+    ),
+    "going home": Source("near home it lands on the spot: within 20 m", "support (ROS #469, of an M210)"),
+    "landing of an M600": Source(
+        f"{M600_LAND_FAST:g} m/s, and {M600_LAND_SLOW:g} m/s from {M600_SLOW_BELOW:g} m above the take-off "
+        "point on",
+        "support (Onboard-SDK #163)",
+    ),
+    "landing that waits": Source(
+        f"at about {CONFIRM_BELOW_M:g} m where the ground looks unsuitable; 3.8 has no task to confirm",
+        "manuals; node 4.1",
+    ),
+    "loss of the transmitter": Source(
+        f"after {to_seconds(RC_LOST_AFTER):g} s it goes home, or hovers if Assistant 2 is set so", GUIDES
+    ),
+    "no transmitter since power-on": Source(
+        f"stays within {NO_RC_RADIUS_M:g} m and {NO_RC_HEIGHT_M:g} m: missions are refused, set-points stop",
+        "support (Onboard-SDK #359; ROS #169)",
+    ),
+    "low battery": Source("goes home after 10 s; critical: lands at once; both override the program", GUIDES),
+    "missions": Source(
+        f"{MIN_WAYPOINTS} to {MAX_WAYPOINTS} waypoints, {LONGEST_PATH_M / 1000:g} km; action {STAY_ACTION} "
+        "stays for milliseconds; the upload takes 1 s and 1 s for each waypoint; an M300 takes none",
+        f"{GUIDES}; nodes 3.8 and 4.1",
+    ),
+    "vehicle node of 4.1": Source(
+        "one request at a time: take-off and landing answer when finished; a refusal is a failed call",
+        "node 4.1",
+    ),
+    "topics": Source(
+        "`imu` at 400 Hz, of an M100 at 100 Hz; an M100 has no `display_mode`, `angular_velocity_fused` and "
+        "`acceleration_ground_fused`, an M600 no `rc_connection_status`",
+        "node 3.8; users (ROS #325)",
+    ),
+}
+"""Subject, behaviour and source, as in docs/dji.md."""

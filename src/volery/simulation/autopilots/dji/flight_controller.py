@@ -1,25 +1,44 @@
 """Decisions of a DJI flight controller: SDK authority, motors, tasks, set-points, missions, batteries.
 
-Requests return whether they are accepted. Topics and services are not known here.
+Requests return the answer of the aircraft as a code. Topics and services are not known here.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import hypot, isfinite, radians
 from typing import Any
 
 from volery.base.time import Ns, S, from_seconds
-from volery.ros.messages.dji_constants import M100, MISSION_SPEEDS, DisplayMode, FlightStatus, M100Status
-from volery.simulation.autopilots.dji.parameters import AIRCRAFT
+from volery.ros.messages.dji_constants import (
+    A3,
+    M100,
+    M210,
+    M300,
+    M600,
+    MISSION_SPEEDS,
+    N3,
+    NO_CODE,
+    AuthorityAck,
+    DisplayMode,
+    FlightStatus,
+    M100MotorsAck,
+    M100Status,
+    MissionAck,
+    TaskAck,
+)
+from volery.simulation.autopilots.dji.parameters import aircraft_type
 from volery.simulation.autopilots.dji.sdk_setpoints import SdkControl, sdk_command
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, WAYPOINT, MissionItem
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 MIN_WAYPOINTS, MAX_WAYPOINTS = 2, 99
-"""Number of waypoints of a mission: assumed."""
+"""Number of waypoints of a mission."""
 STAY_ACTION = 0
-"""Action of a waypoint: stay for a number of milliseconds. The number of the action is assumed."""
+"""Action of a waypoint: stay for a number of milliseconds."""
+LONGEST_PATH_M = 30_000.0
+"""Longest path of a mission."""
 NO_ACTION, GO_HOME_AT_END, LAND_AT_END, TO_FIRST, NO_EXIT = range(5)
 """Actions at the end of a mission."""
 YAW_LOCKED, YAW_BY_WAYPOINT = 1, 3
@@ -74,6 +93,24 @@ INFO, WARNING = 6, 4
 
 SWITCH, F_ABOVE, P_BELOW = 5, 1700, 1300
 """Channel of the mode switch, and its pulse widths [us] for F and P; A is between them."""
+SWITCH_PULSES = {"P": 1000, "A": 1500, "F": 2000}
+"""Pulse widths of the simulated transmitter by position of the mode switch [us]."""
+
+GRANTS_AT = {A3: "P", N3: "P", M100: "F", M600: "PAF", M210: "PF", M300: "PF"}
+"""Positions of the mode switch at which a program is given the authority, by type of aircraft."""
+
+RC_LOST_AFTER: Ns = 3 * S
+"""Time without a transmitter after which the aircraft acts."""
+RC_LOST_HOVERS = 1
+"""Value of RC_LOST_ACTION: it hovers."""
+NO_RC_RADIUS_M, NO_RC_HEIGHT_M = 50.0, 30.0
+"""Farthest distance from home, and greatest height, of a flight without a transmitter since power-on."""
+HOME_IS_LEVEL, HOME_IS_UNKNOWN = 5, 0
+"""``gps_health`` with the position trusted, and without."""
+RANGE_M = 7.0
+"""Greatest distance to the ground that the downward sensors of an M210 measure; beyond it latches."""
+CONFIRM_BELOW_M = 0.7
+"""Height at which a landing waits for a confirmation if LAND_WAITS says so."""
 
 ENGINE_START_TIME: Ns = 2 * S
 """Time after the start of the motors in which ENGINE_START is shown: assumed."""
@@ -88,7 +125,7 @@ AUTONOMOUS_MODES = frozenset(
         DisplayMode.FORCE_AUTO_LANDING,
     }
 )
-"""Modes that set-points do not end while the aircraft itself has chosen them."""
+"""Modes that set-points do not end."""
 LANDING_MODES = frozenset({DisplayMode.AUTO_LANDING, DisplayMode.FORCE_AUTO_LANDING})
 
 
@@ -101,6 +138,7 @@ class FlightController:
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
         self._activates_at_power_on = False
+        vehicle.rc.transmitter[SWITCH - 1] = SWITCH_PULSES[GRANTS_AT[self.aircraft][0]]
         self.reset()
 
     def reset(self) -> None:
@@ -112,16 +150,32 @@ class FlightController:
         self.task: Any = None
         """Waypoint mission as uploaded, or None."""
         self.anomalies = 0
-        self._switch = "F"
+        self.landing_confirmed = False
+        self._switch = self._switch_position()
         self._last_setpoint_ns: Ns = NEVER
         self._requested_by_sdk = False
+        self._place: tuple[float, float] = (0.0, 0.0)
+        self._range = 0.0
+        self._low_battery_at: Ns = NEVER
+        self._rc_lost_at: Ns = NEVER
+        self._had_rc = False
 
     # -- reported state
 
     @property
     def aircraft(self) -> str:
         """Type of the aircraft, such as A3 or M100."""
-        return AIRCRAFT[min(len(AIRCRAFT) - 1, max(0, round(self.vehicle.parameters["AIRCRAFT"])))]
+        return aircraft_type(self.vehicle.parameters)
+
+    @property
+    def rc_connected(self) -> bool:
+        """Whether the transmitter is received."""
+        return self.vehicle.parameters["RC_CONNECTED"] > 0.0
+
+    @property
+    def without_rc(self) -> bool:
+        """Whether there was no transmitter since power-on, so that the flight is limited."""
+        return not self._had_rc and not self.rc_connected
 
     @property
     def mode(self) -> int:
@@ -160,11 +214,34 @@ class FlightController:
 
     @property
     def gps_health(self) -> int:
-        """GPS health, 0 to 5."""
+        """GPS health, 0 to 5; 0 until the position is trusted, and again without satellites."""
         vehicle = self.vehicle
-        if vehicle.has_position:
-            return 5
-        return 3 if vehicle.estimate.gps.fix_type >= 3 and vehicle.estimate.position_ok else 0
+        good = vehicle.has_position and vehicle.estimate.gps.fix_type >= 3
+        return HOME_IS_LEVEL if good else HOME_IS_UNKNOWN
+
+    def place(self) -> tuple[float, float, float]:
+        """Return latitude, longitude [deg] and altitude [m] as they are reported.
+
+        Without satellites the place stays as it was; the altitude, which is by pressure, goes on.
+        """
+        vehicle = self.vehicle
+        if vehicle.uptime() < vehicle.rules.startup.origin_after:
+            return 0.0, 0.0, 0.0
+        latitude, longitude, amsl = vehicle.estimate.geodetic
+        if vehicle.estimate.gps.fix_type >= 3 and vehicle.estimate.position_ok:
+            self._place = (latitude, longitude)
+        return *self._place, amsl + vehicle.parameters["PRESSURE_OFFSET"]
+
+    def height_below(self) -> float:
+        """Return what ``height_above_takeoff`` shows: on an M210 the distance to the ground, or 0 [m]."""
+        height = self.vehicle.height
+        if self.aircraft == M100:
+            return height
+        if self.aircraft not in (M210, M300):
+            return 0.0
+        if height <= RANGE_M:
+            self._range = height
+        return self._range
 
     def _is(self, mode: DisplayMode) -> bool:
         return self.vehicle.mode.number == mode
@@ -180,31 +257,38 @@ class FlightController:
         """Activate now and after each power-on, as the node of 4.1 does."""
         self._activates_at_power_on = self.activated = True
 
-    def set_authority(self, wanted: bool) -> bool:
+    def set_authority(self, wanted: bool) -> int:
         """Give the authority to a program or take it back; the pilot's mode switch may refuse it."""
-        if wanted and (self._switch != "F" or not self.activated):
-            return False
+        if wanted and not self.activated:
+            return NO_CODE
+        allowed = GRANTS_AT[self.aircraft]
+        if wanted and self._switch not in allowed:
+            return AuthorityAck.NEEDS_F if allowed == "F" else AuthorityAck.NEEDS_P
         self.has_authority = wanted
         if not wanted and self._is(DisplayMode.NAVI_SDK_CTRL):
             self.hover()
-        return True
+        return AuthorityAck.OBTAINED if wanted else AuthorityAck.RELEASED
 
-    def motors(self, on: bool) -> bool:
-        """Start or stop the motors, also in flight."""
+    def motors(self, on: bool) -> int:
+        """Start or stop the motors; they stop on the ground only."""
+        own = self.aircraft == M100
         if not self.has_authority:
-            return False
-        if on:
-            return self.vehicle.armed or self._start_motors()
-        self.kill()
-        return True
+            return M100MotorsAck.NEEDS_AUTHORITY if own else NO_CODE
+        if not self.vehicle.landed:
+            return M100MotorsAck.IN_AIR if own else TaskAck.IN_AIR
+        if on == self.vehicle.armed:
+            return M100MotorsAck.ALREADY_DONE if own else TaskAck.MOTORS_ON if on else TaskAck.MOTORS_OFF
+        if not on:
+            self.kill()
+            return TaskAck.OK
+        return TaskAck.OK if self._start_motors() else NO_CODE
 
-    def kill(self) -> bool:
+    def kill(self) -> None:
         """Stop the motors, also in flight."""
         if self.vehicle.armed:
             self.vehicle.disarm()
             self.vehicle.send_text(INFO, "motors stopped")
             self.hover()
-        return True
 
     def _start_motors(self) -> bool:
         vehicle = self.vehicle
@@ -216,40 +300,60 @@ class FlightController:
         vehicle.send_text(INFO, "motors started")
         return True
 
-    def take_off(self) -> bool:
-        """Start the motors and climb to TAKEOFF_HEIGHT."""
-        vehicle = self.vehicle
-        if not vehicle.landed or not vehicle.has_position:
-            return False
-        if not vehicle.armed and not self._start_motors():
-            return False
-        self._enter(DisplayMode.AUTO_TAKEOFF, by_sdk=True)
-        return True
+    def take_off(self) -> int:
+        """Start the motors and climb to TAKEOFF_HEIGHT; only while the motors stand.
 
-    def go_home(self, by_sdk: bool = True) -> bool:
+        With running motors an M100 accepts the task and does not fly it.
+        """
+        vehicle = self.vehicle
+        if not vehicle.landed:
+            return TaskAck.IN_AIR
+        if vehicle.armed:
+            return TaskAck.OK if self.aircraft == M100 else TaskAck.MOTORS_ON
+        if not vehicle.has_position:
+            return TaskAck.BAD_GPS
+        if not self._start_motors():
+            return NO_CODE
+        self._enter(DisplayMode.AUTO_TAKEOFF, by_sdk=True)
+        return TaskAck.OK
+
+    def go_home(self, by_sdk: bool = True) -> int:
         """Climb, fly home and land; near home, land at once."""
         vehicle = self.vehicle
         home = vehicle.home
-        if vehicle.landed or home is None or not vehicle.has_position:
-            return False
+        if vehicle.landed:
+            return TaskAck.NOT_IN_AIR
+        if home is None:
+            return TaskAck.NO_HOME_POINT
+        if not vehicle.has_position:
+            return TaskAck.BAD_GPS
         north, east, _ = vehicle.estimate.position
         near = hypot(home.ned[0] - north, home.ned[1] - east) < vehicle.parameters["GO_HOME_NEAR"]
         self._enter(DisplayMode.AUTO_LANDING if near else DisplayMode.NAVI_GO_HOME, by_sdk=by_sdk)
-        return True
+        return TaskAck.OK
 
-    def land(self, by_sdk: bool = True) -> bool:
+    def land(self, by_sdk: bool = True) -> int:
         """Land at the present position."""
         if self.vehicle.landed:
-            return False
+            return TaskAck.NOT_IN_AIR
+        if self._is(DisplayMode.AUTO_LANDING) and self._requested_by_sdk:
+            return TaskAck.ALREADY_RUNNING
         self._enter(DisplayMode.AUTO_LANDING, by_sdk=by_sdk)
-        return True
+        return TaskAck.OK
 
-    def interrupt(self, *modes: DisplayMode) -> bool:
+    def confirm_landing(self) -> int:
+        """Go on with a landing that waits at CONFIRM_BELOW_M."""
+        if self.vehicle.mode.number not in LANDING_MODES:
+            return TaskAck.NOT_RUNNING
+        self.landing_confirmed = True
+        return TaskAck.OK
+
+    def interrupt(self, *modes: DisplayMode) -> int:
         """Hover if one of these modes is flown on request of a program."""
         if self.vehicle.mode.number not in modes or not self._requested_by_sdk:
-            return False
+            return TaskAck.NOT_RUNNING
         self.hover()
-        return True
+        return TaskAck.OK
 
     def brake(self) -> bool:
         """Stop and hover."""
@@ -265,9 +369,9 @@ class FlightController:
 
     def set_reference(self) -> bool:
         """Set the origin of the local position here."""
-        if not self.vehicle.has_position:
+        if self.gps_health == HOME_IS_UNKNOWN:
             return False
-        self.reference = self.vehicle.estimate.geodetic
+        self.reference = self.place()
         return True
 
     def handle_setpoint(self, numbers: tuple[float, ...], flag: int) -> None:
@@ -278,11 +382,7 @@ class FlightController:
             flag: Control flag of the onboard SDK.
         """
         vehicle = self.vehicle
-        if not self.has_authority or not vehicle.armed:
-            return
-        if vehicle.mode.number in AUTONOMOUS_MODES and not (self._requested_by_sdk and not vehicle.landed):
-            return
-        if self._is(DisplayMode.AUTO_TAKEOFF):
+        if not self.has_authority or not vehicle.armed or vehicle.mode.number in AUTONOMOUS_MODES:
             return
         command = sdk_command(numbers, flag, vehicle.estimate.position)
         if command is None:
@@ -302,46 +402,79 @@ class FlightController:
 
     # -- missions
 
-    def upload(self, task: Any) -> bool:
+    def upload(self, task: Any) -> int:
         """Replace the mission if it is valid."""
+        if not self.has_authority:
+            return MissionAck.NEEDS_AUTHORITY
         found = mission_refusal(task)
-        if found:
-            self.vehicle.send_text(WARNING, f"mission refused: {found}")
-            return False
+        code = NO_CODE if found else self._place_refusal(task)
+        if code:
+            why = found or MissionAck(code).name.lower().replace("_", " ")
+            self.vehicle.send_text(WARNING, f"mission refused: {why}")
+            return code
         self.task = task
         self.vehicle.mission.replace(mission_items(task))
-        return True
+        return MissionAck.OK
 
-    def start_mission(self, *, from_start: bool) -> bool:
-        """Start the mission from its first point, or resume it; in flight only."""
+    def _place_refusal(self, task: Any) -> int:
+        """Return the code for a mission that is too long, or too far without a transmitter; else OK."""
         vehicle = self.vehicle
-        if self.task is None or vehicle.landed or not vehicle.has_position:
-            return False
+        places = [
+            vehicle.point(GLOBAL_RELATIVE, point.latitude, point.longitude, point.altitude)
+            for point in task.mission_waypoint
+        ]
+        if sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(places)) > LONGEST_PATH_M:
+            return MissionAck.PATH_TOO_LONG
+        if not self.without_rc:
+            return MissionAck.OK
+        home = vehicle.home.ned if vehicle.home else vehicle.estimate.position
+        if any(hypot(place[0] - home[0], place[1] - home[1]) > NO_RC_RADIUS_M for place in places):
+            return MissionAck.FAR_FROM_HOME
+        if any(point.altitude > NO_RC_HEIGHT_M for point in task.mission_waypoint):
+            return MissionAck.TOO_HIGH
+        return MissionAck.OK
+
+    def _start_refusal(self, from_start: bool) -> int:
+        """Return the code for a mission that cannot be started; else OK."""
+        vehicle = self.vehicle
+        checks = (
+            (not self.has_authority, MissionAck.NEEDS_AUTHORITY),
+            (self.task is None or (not from_start and vehicle.mission.complete), NO_CODE),
+            (vehicle.landed, MissionAck.NOT_TAKEN_OFF),
+            (self.gps_health == HOME_IS_UNKNOWN, MissionAck.BAD_GPS),
+            (vehicle.mode.number in AUTONOMOUS_MODES, MissionAck.BUSY),
+        )
+        return next((code for found, code in checks if found), MissionAck.OK)
+
+    def start_mission(self, *, from_start: bool) -> int:
+        """Start the mission from its first point, or resume it; in flight only."""
+        refusal = self._start_refusal(from_start)
+        if refusal:
+            return refusal
+        vehicle = self.vehicle
         if from_start:
             vehicle.mission.restart()
-        elif vehicle.mission.complete:
-            return False
         self._enter(DisplayMode.NAVI_MISSION, by_sdk=True)
         vehicle.commanded.speed = self.task.idle_velocity
         if self.task.yaw_mode == YAW_LOCKED:
             vehicle.commanded.yaw = vehicle.estimate.attitude[2]
-        return True
+        return MissionAck.OK
 
-    def leave_mission(self) -> bool:
+    def leave_mission(self) -> int:
         """Hover instead of the mission."""
         if not self._is(DisplayMode.NAVI_MISSION):
-            return False
+            return NO_CODE
         self.hover()
-        return True
+        return MissionAck.OK
 
-    def mission_speed(self, metres_per_second: float) -> bool:
+    def mission_speed(self, metres_per_second: float) -> int:
         """Set the speed of the mission [m/s]."""
         if self.task is None:
-            return False
+            return NO_CODE
         self.task.idle_velocity = metres_per_second
         if self._is(DisplayMode.NAVI_MISSION):
             self.vehicle.commanded.speed = metres_per_second
-        return True
+        return MissionAck.OK
 
     def item_begins(self, number: int, _item: MissionItem) -> None:
         """Turn to the heading of the waypoint, if the mission defines headings."""
@@ -364,7 +497,9 @@ class FlightController:
     def step(self) -> None:
         """Run the automatic actions, ten times a second."""
         self._read_switch()
+        self._watch_transmitter()
         if not self.vehicle.armed:
+            self._low_battery_at = NEVER
             return
         if self.vehicle.landed:
             self._stop_motors_automatically()
@@ -373,8 +508,7 @@ class FlightController:
 
     def _read_switch(self) -> None:
         """Read the mode switch; any change withdraws the authority, and in flight the aircraft hovers."""
-        pulse = self.vehicle.rc[SWITCH]
-        now = "F" if pulse > F_ABOVE else "P" if pulse < P_BELOW else "A"
+        now = self._switch_position()
         if now == self._switch:
             return
         self._switch = now
@@ -383,10 +517,32 @@ class FlightController:
         if self.vehicle.armed and not self.vehicle.landed:
             self.hover()
 
+    def _switch_position(self) -> str:
+        pulse = self.vehicle.rc[SWITCH]
+        return "F" if pulse > F_ABOVE else "P" if pulse < P_BELOW else "A"
+
+    def _watch_transmitter(self) -> None:
+        """Go home or hover once the transmitter has been lost for RC_LOST_AFTER; set-points do not end it."""
+        vehicle, now = self.vehicle, self.vehicle.kernel.now()
+        if self.rc_connected:
+            self._had_rc, self._rc_lost_at = True, NEVER
+            return
+        if not self._had_rc:
+            return
+        if self._rc_lost_at == NEVER:
+            self._rc_lost_at = now
+            vehicle.send_text(WARNING, "transmitter lost")
+        flies = vehicle.armed and not vehicle.landed
+        if not flies or now - self._rc_lost_at < RC_LOST_AFTER or vehicle.mode.number in AUTONOMOUS_MODES:
+            return
+        if round(vehicle.parameters["RC_LOST_ACTION"]) != RC_LOST_HOVERS:
+            self.go_home(by_sdk=False)
+
     def _update_flight(self) -> None:
         vehicle = self.vehicle
         number, manoeuvre = vehicle.mode.number, vehicle.manoeuvre
         timeout = from_seconds(vehicle.parameters["SETPOINT_TIMEOUT"])
+        self._act_on_low_battery()
         if number == DisplayMode.NAVI_SDK_CTRL:
             if vehicle.kernel.now() - self._last_setpoint_ns > timeout:
                 self.hover()
@@ -417,9 +573,17 @@ class FlightController:
             self.kill()
 
     def low_battery(self) -> None:
-        """Report a low battery and go home."""
+        """Report a low battery; after LOW_BATTERY_DELAY the aircraft goes home."""
         self.vehicle.send_text(WARNING, "battery low")
-        if self.vehicle.armed and self.vehicle.mode.number not in LANDING_MODES:
+        self._low_battery_at = self.vehicle.kernel.now()
+
+    def _act_on_low_battery(self) -> None:
+        vehicle = self.vehicle
+        delay = vehicle.seconds_parameter("LOW_BATTERY_DELAY")
+        if self._low_battery_at == NEVER or vehicle.kernel.now() - self._low_battery_at < delay:
+            return
+        self._low_battery_at = NEVER
+        if vehicle.mode.number not in LANDING_MODES:
             self.go_home(by_sdk=False)
 
     def critical_battery(self) -> None:
@@ -430,6 +594,7 @@ class FlightController:
 
     def _enter(self, mode: DisplayMode, *, by_sdk: bool = False) -> None:
         self._requested_by_sdk = by_sdk
+        self.landing_confirmed = False
         self.vehicle.enter_mode(self.vehicle.rules.modes[mode])
 
 

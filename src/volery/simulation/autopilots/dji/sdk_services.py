@@ -1,7 +1,8 @@
 """The services of the two nodes of DJI's onboard SDK.
 
 ``dji_sdk`` 3.8 has all names below its prefix. The vehicle node of ``dji_osdk_ros`` 4.1 has its names beside
-it, and those of waypoint missions below it.
+it, and those of waypoint missions below it. It fails the call of a refused flight task, authority or kill,
+and answers a take-off or a landing when it is finished.
 """
 
 from __future__ import annotations
@@ -11,16 +12,24 @@ from math import pi, radians
 from typing import Any, NamedTuple
 
 from volery.base.frames import heading_to_yaw
+from volery.base.time import Ns, S
 from volery.ros.messages import message_class
 from volery.ros.messages.dji_constants import (
     GO_HOME_ALTITUDES,
     HARDWARE,
     HORIZONTAL,
+    M100,
+    M300,
     MISSION_SPEEDS,
     NEW_NAMES,
+    NO_CODE,
     OLD_NAMES,
+    AuthorityAck,
     DisplayMode,
     Flag,
+    M100TaskAck,
+    MissionAck,
+    TaskAck,
 )
 from volery.simulation.autopilots.dji.flight_controller import FlightController
 
@@ -29,8 +38,21 @@ START, STOP, PAUSE, RESUME = range(4)
 GO_HOME, TAKE_OFF, LAND = 1, 4, 6
 """Tasks of both packages."""
 
-ACCEPTED, REFUSED = 0, 1
-"""Values of ``ack_data``: assumed; the public definitions do not list them."""
+_AUTHORITY = f"{OLD_NAMES}/srv/SDKControlAuthority"
+_TASK = f"{OLD_NAMES}/srv/DroneTaskControl"
+_FLIGHT_TASK = f"{NEW_NAMES}/srv/FlightTaskControl"
+
+Condition = Callable[[], bool]
+
+
+class Reply(NamedTuple):
+    """A response, or None to fail the call, and when it is given: at once, or once ``finished`` is true."""
+
+    response: Any
+    finished: Condition | None = None
+
+
+Answer = Callable[[Any], Reply]
 
 
 class Served(NamedTuple):
@@ -38,27 +60,48 @@ class Served(NamedTuple):
 
     name: str
     type: str
-    answer: Callable[[Any], Any]
+    answer: Answer
 
 
-def _response(kind: str, result: bool) -> Any:
-    """Return a response with its result and, where the type has one, its acknowledgement."""
+def _response(kind: str, result: bool, code: int) -> Any:
+    """Return a response with its result and, where the type has one, the code of the aircraft."""
     cls = message_class(f"{kind}_Response")
     if "ack_data" in cls.__match_args__:
-        return cls(result=result, ack_data=ACCEPTED if result else REFUSED)
+        return cls(result=result, ack_data=code)
     return cls(result=result)
 
 
-def _accepting(
-    prefix: str, package: str, *rows: tuple[str, str, Callable[[Any], bool]]
-) -> tuple[Served, ...]:
-    """Return services that answer whether a request is accepted, from rows of name, type and handler."""
+Row = tuple[str, str, Callable[[Any], int]]
+"""Name, type and handler, which returns the code of the aircraft."""
 
-    def served(name: str, kind: str, handle: Callable[[Any], bool]) -> Served:
+
+def _accepting(prefix: str, package: str, *rows: Row) -> tuple[Served, ...]:
+    """Return services that answer whether a request is accepted: its code is 0."""
+
+    def served(name: str, kind: str, handle: Callable[[Any], int]) -> Served:
         kind = f"{package}/srv/{kind}"
-        return Served(prefix + name, kind, lambda request: _response(kind, handle(request)))
+
+        def answer(request: Any) -> Reply:
+            code = handle(request)
+            return Reply(_response(kind, code == TaskAck.OK, code))
+
+        return Served(prefix + name, kind, answer)
 
     return tuple(served(*row) for row in rows)
+
+
+def _failing(package: str, name: str, kind: str, handle: Callable[[Any], bool]) -> Served:
+    """Return a service whose call fails where the request is refused."""
+    kind = f"{package}/srv/{kind}"
+
+    def answer(request: Any) -> Reply:
+        return Reply(_response(kind, True, TaskAck.OK) if handle(request) else None)
+
+    return Served(name, kind, answer)
+
+
+UPLOAD_PERIOD: Ns = S
+"""Time that the node takes for a mission, and for each of its waypoints."""
 
 
 class Services:
@@ -82,31 +125,37 @@ class Services:
             *_accepting(
                 f"{OLD_NAMES}/",
                 OLD_NAMES,
-                ("activation", "Activation", lambda _: controller.activate()),
-                (
-                    "sdk_control_authority",
-                    "SDKControlAuthority",
-                    lambda request: controller.set_authority(bool(request.control_enable)),
-                ),
+                ("activation", "Activation", lambda _: _plain(controller.activate())),
                 (
                     "drone_arm_control",
                     "DroneArmControl",
                     lambda request: controller.motors(bool(request.arm)),
                 ),
-                ("drone_task_control", "DroneTaskControl", lambda request: self._task(request.task)),
-                ("set_local_pos_ref", "SetLocalPosRef", lambda _: self._set_reference()),
+                ("set_local_pos_ref", "SetLocalPosRef", lambda _: _plain(self._set_reference())),
             ),
+            Served(f"{OLD_NAMES}/sdk_control_authority", _AUTHORITY, self._authority),
+            Served(f"{OLD_NAMES}/drone_task_control", _TASK, self._task),
             Served(f"{OLD_NAMES}/query_drone_version", f"{OLD_NAMES}/srv/QueryDroneVersion", self._version),
         )
 
-    def _version(self, _request: Any) -> Any:
-        name = self._controller.aircraft
-        return message_class(f"{OLD_NAMES}/srv/QueryDroneVersion_Response")(HARDWARE[name], name)
+    def _version(self, _request: Any) -> Reply:
+        hardware, version = HARDWARE[self._controller.aircraft]
+        return Reply(message_class(f"{OLD_NAMES}/srv/QueryDroneVersion_Response")(version, hardware))
 
-    def _task(self, task: int) -> bool:
+    def _authority(self, request: Any) -> Reply:
+        wanted = bool(request.control_enable)
+        code = self._controller.set_authority(wanted)
+        done = code == (AuthorityAck.OBTAINED if wanted else AuthorityAck.RELEASED)
+        return Reply(_response(_AUTHORITY, done, code))
+
+    def _task(self, request: Any) -> Reply:
         controller = self._controller
         tasks = {GO_HOME: controller.go_home, TAKE_OFF: controller.take_off, LAND: controller.land}
-        return task in tasks and tasks[task]()
+        code = tasks[request.task]() if request.task in tasks else NO_CODE
+        done = code == TaskAck.OK
+        if controller.aircraft == M100:
+            code = M100TaskAck.OK if done else M100TaskAck.FAILED
+        return Reply(_response(_TASK, done, code))
 
     def _set_reference(self) -> bool:
         done = self._controller.set_reference()
@@ -119,39 +168,66 @@ class Services:
     def _services_4_1(self) -> tuple[Served, ...]:
         controller = self._controller
         controller.activate_at_power_on()
-        return _accepting(
-            "",
-            NEW_NAMES,
-            ("flight_task_control", "FlightTaskControl", self._flight_task),
-            (
-                "obtain_release_control_authority",
-                "ObtainControlAuthority",
-                lambda request: controller.set_authority(request.enable_obtain),
+        return (
+            Served("flight_task_control", _FLIGHT_TASK, self._flight_task),
+            _failing(NEW_NAMES, "obtain_release_control_authority", "ObtainControlAuthority", self._obtain),
+            _failing(NEW_NAMES, "kill_switch", "KillSwitch", self._kill),
+            *_accepting(
+                "",
+                NEW_NAMES,
+                ("emergency_brake", "EmergencyBrake", lambda _: _plain(controller.brake())),
+                ("set_local_pos_reference", "SetLocalPosRef", lambda _: _plain(self._set_reference())),
+                (
+                    "set_joystick_mode",
+                    "SetJoystickMode",
+                    lambda one: _plain(self._joystick_mode(one)),
+                ),
+                ("joystick_action", "JoystickAction", lambda one: _plain(self._joystick_action(one))),
+                (
+                    "set_go_home_altitude",
+                    "SetGoHomeAltitude",
+                    lambda one: _plain(self._go_home_altitude(one)),
+                ),
+                ("set_home_point", "SetHomePoint", lambda request: _plain(self._home_point(request))),
             ),
-            ("kill_switch", "KillSwitch", lambda request: controller.kill() if request.enable else True),
-            ("emergency_brake", "EmergencyBrake", lambda _: controller.brake()),
-            ("set_local_pos_reference", "SetLocalPosRef", lambda _: self._set_reference()),
-            ("set_joystick_mode", "SetJoystickMode", self._joystick_mode),
-            ("joystick_action", "JoystickAction", self._joystick_action),
-            ("set_go_home_altitude", "SetGoHomeAltitude", self._go_home_altitude),
-            ("set_home_point", "SetHomePoint", self._home_point),
         )
 
-    def _flight_task(self, request: Any) -> bool:
-        controller = self._controller
-        tasks: Mapping[int, Callable[[], bool]] = {
+    def _obtain(self, request: Any) -> bool:
+        code = self._controller.set_authority(request.enable_obtain)
+        return code in (AuthorityAck.OBTAINED, AuthorityAck.RELEASED)
+
+    def _kill(self, request: Any) -> bool:
+        if request.enable:
+            self._controller.kill()
+        return True
+
+    def _flight_task(self, request: Any) -> Reply:
+        """Start a task; the answer to a take-off or a landing comes when it is finished."""
+        controller, vehicle = self._controller, self._controller.vehicle
+
+        def land_at_once() -> int:
+            code = controller.land()
+            controller.landing_confirmed = True
+            return code
+
+        tasks: Mapping[int, Callable[[], int]] = {
             request.TASK_GOHOME: controller.go_home,
             request.TASK_GOHOME_AND_CONFIRM_LANDING: controller.go_home,
             request.TASK_TAKEOFF: controller.take_off,
             request.TASK_LAND: controller.land,
-            request.TASK_FORCE_LANDING: controller.land,
-            request.TASK_FORCE_LANDING_AVOID_GROUND: controller.land,
+            request.TASK_FORCE_LANDING: land_at_once,
+            request.TASK_FORCE_LANDING_AVOID_GROUND: land_at_once,
             request.START_MOTOR: lambda: controller.motors(True),
-            request.STOP_MOTOR: lambda: controller.vehicle.landed and controller.motors(False),
+            request.STOP_MOTOR: lambda: controller.motors(False),
             request.TASK_EXIT_GO_HOME: lambda: controller.interrupt(DisplayMode.NAVI_GO_HOME),
             request.TASK_EXIT_LANDING: lambda: controller.interrupt(DisplayMode.AUTO_LANDING),
         }
-        return request.task in tasks and tasks[request.task]()
+        if request.task not in tasks or tasks[request.task]() != TaskAck.OK:
+            return Reply(None)
+        doing = {request.TASK_TAKEOFF: DisplayMode.AUTO_TAKEOFF, request.TASK_LAND: DisplayMode.AUTO_LANDING}
+        mode = doing.get(request.task)
+        finished = None if mode is None else lambda: vehicle.mode.number != mode or not vehicle.armed
+        return Reply(_response(_FLIGHT_TASK, True, TaskAck.OK), finished)
 
     def _joystick_mode(self, request: Any) -> bool:
         self._joystick = (
@@ -196,18 +272,19 @@ class Services:
 
         def query(name: str, kind: str, values: Callable[[], tuple[Any, ...]]) -> Served:
             response = message_class(f"{package}/srv/{kind}_Response")
-            return Served(prefix + name, f"{package}/srv/{kind}", lambda _: response(*values()))
+            return Served(prefix + name, f"{package}/srv/{kind}", lambda _: Reply(response(*values())))
 
-        upload, action, set_speed = _accepting(
+        action, set_speed = _accepting(
             prefix,
             package,
-            (
-                "mission_waypoint_upload",
-                "MissionWpUpload",
-                lambda request: controller.upload(request.waypoint_task.copy()),
-            ),
             ("mission_waypoint_action", "MissionWpAction", self._mission_action),
             ("mission_waypoint_setSpeed", "MissionWpSetSpeed", self._set_speed),
+        )
+        upload_type = f"{package}/srv/MissionWpUpload"
+        upload = Served(
+            f"{prefix}mission_waypoint_upload",
+            upload_type,
+            lambda request: self._upload(upload_type, request.waypoint_task.copy()),
         )
         no_task = message_class(f"{package}/msg/MissionWaypointTask")
         return (
@@ -223,14 +300,27 @@ class Services:
             query("mission_status", "MissionStatus", lambda: (int(controller.task is not None), 0)),
         )
 
-    def _mission_action(self, request: Any) -> bool:
+    def _upload(self, kind: str, task: Any) -> Reply:
+        """Take a mission, slowly: the aircraft checks all points with the last one."""
+        controller = self._controller
+        kernel = controller.vehicle.kernel
+        until = kernel.now() + UPLOAD_PERIOD * (1 + len(task.mission_waypoint))
+        code = NO_CODE if controller.aircraft == M300 else controller.upload(task)
+        return Reply(_response(kind, code == MissionAck.OK, code), lambda: kernel.now() >= until)
+
+    def _mission_action(self, request: Any) -> int:
         controller = self._controller
         if request.action in (STOP, PAUSE):
             return controller.leave_mission()
-        return request.action in (START, RESUME) and controller.start_mission(
-            from_start=request.action == START
-        )
+        if request.action not in (START, RESUME):
+            return NO_CODE
+        return controller.start_mission(from_start=request.action == START)
 
-    def _set_speed(self, request: Any) -> bool:
+    def _set_speed(self, request: Any) -> int:
         low, high = MISSION_SPEEDS
-        return low <= request.speed <= high and self._controller.mission_speed(request.speed)
+        return self._controller.mission_speed(request.speed) if low <= request.speed <= high else NO_CODE
+
+
+def _plain(accepted: bool) -> int:
+    """Return the code of an answer for which the aircraft has none of its own."""
+    return TaskAck.OK if accepted else NO_CODE

@@ -7,7 +7,7 @@ count from the place of take-off.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, isfinite, pi, sin
+from math import cos, hypot, isfinite, pi, sin
 from typing import TYPE_CHECKING
 
 from volery.base.frames import Vector
@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
 LIFT_OFF_M, LIFT_OFF_M_S, LIFT_OFF_PERCENT = 0.5, 0.1, 20.0
 """Set-points above these values take a standing aircraft with running motors off the ground: assumed."""
+
+
+SLOWEST = 0.1
+"""Speed towards a position that is almost reached [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,7 @@ def sdk_command(numbers: tuple[float, ...], flag: int, anchor: Vector) -> SdkCom
 class SdkControl(Manoeuvre):
     """NAVI_SDK_CTRL: follow the last set-point.
 
-    Without a position, ground-relative set-points hover level.
+    Without satellites, set-points over ground have no horizontal effect: it flies level, and drifts.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
@@ -92,8 +96,10 @@ class SdkControl(Manoeuvre):
     def step(self) -> None:
         """Command the set-point."""
         command, vehicle = self.command, self.vehicle
-        if command is None or (command.needs_position and not vehicle.has_position):
+        if command is None:
             vehicle.drive(Setpoint(Control.CLIMB, accel_z=vehicle.tuning.accel_z))
+        elif command.needs_position and not vehicle.firmware_state.gps_health:
+            vehicle.drive(self._level_setpoint(command))
         elif command.horizontal == Flag.HORIZONTAL_POSITION:
             vehicle.drive(self._position_setpoint(command))
         elif command.horizontal == Flag.HORIZONTAL_VELOCITY:
@@ -127,8 +133,23 @@ class SdkControl(Manoeuvre):
             return None, -command.yaw
         return pi / 2.0 - command.yaw, None
 
+    def _level_setpoint(self, command: SdkCommand) -> Setpoint:
+        """Return the vertical part of a set-point over ground."""
+        tuning, (yaw, rate) = self.vehicle.tuning, self._turn(command)
+        return Setpoint(
+            Control.CLIMB,
+            climb=self._climb(command),
+            yaw=yaw,
+            yaw_rate=rate,
+            speed_up=SDK_CLIMB,
+            speed_down=SDK_CLIMB,
+            accel_z=tuning.accel_z,
+        )
+
     def _position_setpoint(self, command: SdkCommand) -> Setpoint:
         north, east = self._north_east(command)
+        parameters = self.vehicle.parameters
+        speed = min(parameters["MAX_SPEED"], parameters["POSITION_GAIN"] * hypot(north, east))
         tuning, (yaw, rate) = self.vehicle.tuning, self._turn(command)
         by_height = command.vertical == Flag.VERTICAL_POSITION
         return Setpoint(
@@ -137,7 +158,7 @@ class SdkControl(Manoeuvre):
             climb=0.0 if by_height else self._climb(command),
             yaw=yaw,
             yaw_rate=rate,
-            speed=tuning.speed,
+            speed=max(SLOWEST, speed),
             speed_up=tuning.speed_up if by_height else SDK_CLIMB,
             speed_down=tuning.speed_down if by_height else SDK_CLIMB,
             accel=tuning.accel,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
+from enum import IntEnum
 from functools import partial
 from typing import Any
 
@@ -17,7 +18,17 @@ from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal, sleep
 from volery.ros.graph import Node, ServiceError, Work
-from volery.ros.messages.dji_constants import M100, DisplayMode
+from volery.ros.messages.dji_constants import (
+    M100,
+    AuthorityAck,
+    DisplayMode,
+    M100MotorsAck,
+    M100TaskAck,
+    MissionAck,
+    TaskAck,
+    ack_name,
+    aircraft_of,
+)
 from volery.trace.events import LinkState
 from volery.vehicles.drivers.dji.decoder import DjiDecoder
 from volery.vehicles.drivers.dji.node_interfaces import NodeInterface, ServiceRequest
@@ -26,7 +37,10 @@ from volery.vehicles.telemetry import Answer, Telemetry
 
 SETPOINT_PERIOD: Ns = 20 * MS
 ANSWERED_WITHIN: Ns = 60 * S
-"""The vehicle node of 4.1 may answer a task only when the task is done."""
+TASK_ANSWERED_WITHIN: Ns = 600 * S
+"""The vehicle node of 4.1 answers a take-off or a landing only when it is finished."""
+UPLOADED_WITHIN: Ns = 130 * S
+"""The node takes 1 s for a mission and 1 s for each of its 99 waypoints."""
 QUIET: Ns = 200 * MS
 """Time after the last set-point from which none is on its way; a later one would end a task."""
 CHECK_PERIOD: Ns = S
@@ -49,6 +63,11 @@ class Ack:
     START = "mission start"
 
 
+def _time_for(key: str) -> Ns:
+    """Return the time-out of a request under *key*."""
+    return {Ack.TASK: TASK_ANSWERED_WITHIN, Ack.MISSION: UPLOADED_WITHIN}.get(key, ANSWERED_WITHIN)
+
+
 def _nothing() -> None:
     """Do nothing."""
 
@@ -62,13 +81,21 @@ class DjiBackend:
         name: name of the vehicle.
         interface: topics and services of the DJI node.
         record: whether texts are recorded.
+        home_altitude: stated altitude of home, m AMSL; NaN if it is not stated.
     """
 
     def __init__(
-        self, kernel: Kernel, node: Node, name: str, interface: NodeInterface, *, record: bool
+        self,
+        kernel: Kernel,
+        node: Node,
+        name: str,
+        interface: NodeInterface,
+        *,
+        record: bool,
+        home_altitude: float,
     ) -> None:
         self.telemetry = Telemetry(kernel, name)
-        self.decoder = DjiDecoder(kernel, self.telemetry, record=record)
+        self.decoder = DjiDecoder(kernel, self.telemetry, record=record, home_altitude=home_altitude)
         self.stream = SetpointStream(kernel, self.telemetry, self.decoder)
         self.interface = interface
         self._kernel = kernel
@@ -179,7 +206,7 @@ class DjiBackend:
                     self._wrong = str(error)
                 else:
                     self._wrong = ""
-                    self.decoder.aircraft = response.hardware or "aircraft"
+                    self.decoder.aircraft = aircraft_of(response.hardware) or "aircraft"
                     break
                 sleep(self._kernel, S)
         if ask is None:
@@ -205,11 +232,14 @@ class DjiBackend:
 
     def _request(self, key: str, ask: ServiceRequest, accepted: Action) -> None:
         try:
-            response = ask.client.call(ask.request, within=ANSWERED_WITHIN)
+            response = ask.client.call(ask.request, within=_time_for(key))
         except ServiceError as error:
             with self._kernel.guard:
                 self._pending.discard(key)
-                self._wrong = str(error)
+                if error.by_server:  # the way in which the node of 4.1 refuses
+                    self._answered(key, False, None)
+                else:
+                    self._wrong = str(error)
             return
         with self._kernel.guard:
             self._pending.discard(key)
@@ -219,9 +249,27 @@ class DjiBackend:
             self._answered(key, bool(response.result), getattr(response, "ack_data", None))
 
     def _answered(self, key: str, accepted: bool, code: int | None) -> None:
-        result = "accepted" if accepted else "refused" if code is None else f"refused with {code}"
+        result = "accepted" if accepted else "refused"
+        if code is not None and not accepted:
+            meaning = ack_name(self._codes(key), code)
+            result = f"refused with {code}, {meaning}" if meaning else f"refused with {code}"
         self.telemetry.answers[key] = Answer(self._kernel.now(), accepted, result)
         self._update()
+
+    def _codes(self, key: str) -> type[IntEnum]:
+        """Return the meaning of ``ack_data`` in the answers under *key*."""
+        if key == Ack.AUTHORITY:
+            return AuthorityAck
+        if key in (Ack.MISSION, Ack.START):
+            return MissionAck
+        if self.is_m100:
+            return M100MotorsAck if key == Ack.MOTORS else M100TaskAck
+        return TaskAck
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether the node of 4.1 is in a take-off or a landing, and answers nothing else until its end."""
+        return self.interface.blocks and Ack.TASK in self._pending
 
     def activate(self) -> None:
         """Activate the SDK where the node does not by itself."""

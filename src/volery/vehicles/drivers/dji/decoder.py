@@ -1,7 +1,9 @@
 """Decoder of a DJI node's topics. One method for each topic.
 
 No topic reports who has the control authority: it follows from the answers to our requests and from the
-pilot's mode switch, which takes the authority whenever it is moved.
+pilot's mode switch, which takes the authority whenever it is moved. Altitudes are by pressure, tens of metres
+off, so only their differences count: to the altitude where the motors started. Without satellites the place
+freezes while messages go on, so the place counts only while ``gps_health`` is good.
 """
 
 from __future__ import annotations
@@ -33,17 +35,26 @@ SWITCH_AXIS = 4
 MILLI = 1000.0
 MOST_VOLTS = 100.0
 """A higher voltage is in millivolts."""
-NO_FIX = -1
 UNKNOWN = -1
+CONNECTED = 1
+"""Value of ``rc_connection_status`` with a transmitter."""
 WARNING = 4
 TAKEN_OVER_FOR: Ns = 5 * S
 """Time for which another program counts as in control after set-points were not obeyed."""
+
+STALE: Ns = 300 * MS
+"""An older place counts for nothing."""
 
 SETTLED: Ns = 200 * MS
 """Time for which a mode after a landing must be reported before it counts.
 
 On an unreliable link the report that the motors stand may arrive later than that of the mode.
 """
+
+AMSL_REMEDY = (
+    "a DJI aircraft reports its altitude by pressure, tens of metres off; state home's altitude, as in "
+    "home_altitude=900 among the options of its address, or give AboveHome"
+)
 
 WAITS = frozenset({DisplayMode.P_GPS, DisplayMode.ATTITUDE})
 """Modes in which it hovers and accepts commands if the pilot's switch permits."""
@@ -63,22 +74,32 @@ class DjiDecoder:
         activated: the SDK is activated.
         authority: this program has the control authority.
         commanded: mode commanded last.
+        displayed: mode that the aircraft shows, or that its status shows of an M100.
         node_seen: a DJI node publishes.
-        located_at: time of the last position, ns; -1 before the first.
+        located_at: time of the last position with a good ``gps_health``, ns; -1 before the first.
+        home_altitude: stated altitude of home, m AMSL; NaN if it is not stated.
 
     Args:
         kernel: clock and record.
         telemetry: written by the decoder.
         record: whether texts are recorded.
+        home_altitude: see above.
     """
 
-    def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool) -> None:
+    def __init__(
+        self, kernel: Kernel, telemetry: Telemetry, *, record: bool, home_altitude: float = nan
+    ) -> None:
+        self.home_altitude = home_altitude
+        telemetry.amsl_known = isfinite(home_altitude)
+        telemetry.amsl_remedy = AMSL_REMEDY
         self.aircraft = ""
         self.activated = False
         self.authority = False
         self.commanded = ""
         self.node_seen = False
+        self.displayed = UNKNOWN
         self.located_at: Ns = -1
+        self._placed_at: Ns = -1
         self._kernel = kernel
         self._telemetry = telemetry
         self._records = record
@@ -87,7 +108,10 @@ class DjiDecoder:
         self._shown_since: Ns = 0
         self._status = UNKNOWN
         self._gps_health = 0
-        self._height = nan
+        self._place: tuple[float, float] | None = None  # the last with a good gps_health, degrees
+        self._altitude = nan  # as reported, by pressure
+        self._ground = nan  # the same where the motors started
+        self._transmitter = CONNECTED
         self._switch: float | None = None
         self._granted_at: float | None = None  # where the switch was when we were given the authority
         self._taken = ""
@@ -102,20 +126,26 @@ class DjiDecoder:
             "display_mode": ("std_msgs/msg/UInt8", self._display_mode),
             "gps_health": ("std_msgs/msg/UInt8", self._health),
             "gps_position": ("sensor_msgs/msg/NavSatFix", self._position),
-            "height_above_takeoff": ("std_msgs/msg/Float32", self._height_above),
             "velocity": ("geometry_msgs/msg/Vector3Stamped", self._velocity),
             "attitude": ("geometry_msgs/msg/QuaternionStamped", self._attitude),
             "rc": ("sensor_msgs/msg/Joy", self._rc),
+            "rc_connection_status": ("std_msgs/msg/UInt8", self._rc_connection),
             "battery_state": ("sensor_msgs/msg/BatteryState", self._battery),
             "flight_anomaly": (f"{package}/msg/FlightAnomaly", self._anomaly),
         }
+
+    @property
+    def located(self) -> bool:
+        """Whether the place is known, to be trusted, and not old."""
+        return self.located_at >= 0 and self._kernel.now() - self.located_at <= STALE
 
     # -- topics
 
     def _flight_status(self, message: Any) -> None:
         self.node_seen = True
-        if message.data == M100Status.FINISHED_LANDING != self._status and self.aircraft == M100:
-            self._motors = False  # only at the first report, which is repeated for a while
+        landed = self._status == M100Status.FINISHED_LANDING != message.data
+        if landed and self.aircraft == M100:
+            self._motors = False  # they may turn for a while after the touch-down
         self._status = message.data
         if self.aircraft and (self._display != UNKNOWN or self.aircraft == M100):
             self._telemetry.last_message_ns = self._kernel.now()
@@ -133,16 +163,20 @@ class DjiDecoder:
         self._telemetry.fix = f"gps health {message.data}"
 
     def _position(self, message: Any) -> None:
-        """Decode the position; assumption: the altitude is AMSL."""
-        place = (message.latitude, message.longitude, message.altitude)
-        if message.status.status <= NO_FIX or not all(isfinite(value) for value in place) or not any(place):
-            return
-        if abs(place[0]) <= 90.0 and abs(place[1]) <= 180.0:
-            self.located_at = self._kernel.now()
-            self._telemetry.position = Position(place[0], place[1], AMSL(place[2]))
+        """Decode the place, if it is to be trusted, and the altitude, which is by pressure.
 
-    def _height_above(self, message: Any) -> None:
-        self._height = message.data
+        The status is always a fix. A place of 0, 0 is none, whatever the altitude.
+        """
+        latitude, longitude, altitude = message.latitude, message.longitude, message.altitude
+        if not all(isfinite(value) for value in (latitude, longitude, altitude)):
+            return
+        if abs(latitude) > 90.0 or abs(longitude) > 180.0:
+            return
+        if altitude or latitude or longitude:
+            self._altitude = altitude
+        if (latitude or longitude) and self._gps_health >= HEALTHY_GPS:
+            self._place = (latitude, longitude)
+            self.located_at = self._kernel.now()
 
     def _velocity(self, message: Any) -> None:
         vector = message.vector
@@ -171,6 +205,20 @@ class DjiDecoder:
             self._lose("RC", "the pilot moved the mode switch: the authority is lost")
         elif self._taken == "RC" and switch == self._granted_at:
             self._taken = ""
+
+    def _rc_connection(self, message: Any) -> None:
+        """Tell when the transmitter is lost and when it is back."""
+        if message.data == self._transmitter:
+            return
+        self._transmitter = message.data
+        if message.data == CONNECTED:
+            self.add_text(WARNING, "the transmitter is received again")
+        else:
+            self.add_text(
+                WARNING,
+                "rc failsafe: the transmitter is lost; within 3 s it goes home, or hovers if set so in "
+                "Assistant 2, and may no longer obey set-points",
+            )
 
     def _anomaly(self, message: Any) -> None:
         """Add the bits that are newly set as texts."""
@@ -218,12 +266,12 @@ class DjiDecoder:
         if self._taken and self._taken != "RC" and self._kernel.now() - self._taken_at > TAKEN_OVER_FOR:
             self._taken = ""
         telemetry.kind, telemetry.autopilot = DRONE_KIND, f"DJI {self.aircraft}"
-        was_armed = telemetry.armed
         mode = self._update_m100() if self.aircraft == M100 else self._update_others()
-        self._update_home(was_armed)
+        self.displayed = mode
+        self._update_home()
         telemetry.armable = self.activated
         healthy = self._gps_health >= HEALTHY_GPS
-        telemetry.ready = self.activated and healthy and telemetry.position is not None
+        telemetry.ready = self.activated and healthy and self.located
         name = self._named(mode)
         by_itself = mode in DESCENDING_MODES and name != self.commanded
         lost_place = telemetry.flying and mode == DisplayMode.ATTITUDE and not healthy
@@ -241,12 +289,17 @@ class DjiDecoder:
     def _update_m100(self) -> int:
         """Derive the mode, which an M100 does not report, from its status and the commanded mode."""
         telemetry, status = self._telemetry, self._status
-        moving = (M100Status.TAKING_OFF, M100Status.IN_AIR, M100Status.LANDING)
+        moving = (
+            M100Status.TAKING_OFF,
+            M100Status.IN_AIR,
+            M100Status.LANDING,
+            M100Status.FINISHED_LANDING,
+        )
         telemetry.armed = self._motors or status in moving
         telemetry.flying = status in (M100Status.IN_AIR, M100Status.LANDING)
         if status == M100Status.TAKING_OFF:
             return DisplayMode.AUTO_TAKEOFF
-        if status == M100Status.LANDING:
+        if status in (M100Status.LANDING, M100Status.FINISHED_LANDING):
             return DisplayMode.AUTO_LANDING
         commanded = self.commanded if telemetry.flying and self.commanded in DisplayMode.__members__ else ""
         if commanded and commanded != DisplayMode.AUTO_TAKEOFF.name:
@@ -261,17 +314,34 @@ class DjiDecoder:
             return commanded
         return display_name(mode) if mode != UNKNOWN else ""
 
-    def _update_home(self, was_armed: bool) -> None:
-        """Update home: the place where the motors were started; before that, the present place."""
-        telemetry, here = self._telemetry, self._telemetry.position
-        if not telemetry.armed:
-            telemetry.above_home = 0.0 if here is not None else nan
-            telemetry.home = here
+    def _update_home(self) -> None:
+        """Update home, where the motors were started, and the height above it.
+
+        Before the motors start home is the present place. In flight it is unknown to a program that has come
+        too late, and so is the height.
+        """
+        telemetry = self._telemetry
+        if not telemetry.armed or (not telemetry.flying and not isfinite(self._ground)):
+            self._ground = self._altitude
+        on_ground = not telemetry.armed and isfinite(self._altitude)
+        telemetry.above_home = 0.0 if on_ground else self._altitude - self._ground
+        if self._place is None or not isfinite(self._altitude):
             return
-        telemetry.above_home = self._height
-        if not was_armed and not telemetry.flying and here is not None and isfinite(self._height):
-            amsl = here.altitude.metres - self._height
-            telemetry.home = Position(here.latitude, here.longitude, AMSL(amsl))
+        if self.located_at > self._placed_at:
+            self._placed_at = self.located_at
+            telemetry.position = self._at(self._altitude)
+        if not isfinite(self._ground):
+            telemetry.home = None
+        elif not telemetry.armed or (telemetry.home is None and not telemetry.flying):
+            telemetry.home = self._at(self._ground)
+
+    def _at(self, altitude: float) -> Position | None:
+        """Return the present place with a reported *altitude*, AMSL as far as home's is stated."""
+        if self._place is None:
+            return None
+        known = isfinite(self.home_altitude) and isfinite(self._ground)
+        amsl = self.home_altitude + altitude - self._ground if known else altitude
+        return Position(*self._place, AMSL(amsl))
 
     def add_text(self, severity: int, text: str) -> None:
         """Add a text about the aircraft, which sends none itself."""

@@ -8,24 +8,23 @@ pilot can take the authority at any time.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import radians
+from math import isfinite, radians
 
 from volery.base.errors import CapabilityError, LinkError, Refused
 from volery.base.frames import heading_to_yaw
 from volery.base.position import Position
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import Action, Kernel
-from volery.ros.messages.dji_constants import HEALTHY_GPS, DisplayMode
+from volery.ros.messages.dji_constants import GUIDES, HEADERS, HEALTHY_GPS, DisplayMode, Source
 from volery.vehicles.driver import Capability, ManualControl, Step
 from volery.vehicles.drivers.dji.backend import QUIET, DjiBackend
-from volery.vehicles.drivers.dji.decoder import MOST_VOLTS, SETTLED, TAKEN_OVER_FOR
-from volery.vehicles.drivers.dji.missions import MissionRunner, above_home
+from volery.vehicles.drivers.dji.decoder import MOST_VOLTS, SETTLED, STALE, TAKEN_OVER_FOR
+from volery.vehicles.drivers.dji.missions import MissionRunner, above_home, check_amsl
 from volery.vehicles.drivers.dji.sequences import LANDING_MODES, SDK, STARTS, WAITS, DjiSteps, DjiTasks
 from volery.vehicles.drivers.dji.setpoints import (
     BRAKES_M_S2,
     DOWN_M_S,
     OBEYED_WITHIN,
-    STALE,
     STILL,
     UP_M_S,
     Manual,
@@ -44,7 +43,7 @@ from volery.vehicles.drivers.steps import (
     immediate_step,
 )
 from volery.vehicles.mission import MissionItem
-from volery.vehicles.telemetry import Velocity
+from volery.vehicles.telemetry import Telemetry, Velocity
 
 LOW_THROTTLE = 0.3
 """Throttle below which an aircraft flown by thrust would fall."""
@@ -95,8 +94,8 @@ class Dji:
     def on_link_loss(self) -> str:
         """Return the assumed reaction: neither public definitions nor parameters state it."""
         return (
-            "it brakes and hovers where it is (assumed: within 0.5 s), until its battery is low or the pilot "
-            "takes it; landing, going home and missions go on"
+            "it brakes and hovers where it is (assumed: within 0.5 s), until its battery is low, the pilot "
+            "takes it or its transmitter is lost; landing, going home and missions go on"
         )
 
     def close(self) -> None:
@@ -136,6 +135,7 @@ class Dji:
         home = self.telemetry.home
         if home is None:
             raise Refused(self.name, f"go to {goal}", "the place of take-off is unknown")
+        check_amsl(goal, f"go to {goal}", self.telemetry)
         height = above_home(goal, home)
         self._steps.check_height(height, f"go to {goal}")
 
@@ -146,31 +146,41 @@ class Dji:
 
     def hold(self) -> Sequence[Step]:
         """Stream zero velocity until at rest; then it hovers by itself. It needs a position."""
-        if self.telemetry.flying and not self.telemetry.ready:
+        flew = self.telemetry.flying
+        leave = self._steps.leave_descent("hold")
+        if flew and not self.telemetry.ready:
+            self._stream.stop()
             raise Refused(self.name, "hold", f"it has no position ({self.telemetry.fix}) and drifts; land()")
+
+        def stands(seen: Telemetry) -> bool:
+            holds = seen.flying == flew and seen.mode not in LANDING_MODES
+            return holds and at_rest(seen) and not self._stream.fresh
+
         brake = Step(
             ask="stop",
             send=lambda: self._stream_velocity(STILL, 0.0, STOPPED_WITHIN),
-            done=lambda seen: at_rest(seen) and not self._stream.fresh,
+            done=stands,
             within=STOPPED_WITHIN,
             enters=SDK,
             leads_to=(WAITS,),
             armed=True,
         )
-        return (*self._steps.leave_descent(), self._steps.authority(), brake, self._steps.hover())
+        return (*leave, self._steps.authority(), brake, self._steps.hover())
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """Stream a velocity for *lasting*, then stop."""
         follow = immediate_step(
             "fly on", lambda: self._stream_velocity(velocity, yaw_rate, lasting), enters=SDK
         )
-        return (*self._steps.leave_descent(), self._steps.authority(), follow)
+        return (*self._steps.leave_descent("fly at a velocity"), self._steps.authority(), follow)
 
     def _stream_velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
         self._steps.follow(Moving(velocity, -radians(yaw_rate), self._kernel.now() + lasting))
 
     def heading(self, degrees: float) -> Sequence[Step]:
         """Turn in place."""
+        if self.telemetry.flying and not isfinite(self.telemetry.above_home):
+            raise Refused(self.name, f"turn to {degrees:g} degrees", "its height above home is unknown")
 
         def turn() -> Point | None:
             here = self._steps.over_here(self.telemetry.above_home)
@@ -205,7 +215,7 @@ class Dji:
             enters=SDK,
             leads_to=STARTS,
         )
-        return (self._steps.activated(), *self._steps.leave_descent(), self._steps.authority(), step)
+        return (self._steps.activated(), *self._steps.leave_descent(ask), self._steps.authority(), step)
 
     def manual(self) -> Sequence[Step]:
         """Raise ``CapabilityError``: this is for rovers."""
@@ -239,25 +249,54 @@ class Dji:
 
 
 ASSUMED: Mapping[str, str] = {
-    "`gps_position`": "its altitude is above the sea",
-    "home": "is where the motors started, and `height_above_takeoff` counts from there",
-    "`gps_health`": f"from {HEALTHY_GPS} on positions are to be trusted, and it can arm and go by position",
-    "`rc`": "the fifth axis is the mode switch: any move of it takes the authority, and its return hands "
-    "the aircraft back",
-    "`battery_state`": f"percent; a voltage above {MOST_VOLTS:g} is in millivolts; the current is negative "
-    "when it is drawn",
+    "home": "is where the motors started",
+    "`battery_state`": f"a voltage above {MOST_VOLTS:g} is in millivolts; the current is negative when drawn",
+    "the mode switch": "its return to where the authority was given hands the aircraft back",
     "set-points": f"without effect for {to_seconds(OBEYED_WITHIN):g} s mean that another program has the "
     f"authority, for {to_seconds(TAKEN_OVER_FOR):g} s at least",
-    "a position": f"older than {to_seconds(STALE):g} s is not reckoned from: no offset is sent",
-    "a set-point on its way": f"has come after {to_seconds(QUIET):g} s; it would end a landing or a way home "
-    "that a program has asked for",
+    "a position": f"older than {to_seconds(STALE):g} s counts for nothing: no offset is sent",
+    "a set-point on its way": f"has come after {to_seconds(QUIET):g} s",
     "a stated speed": f"is flown as a velocity until it has to brake with {BRAKES_M_S2:g} m/s² for its goal, "
     f"with at most {UP_M_S:g} m/s up and {DOWN_M_S:g} m/s down",
     "a mode after a way down": f"counts once it has shown for {to_seconds(SETTLED):g} s: the news that the "
     "motors stand may come later",
-    "task 6 (land) and task 1 (go home)": "stop the motors at the end by themselves",
-    "leaving a landing or a way home": "takes a set-point with `dji_sdk`, a task of its own with "
-    "`dji_osdk_ros`",
     "silence of the program": "makes it brake and hover; landing, going home and missions go on",
 }
-"""What the driver assumes beyond the public definitions, by subject."""
+"""What the driver assumes, by subject."""
+
+DOCUMENTED: Mapping[str, Source] = {
+    "altitudes": Source(
+        "those of `gps_position` are by pressure: only their difference to where the motors started counts; "
+        "AMSL takes the option `home_altitude`",
+        f"{HEADERS}; support and users (Onboard-SDK #160, #258; ROS #127)",
+    ),
+    "`height_above_takeoff`": Source(
+        "is another quantity on most aircraft, and not used", f"{HEADERS}; users (Onboard-SDK #160, #218)"
+    ),
+    "`gps_health`": Source(
+        f"from {HEALTHY_GPS} on the place counts; below, it freezes while messages go on",
+        f"{HEADERS}; nodes 3.8 and 4.1",
+    ),
+    "`rc`": Source("any move of the mode switch takes the authority", GUIDES),
+    "set-points in flight": Source(
+        "horizontal offsets that remain, absolute heights above take-off, 50 Hz; zero velocity brakes and "
+        "holds",
+        f"{GUIDES}; support (ROS #34; Onboard-SDK #760)",
+    ),
+    "task 4": Source("works only while the motors stand: `takeoff()` stops them first", "support (ROS #15)"),
+    "task 6 (land) and task 1 (go home)": Source(
+        "stop the motors at the end by themselves; near home going home lands on the spot, up to 20 m away",
+        f"{GUIDES}; support (ROS #199, #469)",
+    ),
+    "leaving a landing or a way home": Source(
+        "impossible with `dji_sdk` 3.8; with `dji_osdk_ros` 4.1 except a landing that was asked for",
+        "support (ROS #44); nodes 3.8 and 4.1",
+    ),
+    "motors in the air": Source("stop by the kill switch of 4.1 only", f"{GUIDES}; nodes 3.8 and 4.1"),
+    "a failed call": Source("is a refusal by the node of 4.1", "node 4.1"),
+    "`ack_data`": Source("the codes of an answer are named in the error", HEADERS),
+    "`rc_connection_status`": Source(
+        "after 3 s without a transmitter it goes home, or hovers if set so in Assistant 2", GUIDES
+    ),
+}
+"""What the driver relies on that has a source, by subject."""

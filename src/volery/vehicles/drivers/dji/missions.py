@@ -141,6 +141,18 @@ def above_home(position: Position, home: Position) -> float:
     raise UsageError(f"{position}: a DJI aircraft takes AMSL and AboveHome")
 
 
+def check_amsl(goal: Position, asked: str, seen: Telemetry) -> None:
+    """Raise ``Refused`` for an altitude AMSL while that of home is not stated.
+
+    Args:
+        goal: goal or waypoint.
+        asked: the command in words.
+        seen: telemetry of the aircraft.
+    """
+    if isinstance(goal.altitude, AMSL) and not seen.amsl_known:
+        raise Refused(seen.name, asked, seen.amsl_remedy)
+
+
 FLYING = DisplayMode.NAVI_MISSION.name
 
 
@@ -160,6 +172,9 @@ class MissionRunner:
         if home is None or here is None:
             said = "it does not know where it is yet; wait_ready() first"
             raise Refused(self._steps.name, "upload a mission", said)
+        for item in mission:
+            if isinstance(item, Waypoint):
+                check_amsl(item.position, "upload a mission", self._telemetry)
         plan = plan_of(self._steps.name, self._backend.interface.package, mission, home, here)
 
         def keep() -> None:
@@ -172,8 +187,9 @@ class MissionRunner:
             within=30 * S + len(plan.task.mission_waypoint) * 2 * S,
             answer=Ack.MISSION,
             again=5 * S,
+            advice="an M300 takes no missions of this kind" if self._backend.interface.blocks else "",
         )
-        return (self._steps.activated(), step)
+        return (self._steps.activated(), self._steps.authority(), step)
 
     def start(self, within: Ns) -> Sequence[Step]:
         """Return steps that take off, start the mission, and wait for its end."""

@@ -49,6 +49,8 @@ class NodeInterface(Protocol):
     namespace: str
     package: str
     kills_without_authority: bool
+    blocks: bool
+    """Whether it answers nothing while a take-off or a landing is in progress."""
 
     def version(self) -> ServiceRequest | None:
         """Request the type of aircraft; the response has ``hardware``."""
@@ -69,7 +71,7 @@ class NodeInterface(Protocol):
         """Start the task to go home, take off or land."""
 
     def interrupt(self, task: int) -> ServiceRequest | None:
-        """End going home or landing; ``None`` means that a set-point ends it."""
+        """End going home or landing; ``None`` means that no request does."""
 
     def reference(self) -> ServiceRequest:
         """Set the local reference."""
@@ -115,6 +117,7 @@ class DjiSdkInterface(_CommonInterface):
 
     package = OLD_NAMES
     kills_without_authority = False
+    blocks = False
 
     def __init__(self, node: Node, namespace: str) -> None:
         super().__init__(node, namespace)
@@ -155,7 +158,7 @@ class DjiSdkInterface(_CommonInterface):
         return self._make_request(self._task, task=task)
 
     def interrupt(self, task: int) -> None:
-        """Return ``None``: there is no such task; assumption: set-points end it."""
+        """Return ``None``: there is no such task, and set-points do not end it either."""
 
     def reference(self) -> ServiceRequest:
         """Return a request to ``set_local_pos_ref``."""
@@ -175,6 +178,7 @@ class OsdkRosInterface(_CommonInterface):
 
     package = NEW_NAMES
     kills_without_authority = True
+    blocks = True
 
     def __init__(self, node: Node, namespace: str) -> None:
         super().__init__(node, namespace)

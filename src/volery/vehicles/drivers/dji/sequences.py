@@ -35,6 +35,17 @@ STARTS = (DisplayMode.ENGINE_START.name, DisplayMode.ATTITUDE.name, WAITS, SDK)
 LANDING_MODES = frozenset(mode.name for mode in DESCENDING_MODES)
 
 
+ON_THE_WAY = (
+    "towards a position a DJI aircraft is slow (an M600 at most 3 m/s); without GPS (gps_health below 4), "
+    "and beyond 30 m height or 50 m from home without a transmitter since power-on, it does not obey"
+)
+WAITS_LOW = (
+    "aircraft with downward vision may wait at about 0.7 m where the ground looks unsuitable: the pilot "
+    "holds the throttle down"
+)
+ONLY_THE_PILOT = "only the pilot can, with the mode switch or the sticks"
+
+
 class DjiSteps:
     """Common steps for one aircraft."""
 
@@ -97,16 +108,30 @@ class DjiSteps:
             skippable=True,
             answer=Ack.AUTHORITY,
             again=RESEND_PERIOD,
-            advice="the pilot's mode switch must be at F (P on aircraft that have no F)",
+            advice="the pilot's mode switch must be at P (A3, N3, M210), or at F (M100)",
         )
 
-    def leave_descent(self) -> Sequence[Step]:
-        """Return a step that leaves a commanded landing or return, where that needs a task."""
+    def leave_descent(self, asked: str) -> Sequence[Step]:
+        """Return a step that leaves a commanded landing or return, for which set-points are no means.
+
+        Args:
+            asked: the command in words.
+
+        Raises:
+            Refused: the node has no request for it, or answers none until the landing is finished.
+        """
         doing = self.decoder.commanded
-        task = GO_HOME if doing == DisplayMode.NAVI_GO_HOME.name else LAND
-        ask = self.backend.interface.interrupt(task) if doing in LANDING_MODES else None
-        if ask is None or not self.telemetry.flying or self.telemetry.mode != doing:
+        if doing not in LANDING_MODES or not self.telemetry.flying or self.telemetry.mode != doing:
             return ()
+        goes = self.decoder.displayed == DisplayMode.NAVI_GO_HOME
+        ask = self.backend.interface.interrupt(GO_HOME if goes else LAND)
+        if ask is None or self.backend.is_busy:
+            node = (
+                "dji_sdk 3.8 has no request that ends it"
+                if ask is None
+                else ("the node of 4.1 answers nothing until it is finished")
+            )
+            raise Refused(self.name, asked, f"it is in {doing}; {node}: {ONLY_THE_PILOT}")
         return (
             Step(
                 ask=f"leave {doing}",
@@ -140,7 +165,7 @@ class DjiSteps:
         Args:
             ask: the command in words.
             point: returns the point; called when the step begins.
-            done: whether telemetry shows the effect.
+            done: whether telemetry shows the effect; a place that is not to be trusted shows none.
             within: time-out, ns.
         """
 
@@ -149,8 +174,17 @@ class DjiSteps:
             if target is not None:
                 self.follow(target)
 
-        step = Step(ask=ask, send=send, done=done, within=within, enters=SDK, leads_to=(WAITS,), armed=True)
-        return (*self.leave_descent(), self.authority(), step, self.hover())
+        step = Step(
+            ask=ask,
+            send=send,
+            done=lambda seen: self.decoder.located and done(seen),
+            within=within,
+            enters=SDK,
+            leads_to=(WAITS,),
+            armed=True,
+            advice=ON_THE_WAY,
+        )
+        return (*self.leave_descent(ask), self.authority(), step, self.hover())
 
     def over_here(self, height: float) -> Point | None:
         """Return the present place at *height* metres above home; ``None`` without a position."""
@@ -225,14 +259,21 @@ class DjiTasks:
             skippable=True,
             answer=Ack.MOTORS,
             again=RESEND_PERIOD,
+            advice=f"while it takes off or lands the node of 4.1 answers nothing: {ONLY_THE_PILOT}"
+            if self._backend.interface.blocks
+            else f"dji_sdk 3.8 stops the motors on the ground only: {ONLY_THE_PILOT}",
         )
-        alone = force and self._backend.interface.kills_without_authority
+        interface = self._backend.interface
+        alone = force and interface.kills_without_authority
         return (self._steps.authority(), step) if self._telemetry.armed and not alone else (step,)
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
         """Return steps for task 4, which climbs to a fixed height, and then to *height* by set-points."""
         steps = self._steps
         steps.check_height(height, f"take off to {height:g} m")
+        standing: Sequence[Step] = ()
+        if self._telemetry.armed and not self._telemetry.flying:
+            standing = self.disarm(force=False)  # task 4 works only while the motors stand
         lift = Step(
             ask="take off",
             send=lambda: self._backend.task(TAKE_OFF, DisplayMode.AUTO_TAKEOFF),
@@ -247,7 +288,7 @@ class DjiTasks:
         climb = steps.to_point(
             f"climb to {height:g} m", lambda: steps.over_here(height), climbed_to(height), within
         )
-        return (*steps.ready(), steps.authority(), lift, *climb)
+        return (*standing, *steps.ready(), steps.authority(), lift, *climb)
 
     def _off_the_ground(self, seen: Telemetry) -> bool:
         if self._backend.is_m100 and not seen.above_home >= M100_GAINS_M:
@@ -277,4 +318,5 @@ class DjiTasks:
             enters=mode.name,
             leads_to=(WAITS, SDK),
         )
-        return (self._steps.quiet(), begin, disarmed_step(ask, mode.name, within))
+        end = replace(disarmed_step(ask, mode.name, within), advice=WAITS_LOW)
+        return (self._steps.quiet(), begin, end)

@@ -11,7 +11,7 @@ from math import hypot, isfinite, pi, radians
 from typing import NamedTuple
 
 from volery.base.frames import LocalFrame, heading_to_yaw
-from volery.base.time import MS, Ns, S
+from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.ros.messages.dji_constants import (
     ANGLE_YAW_RATE_CLIMB,
@@ -24,8 +24,6 @@ from volery.vehicles.driver import ManualControl
 from volery.vehicles.drivers.dji.decoder import WAITS, DjiDecoder
 from volery.vehicles.telemetry import Telemetry, Velocity
 
-STALE: Ns = 300 * MS
-"""No offset is computed from an older position."""
 STOP_FOR: Ns = 2 * S
 """Time for which zero velocity is sent at the end of a velocity."""
 OBEYED_WITHIN: Ns = 3 * S
@@ -149,7 +147,7 @@ class SetpointStream:
 
     def _towards(self, target: Point) -> Setpoint | None:
         here = self._telemetry.position
-        if here is None or self._kernel.now() - self._decoder.located_at > STALE:
+        if here is None or not self._decoder.located or not isfinite(self._telemetry.above_home):
             return None
         east, north, _ = LocalFrame(here.latitude, here.longitude, 0.0).to_enu(
             target.latitude, target.longitude, 0.0

@@ -33,6 +33,7 @@ TYPES = {
     "local_frame_ref": "sensor_msgs/NavSatFix",
     "local_position": "geometry_msgs/PointStamped",
     "rc": "sensor_msgs/Joy",
+    "rc_connection_status": "std_msgs/UInt8",
     "velocity": "geometry_msgs/Vector3Stamped",
 }
 
@@ -77,7 +78,7 @@ class Apron:
         """The response of a service: in /d for a name that begins with a slash."""
         full = f"/d{name}" if name.startswith("/") else f"/d/{self.package}/{name}"
         asked = request(f"{self.package}/srv/{kind}", **fields)
-        return self.node.client(full, f"{self.package}/srv/{kind}").call(asked, within=S)
+        return self.node.client(full, f"{self.package}/srv/{kind}").call(asked, within=120 * S)
 
     def task(self, number: int) -> bool:
         return bool(self.call("drone_task_control", "DroneTaskControl", task=number).result)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from math import cos, hypot, pi, radians
 from typing import Any
 
 import pytest
 
 from volery.base.errors import UsageError
+from volery.base.time import S
 from volery.kernel.task import ExecutionContext
+from volery.ros.graph import ServiceError
 from volery.ros.messages import new
 
 Make = Callable[..., Any]
@@ -47,7 +50,8 @@ def test_a_cold_one_boots_before_it_speaks_and_gains_its_position_later(apron: M
         assert "flight_status" not in yard.seen
         yard.wait(2.0)
         assert (yard.seen["flight_status"].data, yard.seen["gps_health"].data) == (0, 0)
-        assert yard.seen["gps_position"].status.status == -1
+        place = yard.seen["gps_position"]
+        assert (place.status.status, place.latitude, place.longitude) == (0, 0.0, 0.0)  # a fix, it says
         assert not yard.call("set_local_pos_ref", "SetLocalPosRef").result
         yard.activate()
         assert not yard.task(TAKE_OFF)
@@ -274,13 +278,15 @@ def test_the_mode_switch_takes_the_authority_and_gives_none(apron: Make) -> None
         yard.fly()
         yard.keep_sending(1.0, "ENUvelocity_yawrate", 2.0, 0.0, 0.0, 0.0)
         before = yard.seen["rc"].axes[4]
-        yard.autopilot.vehicle.rc.transmitter[4] = 1000
+        assert before == pytest.approx(1.0)  # P of an A3
+        yard.autopilot.vehicle.rc.transmitter[4] = 2000
         yard.wait(0.3)
-        assert yard.seen["rc"].axes[4] != before
+        assert yard.seen["rc"].axes[4] == pytest.approx(-1.0)
         yard.keep_sending(1.0, "ENUvelocity_yawrate", 2.0, 0.0, 0.0, 0.0)
         assert yard.mode == 6
-        assert not yard.authority()
-        yard.autopilot.vehicle.rc.transmitter[4] = 2000
+        refused = yard.call("sdk_control_authority", "SDKControlAuthority", control_enable=1)
+        assert (refused.result, refused.ack_data) == (False, 5)  # it needs P
+        yard.autopilot.vehicle.rc.transmitter[4] = 1000
         yard.wait(0.3)
         yard.keep_sending(0.5, "ENUvelocity_yawrate", 2.0, 0.0, 0.0, 0.0)
         assert yard.mode == 6  # it must be asked for again
@@ -312,16 +318,19 @@ def test_going_home_climbs_comes_back_and_stops_the_motors(apron: Make) -> None:
     yard.run(body)
 
 
-def test_near_home_going_home_is_landing_and_a_setpoint_ends_it(apron: Make) -> None:
+def test_near_home_going_home_is_landing_and_no_setpoint_ends_it(apron: Make) -> None:
     yard = apron()
 
     def body() -> None:
         yard.fly()
-        yard.keep_sending(3.0, "ENUvelocity_yawrate", 0.0, 0.0, 2.0, 0.0)
+        yard.keep_sending(6.0, "ENUvelocity_yawrate", 3.0, 0.0, 1.0, 0.0)
+        assert 10.0 < yard.place[0] < 20.0
         assert yard.task(GO_HOME)
         assert yard.mode == 12
-        yard.keep_sending(0.5, "ENUvelocity_yawrate", 0.0, 0.0, 0.0, 0.0)
-        assert yard.mode == 17
+        yard.keep_sending(2.0, "ENUvelocity_yawrate", 0.0, 0.0, 2.0, 0.0)
+        assert yard.mode == 12
+        yard.until(lambda: yard.status == 0)
+        assert yard.place[0] > 10.0  # it is not at home
 
     yard.run(body)
 
@@ -331,9 +340,11 @@ def test_a_low_battery_sends_it_home_and_a_setpoint_does_not_stop_it(apron: Make
 
     def body() -> None:
         yard.fly()
-        yard.keep_sending(6.0, "ENUvelocity_yawrate", 4.0, 0.0, 0.0, 0.0)
+        yard.keep_sending(8.0, "ENUvelocity_yawrate", 4.0, 0.0, 0.0, 0.0)
         yard.flight.drain_battery(0.25)
-        yard.until(lambda: yard.mode == 15, within=3.0)
+        yard.wait(8.0)
+        assert yard.mode == 6  # it has told, and waits
+        yard.until(lambda: yard.mode == 15, within=5.0)
         yard.keep_sending(0.5, "ENUvelocity_yawrate", 4.0, 0.0, 0.0, 0.0)
         assert yard.mode == 15
         yard.flight.drain_battery(0.08)
@@ -400,9 +411,14 @@ def test_a_mission_is_flown_from_point_to_point_and_what_follows_it(apron: Make)
         task = _mission("dji_sdk", (0.0, 12.0, 6.0), (15.0, 12.0, 6.0), finish=2)
         yard.wait(0.5)
         yard.activate()
+        assert yard.call("mission_waypoint_upload", "MissionWpUpload", waypoint_task=task).ack_data == 0xD1
+        assert yard.authority()
+        start = yard.kernel.now()
         assert yard.call("mission_waypoint_upload", "MissionWpUpload", waypoint_task=task).result
+        assert yard.kernel.now() - start >= 3 * S  # a second, and one for each point
         assert yard.call("mission_status", "MissionStatus").waypoint_mission_count == 1
-        assert not yard.call("mission_waypoint_action", "MissionWpAction", action=0).result  # on the ground
+        grounded = yard.call("mission_waypoint_action", "MissionWpAction", action=0)
+        assert (grounded.result, grounded.ack_data) == (False, 0xDA)
         yard.fly()
         assert yard.call("mission_waypoint_action", "MissionWpAction", action=0).result
         yard.wait(2.0)
@@ -440,11 +456,13 @@ def test_missions_that_make_no_sense_are_refused(
 
     def body() -> None:
         yard.wait(0.5)
+        yard.activate()
+        assert yard.authority()
         task = _mission("dji_sdk", *[(float(number), 0.0, 5.0) for number in range(places)])
         for name, value in changes.items():
             setattr(task, name, value)
         response = yard.call("mission_waypoint_upload", "MissionWpUpload", waypoint_task=task)
-        assert (response.result, response.ack_data) == (False, 1)
+        assert (response.result, response.ack_data) == (False, 255)
 
     yard.run(body)
     assert any(why in text for text in yard.texts())
@@ -468,8 +486,10 @@ def test_the_vehicle_node_of_4_1_has_its_services_beside_its_topics(apron: Make)
             "/obtain_release_control_authority", "ObtainControlAuthority", enable_obtain=True
         ).result
         assert task(TAKE_OFF)
-        yard.until(lambda: yard.mode == 6 and yard.status == 2)
-        assert not task(8)  # the motors are not stopped in the air
+        assert (yard.mode, yard.status) == (6, 2)  # it answers when it is finished
+        with pytest.raises(ServiceError, match="its handler failed") as failed:
+            task(8)  # the motors are not stopped in the air
+        assert failed.value.by_server
         yard.call("/set_joystick_mode", "SetJoystickMode", horizontal_mode=1, yaw_mode=1, stable_mode=1)
         steer(x=3.0, y=0.0, z=1.0, yaw=0.0)  # x is north here
         assert yard.place[1] > 3.0
@@ -478,13 +498,192 @@ def test_the_vehicle_node_of_4_1_has_its_services_beside_its_topics(apron: Make)
         assert yard.mode == 6
         assert yard.call("/set_go_home_altitude", "SetGoHomeAltitude", altitude=25).result
         assert not yard.call("/set_go_home_altitude", "SetGoHomeAltitude", altitude=5).result
-        assert task(LAND)
-        assert task(14)  # out of the landing
-        assert yard.mode == 6
         assert yard.call("/kill_switch", "KillSwitch", enable=True).result
         assert yard.status == 0
 
     yard.run(body)
+
+
+def test_during_a_landing_the_node_of_4_1_answers_nothing_else(apron: Make) -> None:
+    yard = apron("dji_osdk_ros")
+    done: list[str] = []
+
+    def ask(name: str, kind: str, **fields: Any) -> None:
+        def body() -> None:
+            with suppress(ServiceError):
+                yard.call(name, kind, **fields)
+            done.append(name)
+
+        yard.kernel.spawn(body, name, ExecutionContext("program"))
+
+    def body() -> None:
+        yard.wait(0.5)
+        assert yard.call("/flight_task_control", "FlightTaskControl", task=TAKE_OFF).result
+        ask("/flight_task_control", "FlightTaskControl", task=LAND)
+        yard.wait(0.1)
+        assert yard.mode == 12
+        ask("/kill_switch", "KillSwitch", enable=True)
+        yard.wait(0.5)
+        assert (done, yard.status) == ([], 2)
+        yard.until(lambda: len(done) == 2)
+        assert done == ["/flight_task_control", "/kill_switch"]
+        assert yard.status == 0
+
+    yard.run(body)
+
+
+def test_motors_are_not_stopped_in_the_air_nor_is_task_4_flown_with_running_ones(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.wait(0.5)
+        yard.activate()
+        assert yard.authority()
+        assert yard.motors(True)
+        refused = yard.call("drone_task_control", "DroneTaskControl", task=TAKE_OFF)
+        assert (refused.result, refused.ack_data) == (False, 1)  # MOTORS_ON
+        assert yard.motors(False)
+        assert yard.task(TAKE_OFF)
+        yard.until(lambda: yard.mode == 6 and yard.status == 2)
+        refused = yard.call("drone_arm_control", "DroneArmControl", arm=0)
+        assert (refused.result, refused.ack_data) == (False, 3)  # IN_AIR
+        assert yard.status == 2
+
+    yard.run(body)
+
+
+def test_an_m100_accepts_task_4_with_running_motors_and_stays(apron: Make) -> None:
+    yard = apron(parameters={"AIRCRAFT": 2})
+
+    def body() -> None:
+        yard.wait(0.5)
+        yard.activate()
+        assert yard.authority()
+        assert yard.motors(True)
+        accepted = yard.call("drone_task_control", "DroneTaskControl", task=TAKE_OFF)
+        assert (accepted.result, accepted.ack_data) == (True, 2)
+        yard.wait(5.0)
+        assert yard.place[2] < 0.2
+
+    yard.run(body)
+
+
+@pytest.mark.parametrize(
+    ("aircraft", "grants", "axis"), [(0, "P", 1.0), (2, "F", 8000.0), (3, "PAF", None), (4, "PF", None)]
+)
+def test_the_switch_grants_the_authority_by_aircraft(
+    apron: Make, aircraft: int, grants: str, axis: float | None
+) -> None:
+    yard = apron(parameters={"AIRCRAFT": aircraft})
+
+    def body() -> None:
+        yard.hear("rc")
+        yard.wait(0.5)
+        yard.activate()
+        assert axis is None or yard.seen["rc"].axes[4] == pytest.approx(axis)
+        for position, pulse in (("P", 1000), ("A", 1500), ("F", 2000)):
+            yard.autopilot.vehicle.rc.transmitter[4] = pulse
+            yard.wait(0.3)
+            assert yard.authority() == (position in grants)
+
+    yard.run(body)
+
+
+def test_its_altitude_is_by_pressure_and_its_height_another_quantity(apron: Make) -> None:
+    for aircraft, shown in ((0, 0.0), (4, 7.0)):
+        yard = apron(parameters={"PRESSURE_OFFSET": -60.0, "AIRCRAFT": aircraft})
+
+        def body(yard: Any = yard, shown: float = shown) -> None:
+            yard.hear("gps_position", "height_above_takeoff")
+            yard.fly()
+            yard.keep_sending(6.0, "ENUvelocity_yawrate", 0.0, 0.0, 2.0, 0.0)
+            assert yard.place[2] > 9.0
+            assert yard.seen["gps_position"].altitude == pytest.approx(840.0 + yard.place[2], abs=1.5)
+            assert yard.seen["height_above_takeoff"].data == pytest.approx(shown, abs=0.3)
+
+        yard.run(body)
+
+
+def test_without_satellites_the_place_freezes_and_messages_go_on(apron: Make) -> None:
+    yard = apron()
+
+    def body() -> None:
+        yard.hear("gps_position", "gps_health")
+        yard.fly()
+        yard.keep_sending(3.0, "ENUvelocity_yawrate", 3.0, 0.0, 0.0, 0.0)
+        yard.flight.block_gps()
+        yard.wait(1.0)
+        before, count = yard.seen["gps_position"], yard.counts["gps_position"]
+        yard.keep_sending(2.0, "ENUvelocity_yawrate", 0.0, 0.0, 1.0, 0.0)
+        after = yard.seen["gps_position"]
+        assert yard.counts["gps_position"] - count == 100
+        assert (after.latitude, after.longitude) == (before.latitude, before.longitude)
+        assert (after.status.status, yard.seen["gps_health"].data) == (0, 0)
+        assert after.altitude > before.altitude + 1.0
+
+    yard.run(body)
+
+
+@pytest.mark.parametrize(("action", "mode"), [(0, 12), (1, 17)])
+def test_a_lost_transmitter_sends_it_home_or_does_not(apron: Make, action: int, mode: int) -> None:
+    yard = apron(parameters={"RC_LOST_ACTION": action})
+
+    def body() -> None:
+        yard.hear("rc_connection_status")
+        yard.fly()
+        yard.autopilot.vehicle.set_parameter("RC_CONNECTED", 0.0)
+        yard.keep_sending(2.5, "ENUvelocity_yawrate", 1.0, 0.0, 0.0, 0.0)
+        assert (yard.mode, yard.seen["rc_connection_status"].data) == (17, 0)
+        yard.keep_sending(1.0, "ENUvelocity_yawrate", 1.0, 0.0, 0.0, 0.0)
+        assert yard.mode == mode
+
+    yard.run(body)
+
+
+def test_a_landing_may_wait_low_for_a_confirmation(apron: Make) -> None:
+    yard = apron(parameters={"LAND_WAITS": 1})
+
+    def body() -> None:
+        yard.fly()
+        assert yard.task(LAND)
+        yard.wait(15.0)
+        assert (yard.mode, yard.status) == (12, 2)
+        assert 0.3 < yard.place[2] < 0.9
+        yard.autopilot.vehicle.firmware_state.confirm_landing()
+        yard.until(lambda: yard.status == 0)
+
+    yard.run(body)
+
+
+def test_a_position_has_a_law_of_speed(apron: Make) -> None:
+    """Half the offset for each second, 3 m/s at most: as seen of an M600."""
+    yard = apron()
+
+    def speed(offset: float) -> float:
+        yard.keep_sending(4.0, "ENUposition_yaw", offset, 0.0, 1.2, 0.0)
+        return hypot(*yard.flight.truth().velocity[:2])
+
+    def body() -> None:
+        yard.fly()
+        assert speed(2.0) == pytest.approx(1.0, abs=0.2)
+        assert speed(4.0) == pytest.approx(2.0, abs=0.2)
+        assert speed(20.0) == pytest.approx(3.0, abs=0.2)
+
+    yard.run(body)
+
+
+def test_the_imu_has_the_rate_of_the_aircraft(apron: Make) -> None:
+    for aircraft, rate in ((0, 400), (2, 100)):
+        yard = apron(parameters={"AIRCRAFT": aircraft})
+
+        def body(yard: Any = yard, rate: int = rate) -> None:
+            yard.hear("imu")
+            yard.wait(1.0)
+            before = yard.counts["imu"]
+            yard.wait(1.0)
+            assert yard.counts["imu"] - before == pytest.approx(rate, abs=1)
+
+        yard.run(body)
 
 
 def test_where_it_may_join_a_graph(apron: Make) -> None:

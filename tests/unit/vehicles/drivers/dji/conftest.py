@@ -28,9 +28,11 @@ class FakeNode:
         self.kernel = graph.kernel
         self.node = node = graph.node("dji_sdk", context=ExecutionContext("aircraft"))
         self.hardware = hardware
-        self.status, self.mode, self.health, self.switch = (1 if hardware == "M100" else 0), 6, 5, 8000.0
+        self.status, self.mode, self.health, self.switch = (1 if hardware == "M100" else 0), 6, 5, 1.0
         self.north = self.east = self.up = 0.0
         self.speed = 0.0
+        self.range, self.offset = 0.0, 0.0
+        self.codes: dict[str, int] = {}
         self.mute = False
         self.lost = False
         self.refuse: set[str] = set()
@@ -48,6 +50,7 @@ class FakeNode:
                 "velocity": "geometry_msgs/Vector3Stamped",
                 "attitude": "geometry_msgs/QuaternionStamped",
                 "rc": "sensor_msgs/Joy",
+                "rc_connection_status": "std_msgs/UInt8",
                 "flight_anomaly": "dji_sdk/FlightAnomaly",
                 "battery_state": "sensor_msgs/BatteryState",
             }.items()
@@ -84,7 +87,7 @@ class FakeNode:
         if self.hardware != "M100":
             self.say("display_mode", data=self.mode)
         self.say("gps_health", data=self.health)
-        self.say("height_above_takeoff", data=self.up)
+        self.say("height_above_takeoff", data=self.range)
         self.say("velocity", vector={"x": self.speed})
         self.say("attitude", quaternion={"w": 1.0})
         self.say("rc", axes=[0.0, 0.0, 0.0, 0.0, self.switch, 0.0])
@@ -94,7 +97,7 @@ class FakeNode:
                 "gps_position",
                 latitude=HOME[0] + self.north / METRES,
                 longitude=HOME[1] + self.east / METRES,
-                altitude=HOME[2] + self.up,
+                altitude=HOME[2] + self.offset + self.up,
             )
 
     # -- obeying
@@ -118,7 +121,10 @@ class FakeNode:
                 self.on_task(request.task)
             if good and name == "drone_arm_control":
                 self.status = request.arm
-            return message_class(f"dji_sdk/srv/{kind}_Response")(result=good)
+            response = message_class(f"dji_sdk/srv/{kind}_Response")(result=good)
+            if not good and name in self.codes:
+                response.ack_data = self.codes[name]
+            return response
 
         return answer
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from math import pi
 from typing import Any
 
@@ -18,11 +19,12 @@ from volery.base.errors import (
     Overridden,
     Refused,
     UsageError,
+    VehicleError,
 )
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MS, S
 from volery.kernel.task import ExecutionContext
-from volery.vehicles import Drone
+from volery.vehicles import Drone, Fence, Waypoint
 from volery.vehicles.driver import Capability
 from volery.vehicles.drivers.dji import DRIVER, open_driver
 from volery.vehicles.telemetry import StatusText
@@ -84,7 +86,11 @@ def test_a_missing_node_is_reported_with_its_topic(bench: Make) -> None:
 
 @pytest.mark.parametrize(
     ("options", "wrong"),
-    [({"names": "dji"}, "dji_osdk_ros or dji_sdk"), ({"rate": "10"}, "no option 'rate'")],
+    [
+        ({"home_altitude": "high"}, "no altitude"),
+        ({"names": "dji"}, "dji_osdk_ros or dji_sdk"),
+        ({"rate": "10"}, "no option 'rate'"),
+    ],
 )
 def test_options_that_make_no_sense(bench: Make, options: dict[str, str], wrong: str) -> None:
     made = bench()
@@ -136,7 +142,7 @@ def test_a_bad_gps_is_waited_for_and_named(bench: Make) -> None:
     ("service", "words"),
     [
         ("activation", "refused to activate .*app_id"),
-        ("sdk_control_authority", "give the program the authority .*mode switch must be at F"),
+        ("sdk_control_authority", "give the program the authority .*mode switch must be at P"),
         ("drone_task_control", "refused to take off"),
     ],
 )
@@ -173,17 +179,79 @@ def test_setpoints_are_remaining_offsets_fifty_times_a_second(bench: Make) -> No
 
 
 def test_an_altitude_above_the_sea_is_flown_above_the_point_of_takeoff(bench: Make) -> None:
-    made = bench()
+    """It reports an altitude that is 60 m too low: only its difference to home's, which is stated, counts."""
+    made = bench(home_altitude="900")
+    made.node.offset = -60.0
 
     def body() -> None:
-        made.drone.arm()
+        made.drone.wait_ready()
         made.node.obey(4)
         made.wait(0.1)
         made.later(1.0, lambda: made.node.be_at(5.0, 0.0, 12.0))
         made.drone.goto(Position(HOME[0] + 5.0 / METRES, HOME[1], AMSL(912.0)))
+        assert made.drone.position.altitude == AMSL(912.0)
         assert made.node.setpoints[10][2][2] == pytest.approx(12.0, abs=0.05)
         with pytest.raises(OutOfBounds, match="0 to 120 m"):
             made.drone.goto(at(5.0, 0.0, -1.0))
+
+    made.run(body)
+
+
+def test_an_altitude_above_the_sea_is_refused_where_homes_is_not_stated(bench: Make) -> None:
+    made = bench()
+    made.node.offset = -60.0
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        goal = Position(HOME[0], HOME[1], AMSL(915.0))
+        with pytest.raises(Refused, match="home_altitude=900 among the options"):
+            made.drone.goto(goal)
+        with pytest.raises(Refused, match="by pressure"):
+            made.drone.upload_mission([Waypoint(goal), Waypoint(goal)])
+        made.drone.fence = Fence(ceiling=AMSL(950.0))
+        with pytest.raises(UsageError, match="the fence states altitudes AMSL"):
+            made.drone.goto(at(5.0, 0.0, 12.0))
+        assert made.node.setpoints == []
+        assert made.drone.altitude.metres == pytest.approx(1.2)
+
+    made.run(body)
+
+
+def test_the_height_is_a_difference_of_altitudes_whatever_the_downward_range_shows(bench: Make) -> None:
+    made = bench()
+    made.node.range, made.node.offset = 0.0, -137.0
+    follows(made)
+
+    def body() -> None:
+        made.drone.takeoff(10.0)
+        assert made.drone.altitude.metres == pytest.approx(10.0)
+        made.node.range = 5.0  # latched
+        made.drone.goto(at(20.0, 0.0, 12.0))
+        assert made.drone.altitude.metres == pytest.approx(12.0)
+
+    made.run(body)
+
+
+def test_a_frozen_place_counts_for_nothing(bench: Make) -> None:
+    """Latitude and longitude stay, messages go on and say fix: no offset, and no arrival at a goal there."""
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.later(0.5, lambda: setattr(made.node, "health", 0))
+        made.later(1.0, made.node.setpoints.clear)
+        began = made.kernel.now()
+        with pytest.raises(VehicleError, match="no position"):
+            made.drone.goto(at(60.0, 0.0, 1.2))
+        assert made.node.setpoints == []
+        assert made.kernel.now() - began < 15 * S
+        with pytest.raises(VehicleError):
+            made.drone.goto(at(0.0, 0.0, 1.2))  # where it seems to stand
+        assert made.node.setpoints == []
 
     made.run(body)
 
@@ -312,6 +380,90 @@ def test_a_task_is_asked_for_once_no_setpoint_is_on_its_way(bench: Make) -> None
     made.run(body)
 
 
+@pytest.mark.parametrize("hardware", ["A3", "M100"])
+def test_a_landing_and_a_way_home_cannot_be_left_with_3_8(bench: Make, hardware: str) -> None:
+    """Set-points do not end them, and the node has no request that does: nothing is said to be held."""
+    made = bench(hardware)
+    flies, lands = (3, 4) if hardware == "M100" else (2, 2)
+
+    def task(number: int) -> None:
+        made.node.status, made.node.mode, made.node.up = (flies, 6, 1.2) if number == 4 else (lands, 12, 1.0)
+
+    made.node.on_task = task
+
+    def body() -> None:
+        made.drone.wait_ready()
+        task(4)
+        made.wait(0.1)
+
+        def land() -> None:
+            with suppress(VehicleError):
+                made.drone.land()
+
+        made.kernel.spawn(land, "lands", ExecutionContext("commander"))
+        made.wait(1.0)
+        assert made.drone.mode == "AUTO_LANDING"
+        made.node.setpoints.clear()
+        with pytest.raises(Refused, match="only the pilot can"):
+            made.drone.hold()
+        with pytest.raises(Refused, match="only the pilot can"):
+            made.drone.set_velocity(1.0)
+        assert made.node.setpoints == []
+
+    made.run(body)
+
+
+def test_running_motors_are_stopped_before_the_task_that_takes_off(bench: Make) -> None:
+    """Task 4 works only while they stand."""
+    made = bench()
+    follows(made)
+
+    def body() -> None:
+        made.drone.arm()
+        made.drone.takeoff(5.0)
+        asked = [(name, getattr(request, "arm", None)) for name, request in made.node.asked]
+        first = asked.index(("drone_task_control", None))
+        assert asked[:first][-1] != ("drone_arm_control", 1)
+        assert ("drone_arm_control", 0) in asked[:first]
+
+    made.run(body)
+
+
+@pytest.mark.parametrize(
+    ("service", "code", "words"),
+    [
+        ("drone_task_control", 1, "refused with 1, motors on"),
+        ("drone_task_control", 6, "refused with 6, bad gps"),
+        ("sdk_control_authority", 5, "refused with 5, needs p"),
+    ],
+)
+def test_a_code_is_named(bench: Make, service: str, code: int, words: str) -> None:
+    made = bench()
+    made.node.refuse.add(service)
+    made.node.codes[service] = code
+
+    def body() -> None:
+        with pytest.raises(Refused, match=words):
+            made.drone.takeoff(5.0)
+
+    made.run(body)
+
+
+def test_the_loss_of_the_transmitter_is_told(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_connected()
+        made.node.say("rc_connection_status", data=0)
+        made.wait(0.1)
+        assert "the transmitter is lost" in made.drone.texts[-1].text
+        made.node.say("rc_connection_status", data=1)
+        made.wait(0.1)
+        assert "received again" in made.drone.texts[-1].text
+
+    made.run(body)
+
+
 def test_in_the_air_the_motors_are_stopped_by_force_only(bench: Make) -> None:
     made = bench()
 
@@ -338,7 +490,7 @@ def test_the_pilot_who_moves_the_mode_switch_has_it_until_he_moves_it_back(bench
         made.drone.wait_ready()
         made.node.obey(4)
         made.wait(0.1)
-        made.later(1.0, lambda: setattr(made.node, "switch", -8000.0))
+        made.later(1.0, lambda: setattr(made.node, "switch", -1.0))
         made.later(1.0, lambda: setattr(made.node, "mode", 6))
         with pytest.raises(Overridden, match="P_GPS by RC"):
             made.drone.goto(at(20.0, 0.0, 5.0))
@@ -347,7 +499,7 @@ def test_the_pilot_who_moves_the_mode_switch_has_it_until_he_moves_it_back(bench
             made.drone.hold()
         assert made.node.setpoints == []
         assert "the authority is lost" in made.drone.texts[-1].text
-        made.node.switch = 8000.0
+        made.node.switch = 1.0
         made.wait(0.1)
         asked = made.node.names().count("sdk_control_authority")
         made.drone.hold()
@@ -461,7 +613,7 @@ def test_an_m100_is_read_by_its_own_numbers(bench: Make) -> None:
         {"latitude": 91.0, "longitude": 0.0, "altitude": 0.0},
         {"latitude": 46.0, "longitude": -103.0, "altitude": float("inf")},
         {"latitude": 0.0, "longitude": 0.0, "altitude": 0.0},
-        {"latitude": 46.5, "longitude": -103.0, "altitude": 0.0, "status": {"status": -1}},
+        {"latitude": 0.0, "longitude": 0.0, "altitude": 82.0},
     ],
 )
 def test_a_place_off_the_globe_is_not_believed(bench: Make, spoiled: dict[str, Any]) -> None:

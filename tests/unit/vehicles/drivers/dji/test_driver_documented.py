@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from volery.ros.messages.dji_constants import Source
 from volery.simulation.autopilots.dji import firmware as simulated
 from volery.simulation.autopilots.dji.parameters import SUPPORTED, parameters
 from volery.vehicles.drivers.dji import driver
@@ -31,6 +32,20 @@ def table(heading: str, head: str) -> list[str]:
 def test_every_assumption_is_in_a_table(heading: str, assumed: Mapping[str, str]) -> None:
     expected = [f"| {what} | {text} |" for what, text in assumed.items()]
     assert table(heading, "| what | assumption |") == expected
+
+
+@pytest.mark.parametrize(
+    ("heading", "documented"),
+    [
+        ("## What is taken for granted", driver.DOCUMENTED),
+        ("## The simulated DJI", simulated.DOCUMENTED),
+    ],
+)
+def test_every_documented_behaviour_is_in_a_table_with_its_source(
+    heading: str, documented: Mapping[str, Source]
+) -> None:
+    expected = [f"| {subject} | {one.what} | {one.whom} |" for subject, one in documented.items()]
+    assert table(heading, "| what | documented | by whom |") == expected
 
 
 def test_every_figure_is_in_the_table() -> None:
