@@ -173,7 +173,7 @@ def test_modes_show_the_recorded_bits(kind: str, bench: Any, facts: Any) -> None
     assert recorded <= seen
 
 
-OTHER_MODES = {"copter": (1, 7, 11, 13, 15, 16, 18, 20, 21, 22, 25), "rover": (1, 3, 5, 12)}
+OTHER_MODES = {"copter": (8, 10, 12, 13, 26, 27), "rover": (2, 6, 8, 9)}
 
 
 @pytest.mark.parametrize(
@@ -202,3 +202,24 @@ def test_several_vehicles_have_their_own_system_ids(bench: Any) -> None:
     assert rig.command(400, 1, 21196, target_system=1) is SILENCE
     assert rig.command(400, 1, 21196, target_system=5) == ACCEPTED
     assert rig.vehicle.parameters["SYSID_THISMAV"] == 5
+
+
+@pytest.mark.parametrize(
+    ("mode", "name", "before"),
+    [
+        (14, "FLIP", None),
+        (15, "AUTOTUNE", None),
+        (18, "THROW", None),
+        (22, "FLOWHOLD", None),
+        (23, "FOLLOW", "Set FOLL_ENABLE = 1"),
+        (25, "SYSTEMID", "No axis selected, SID_AXIS = 0"),
+        (28, "TURTLE", None),
+    ],
+)
+def test_modes_that_need_more_are_refused_by_name(
+    mode: int, name: str, before: str | None, bench: Any
+) -> None:
+    rig = bench()
+    rig.run(0.5)
+    assert rig.mode(mode) == FAILED
+    assert rig.texts() == [*([before] if before else []), f"Mode change to {name} failed: init failed"]

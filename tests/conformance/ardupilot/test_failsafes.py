@@ -8,7 +8,7 @@ import pytest
 
 from volery.base.time import S
 
-RTL, LAND, BRAKE, GUIDED = 6, 9, 17, 4
+RTL, LAND, BRAKE, GUIDED, SMART_RTL = 6, 9, 17, 4, 21
 
 
 def set_parameter(rig: Any, name: str, value: float) -> None:
@@ -53,7 +53,7 @@ def test_without_the_parameter_it_hovers_on(bench: Any) -> None:
     assert rig.texts() == []
 
 
-@pytest.mark.parametrize(("value", "mode"), [(1, RTL), (3, RTL), (4, LAND), (5, LAND), (7, BRAKE)])
+@pytest.mark.parametrize(("value", "mode"), [(1, RTL), (3, SMART_RTL), (4, SMART_RTL), (5, LAND), (7, BRAKE)])
 def test_the_parameter_chooses_what_happens(value: int, mode: int, bench: Any) -> None:
     rig = bench(parameters={"FS_GCS_ENABLE": value})
     airborne_without_a_station(rig)
@@ -103,7 +103,7 @@ def test_without_the_transmitter_it_does_not_arm(bench: Any) -> None:
     assert "Arm: Throttle below failsafe" in rig.texts()
 
 
-@pytest.mark.parametrize(("action", "mode"), [(0, GUIDED), (1, LAND), (2, RTL), (3, RTL)])
+@pytest.mark.parametrize(("action", "mode"), [(0, GUIDED), (1, LAND), (2, RTL), (3, SMART_RTL)])
 def test_a_low_battery_says_so_and_acts_as_asked(action: int, mode: int, bench: Any) -> None:
     rig = bench(parameters={"BATT_FS_LOW_ACT": action})
     rig.airborne()

@@ -155,6 +155,8 @@ def test_supported_parameters_exist_and_are_read_and_no_others_are() -> None:
     read |= {
         f"RC{channel}_{part}" for channel in range(1, 17) for part in ("MIN", "TRIM", "MAX", "DZ", "REVERSED")
     }
+    read |= {f"RC{channel}_OPTION" for channel in range(5, 17)} | {"FLTMODE_CH", "MODE_CH"}
+    read |= {f"{modes}{position}" for modes in ("FLTMODE", "MODE") for position in range(1, 7)}
     stated = set(FIRMWARE.kinds["multirotor"].rules.parameters.supported) | set(
         FIRMWARE.kinds["rover"].rules.parameters.supported
     )

@@ -56,6 +56,8 @@ class GroundState:
     """Since when an armed vehicle has stood on the ground without a request to take off."""
     flight_time: Ns = 0
     """Time in flight since boot, where the firmware counts it."""
+    track: list[Vector] = field(default_factory=list)
+    """Points passed since arming, north, east, down about the estimator's origin [m], where they are kept."""
     lifted: bool = False
     """Whether the landed detector has reported flight since the motors came up."""
     takeoff_requested_at: Ns = NEVER
@@ -64,6 +66,7 @@ class GroundState:
     def arm(self, now: Ns) -> None:
         """Start to wait for a request to take off."""
         self.idle_since = now
+        self.track.clear()
         self.takeoff_requested_at = NEVER
 
     def leave(self, now: Ns) -> None:
@@ -90,6 +93,23 @@ class GroundState:
             self.landed = True
             self.landed_at = self.idle_since = now
             self.takeoff_requested_at = NEVER
+
+
+@dataclass
+class SwitchState:
+    """Switches of the transmitter, as the firmware has read them. Times in ns."""
+
+    mode: int = 0
+    """Position of the mode switch, from 1; 0: not read yet."""
+    read: int = 0
+    """Position that it may have moved to."""
+    read_since: Ns = NEVER
+    rudder_since: Ns = NEVER
+    """Since when the yaw stick has been at the same end with the throttle closed."""
+    rudder: int = 0
+    """That end: 1 right, -1 left."""
+    options: dict[int, bool] = field(default_factory=dict)
+    """Whether the switch of a channel is up, by channel."""
 
 
 @dataclass

@@ -30,6 +30,7 @@ from volery.simulation.autopilots.state_groups import (
     Home,
     OutputState,
     ReportState,
+    SwitchState,
 )
 
 
@@ -246,6 +247,7 @@ class Vehicle:
         self.ground = GroundState()
         self.commanded = CommandedLimits()
         self.outputs = OutputState()
+        self.switches = SwitchState()
         self.failsafes = FailsafeState()
         self.reports = ReportState(arming_checks_at=self.uptime(), counters_at=self.uptime())
         self.home: Home | None = None

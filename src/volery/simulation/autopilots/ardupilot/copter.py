@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache, partial
 
 from volery.base.time import MS, S, from_seconds, to_seconds
-from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, switches, telemetry
 from volery.simulation.autopilots.ardupilot.failsafes import COPTER_FAILSAFES
 from volery.simulation.autopilots.ardupilot.fence import outside_fence
 from volery.simulation.autopilots.ardupilot.firmware import (
@@ -43,7 +43,7 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
 )
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.firmware import BootSequence, Firmware, PeriodicWork
-from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
+from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, GuidedAttitude
 from volery.simulation.autopilots.manoeuvres.manual_flight import (
     AltitudeHold,
     Loiter,
@@ -51,6 +51,12 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import (
     Stabilize,
 )
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
+from volery.simulation.autopilots.manoeuvres.pilot_modes import (
+    Acro,
+    CircleMode,
+    Drift,
+    ReturnAlongTrack,
+)
 from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import LinkStart
@@ -83,6 +89,9 @@ EACH_SECOND = round(0.285 * S)
 ARMING_TEXTS = ("Arming motors", COPTER_DISARMED)
 LANDED_TO_DISARM = 200 * MS
 """Recorded: disarming 2.07 s after touch-down, most of it in the landed detector."""
+RUDDER_HOLD = 2 * S
+OPTION_MODES = {4: 6, 16: 3, 18: 9, 33: 17, 42: 21, 52: 1, 55: 4, 56: 5, 68: 0, 69: 16, 70: 2, 72: 7, 73: 11}
+"""RCn_OPTION to the number of the mode that its switch enters."""
 ALIGNS_ABOVE = 2.5
 """Height of the in-flight yaw alignment [m]."""
 
@@ -123,6 +132,14 @@ MODES = {
         ),
         Mode(6, "RTL", AUTO_BITS, Return, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
         Mode(9, "LAND", MANUAL_BITS, Land, LEVEL_AND_HEIGHT, armable=False),
+        Mode(1, "ACRO", MANUAL_BITS, Acro, pilot=True, manual_throttle=True),
+        Mode(7, "CIRCLE", AUTO_BITS, CircleMode, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
+        Mode(11, "DRIFT", MANUAL_BITS, Drift, needs_position=True, pilot=True, manual_throttle=True),
+        Mode(16, "POSHOLD", AUTO_BITS, Loiter, LEVEL_AND_HEIGHT, True, pilot=True, user_takeoff=True),
+        Mode(19, "AVOID_ADSB", AUTO_BITS, Guided, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
+        Mode(20, "GUIDED_NOGPS", MANUAL_BITS, GuidedAttitude, Z_CONTROL, starts_high=True),
+        Mode(21, "SMART_RTL", AUTO_BITS, ReturnAlongTrack, LEVEL_AND_HEIGHT, True, armable=False),
+        Mode(24, "ZIGZAG", AUTO_BITS, Loiter, LEVEL_AND_HEIGHT, needs_position=True, pilot=True),
         Mode(17, "BRAKE", AUTO_BITS, Brake, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
     )
 }
@@ -188,6 +205,10 @@ def on_step(vehicle: Vehicle) -> None:
     """Expire overrides, and disarm automatically after a landing or without a take-off."""
     pilot_input.on_step(vehicle)
     boot.find_home(vehicle)
+    switches.read_mode_switch(vehicle, "FLTMODE_CH", "FLTMODE")
+    switches.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
+    switches.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
+    switches.keep_track(vehicle)
     commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))
     if not vehicle.armed:
         return
@@ -214,7 +235,9 @@ def _notice_flight(vehicle: Vehicle) -> None:
 
 def _disarm_automatically(vehicle: Vehicle) -> None:
     now = vehicle.kernel.now()
-    finished = vehicle.mode.name == "LAND" or (vehicle.mode.name == "RTL" and vehicle.manoeuvre.landing)
+    finished = vehicle.mode.name == "LAND" or (
+        vehicle.mode.name in ("RTL", "SMART_RTL") and vehicle.manoeuvre.landing
+    )
     if finished and now - vehicle.ground.landed_at >= LANDED_TO_DISARM:
         disarm(vehicle, COPTER_DISARMED, force=True)
         return

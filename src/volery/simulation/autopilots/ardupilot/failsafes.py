@@ -96,19 +96,25 @@ def _enter_first(vehicle: Vehicle, modes: tuple[int, ...]) -> None:
 
 # -- copter
 
-RTL, LAND, BRAKE, ALT_HOLD = 6, 9, 17, 2
+RTL, LAND, BRAKE, ALT_HOLD, SMART_RTL = 6, 9, 17, 2, 21
 STATION_ACTIONS = {
     1: (RTL, LAND),
-    3: (RTL, LAND),
-    4: (LAND,),
+    3: (SMART_RTL, RTL, LAND),
+    4: (SMART_RTL, LAND),
     5: (LAND,),
     6: (RTL, LAND),
     7: (BRAKE, LAND),
 }
-"""FS_GCS_ENABLE to the modes that are tried in order. SmartRTL is represented by its fallback."""
-RADIO_ACTIONS = {1: (RTL, LAND), 2: (RTL, LAND), 3: (LAND,), 4: (RTL, LAND), 5: (LAND,)}
+"""FS_GCS_ENABLE to the modes that are tried in order."""
+RADIO_ACTIONS = {1: (RTL, LAND), 2: (RTL, LAND), 3: (LAND,), 4: (SMART_RTL, RTL, LAND), 5: (SMART_RTL, LAND)}
 """The same for FS_THR_ENABLE."""
-BATTERY_ACTIONS = {1: (LAND,), 2: (RTL, LAND), 3: (RTL, LAND), 4: (LAND,), 7: (BRAKE, LAND)}
+BATTERY_ACTIONS = {
+    1: (LAND,),
+    2: (RTL, LAND),
+    3: (SMART_RTL, RTL, LAND),
+    4: (SMART_RTL, LAND),
+    7: (BRAKE, LAND),
+}
 """The same for BATT_FS_LOW_ACT and BATT_FS_CRT_ACT."""
 FENCE_ACTIONS = {1: (RTL, LAND), 2: (LAND,), 3: (RTL, LAND), 4: (BRAKE, LAND), 5: (RTL, LAND)}
 """The same for FENCE_ACTION."""

@@ -146,6 +146,17 @@ def update_prearm_state(vehicle: Vehicle, problems: Callable[[Vehicle], list[str
 
 CUSTOM_MODE_ENABLED = 1
 
+WITHOUT_EFFECT = {
+    14: ("FLIP", ""),
+    15: ("AUTOTUNE", ""),
+    18: ("THROW", ""),
+    22: ("FLOWHOLD", ""),
+    23: ("FOLLOW", "Set FOLL_ENABLE = 1"),
+    25: ("SYSTEMID", "No axis selected, SID_AXIS = 0"),
+    28: ("TURTLE", ""),
+}
+"""Modes of a copter that always refuse: name, and the text before the refusal."""
+
 CUSTOM, GUIDED, STABILIZED, MANUAL = 1, 8, 16, 64
 """MAV_MODE_FLAG."""
 
@@ -160,6 +171,12 @@ def set_mode(vehicle: Vehicle, base_mode: int, number: int) -> int:
 def change_mode(vehicle: Vehicle, number: int) -> bool:
     """Enter a mode if that is possible; otherwise report the reason. Return whether the mode is flown."""
     mode = vehicle.rules.modes.get(number)
+    if mode is None and vehicle.flies and number in WITHOUT_EFFECT:
+        name, reason = WITHOUT_EFFECT[number]
+        if reason:
+            vehicle.send_text(WARNING, reason)
+        vehicle.send_text(WARNING, f"Mode change to {name} failed: init failed")
+        return False
     if mode is None:
         vehicle.send_text(WARNING, f"No such mode {number}")
         return False
@@ -181,6 +198,8 @@ def refusal(vehicle: Vehicle, mode: Mode) -> str:
     if mode.needs_position and not vehicle.has_position:
         return "requires position"
     if mode.name == "AUTO" and len(vehicle.mission) <= 1:
+        return "init failed"
+    if mode.name == "SMART_RTL" and not vehicle.ground.track:
         return "init failed"
     if vehicle.flies and vehicle.landed:
         return _refusal_on_ground(vehicle, mode)

@@ -34,6 +34,11 @@ _STICKS = {
 _SHARED = {
     **_STICKS,
     "ARMING_CHECK": "0 skips all checks; any other value runs all of them",
+    **{
+        f"RC{channel}_OPTION": "switch: a mode, 11 fence, 153 arming; others do nothing"
+        for channel in range(5, 17)
+    },
+    "ARMING_RUDDER": "0: the yaw stick does not arm; 1 arms, 2 disarms, too",
     "BATT_ARM_MAH": "charge required for arming",
     "BATT_ARM_VOLT": "voltage required for arming",
     "BATT_CAPACITY": "charge of the full battery; by default that of the simulated battery",
@@ -73,6 +78,8 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "DISARM_DELAY": "time on the ground after which an idle copter disarms",
         "FENCE_ALT_MAX": "ceiling of the fence above home",
         "FENCE_ALT_MIN": "floor of the fence above home",
+        **{f"FLTMODE{position}": "mode of that position of the mode switch" for position in range(1, 7)},
+        "FLTMODE_CH": "channel of the mode switch; 0: none",
         "FRAME_TYPE": "frame name in the text after a parameter list; no effect on the flight",
         "FS_EKF_ACTION": "action when the position is lost in flight",
         "FS_EKF_THRESH": "0 disables that action",
@@ -115,6 +122,8 @@ ROVER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "ATC_ACCEL_MAX": "acceleration; 0: 1 m/s^2",
         "CRUISE_SPEED": "speed where WP_SPEED is 0",
         "FS_ACTION": "action when ground station or radio is lost",
+        **{f"MODE{position}": "mode of that position of the mode switch" for position in range(1, 7)},
+        "MODE_CH": "channel of the mode switch; 0: none",
         "RTL_SPEED": "speed of the return; 0: WP_SPEED",
         "WP_RADIUS": "radius within which a waypoint is reached",
         "WP_SPEED": "speed",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache, partial
 
 from volery.base.time import MS, S
-from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, switches, telemetry
 from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES
 from volery.simulation.autopilots.ardupilot.fence import outside_fence
 from volery.simulation.autopilots.ardupilot.firmware import (
@@ -24,6 +24,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
     MANUAL,
     ROVER_DISARMED,
     SHARED_CHECKS,
+    STABILIZED,
     WARNING,
     Check,
     between_uptimes,
@@ -46,6 +47,7 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.firmware import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
+from volery.simulation.autopilots.manoeuvres.pilot_modes import HoldPlace, ReturnAlongTrack, Simple, Steering
 from volery.simulation.autopilots.manoeuvres.rover_driving import (
     GuidedRover,
     Manual,
@@ -81,6 +83,11 @@ POSITION = round(42.08 * S)
 ARMING_TEXTS = ("Throttle armed", ROVER_DISARMED)
 
 
+RUDDER_HOLD = 3 * S
+OPTION_MODES = {4: 11, 16: 10, 42: 12, 51: 0, 52: 1, 53: 3, 54: 4, 55: 15, 56: 5, 59: 7}
+"""RCn_OPTION to the number of the mode that its switch enters."""
+
+
 def guided_arrived(vehicle: Vehicle) -> None:
     """Report a reached guided target as the firmware does, as mission item 0."""
     vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": 0})
@@ -100,7 +107,12 @@ MODES = {
     mode.number: mode
     for mode in (
         Mode(0, "MANUAL", CUSTOM | MANUAL, Manual, pilot=True),
+        Mode(1, "ACRO", CUSTOM | STABILIZED, Steering, STEERED, needs_position=True, pilot=True),
+        Mode(3, "STEERING", CUSTOM | STABILIZED, Steering, STEERED, needs_position=True, pilot=True),
         Mode(4, "HOLD", CUSTOM, Stand),
+        Mode(5, "LOITER", AUTO_BITS, HoldPlace, STEERED, needs_position=True),
+        Mode(7, "SIMPLE", CUSTOM | MANUAL, Simple, pilot=True),
+        Mode(12, "SMART_RTL", AUTO_BITS, ReturnAlongTrack, STEERED, needs_position=True, armable=False),
         Mode(
             10,
             "AUTO",
@@ -184,6 +196,10 @@ def on_step(vehicle: Vehicle) -> None:
     """Expire overrides and count the driving time, at each tick."""
     pilot_input.on_step(vehicle)
     boot.find_home(vehicle)
+    switches.read_mode_switch(vehicle, "MODE_CH", "MODE")
+    switches.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
+    switches.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
+    switches.keep_track(vehicle)
     if vehicle.armed:
         vehicle.ground.flight_time += ROVER.periodic.tick
 

@@ -233,3 +233,23 @@ class Guided(Manoeuvre):
             thrust: 0..1; one half holds the height.
         """
         self._begin(FollowAttitude(self.vehicle, attitude, yaw_rate, thrust))
+
+
+class GuidedAttitude(Guided):
+    """Execute attitudes only: a guided flight without a position."""
+
+    def enter(self) -> None:
+        """Hold the height, level."""
+        self.follow_attitude(None, 0.0, 0.5)
+
+    def take_off(self, height: float) -> None:
+        """Ignore the command: it requires a position."""
+
+    def go_to(self, point: Vector, turn: Turn = OWN_HEADING) -> None:
+        """Ignore the command: it requires a position."""
+
+    def follow_velocity(self, velocity: Vector, turn: Turn = OWN_HEADING) -> None:
+        """Ignore the command: it requires a position."""
+
+    def follow_acceleration(self, acceleration: Vector, turn: Turn = OWN_HEADING) -> None:
+        """Ignore the command: it requires a position."""

@@ -284,6 +284,11 @@ class Circle(Manoeuvre):
         self.target = self._centre
         self._angle = self._bearing()
 
+    def raise_by(self, height: float) -> None:
+        """Raise the circle [m]."""
+        north, east, down = self._centre
+        self._centre = self.target = (north, east, down - height)
+
     def _bearing(self) -> float:
         north, east, _ = self.vehicle.estimate.position
         return atan2(east - self._centre[1], north - self._centre[0])
