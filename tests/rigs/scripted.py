@@ -13,7 +13,7 @@ from volery.links.link import Frame, Link
 from volery.links.mavlink_messages import message_type
 
 ACCEPTED = 0
-INTERVAL, ASK, GET_HOME = 511, 512, 410
+INTERVAL, ASK, GET_HOME, RUN_CHECKS = 511, 512, 410, 401
 STREAMED = (
     "GLOBAL_POSITION_INT",
     "SYS_STATUS",
@@ -195,6 +195,6 @@ class Scripted:
         return [frame.fields for frame in self.received if frame.name == name]
 
     def commands(self) -> list[int]:
-        """The commands that it received, requests for messages left out."""
+        """The commands that it received, requests for messages and for arming checks left out."""
         received = [frame.fields["command"] for frame in self.received if frame.name.startswith("COMMAND_")]
-        return [command for command in received if command not in {INTERVAL, ASK, GET_HOME}]
+        return [command for command in received if command not in {INTERVAL, ASK, GET_HOME, RUN_CHECKS}]

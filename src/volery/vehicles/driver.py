@@ -12,7 +12,14 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, NamedTuple, Protocol
 
-from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent
+from volery.base.errors import (
+    CapabilityError,
+    LinkError,
+    LinkGarbled,
+    LinkSilent,
+    NotArrived,
+    VehicleError,
+)
 from volery.base.position import Position
 from volery.base.registry import Registry
 from volery.base.time import Ns
@@ -72,6 +79,7 @@ class Step:
         armed: whether it must stay armed.
         lost: returns how another station has changed the target, where the mode does not show it; else empty.
         fails: returns why the step can no longer be done, which ends it at once; else empty.
+        failure: error that is raised then.
         keep: repeated until the step ends.
         advice: remedy if the step is refused or late.
     """
@@ -89,6 +97,7 @@ class Step:
     armed: bool = False
     lost: Callable[[], str] = _never
     fails: Callable[[], str] = _never
+    failure: type[VehicleError] = NotArrived
     keep: Repeat | None = None
     advice: str = ""
 

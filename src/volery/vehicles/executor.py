@@ -317,12 +317,13 @@ class _StepRun:
             self._stopped = self._stopped or self._check(self._asked, self._kernel.now()) or self._failed()
         return bool(self._taken) or self._stopped is not None
 
-    def _failed(self) -> NotArrived | None:
+    def _failed(self) -> VehicleError | None:
         """Return the error of a step that can no longer be done."""
         why = self._step.fails()
         if not why:
             return None
-        return NotArrived(self._driver.name, self._asked, f"{why}; {describe_state(self._telemetry)}")
+        what = f"{why}; {describe_state(self._telemetry)}{self._advice()}"
+        return self._step.failure(self._driver.name, self._asked, what)
 
     def _is_refused(self) -> bool:
         answer = self._telemetry.answers.get(self._step.answer)

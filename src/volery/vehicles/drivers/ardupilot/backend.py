@@ -9,6 +9,7 @@ from typing import Protocol
 from volery.base.errors import UsageError
 from volery.base.geoid import EGM96, Geoid
 from volery.base.position import AboveHome, Position
+from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant
 from volery.ros.graph import Node
@@ -42,6 +43,31 @@ ARDUPILOT_FIRMWARE = Firmware(
     oldest=(4, 0),  # the first version with requests of single messages
     estimator="EKF_STATUS_REPORT",
 )
+
+
+_LASTING = (
+    *("battery", "radio failsafe", "fs_thr", "rc not", "rc calib", "throttle", "safety switch"),
+    *("not calibrated", "calibration needed", "frame", "parameter", "logging", "disarm switch", "interlock"),
+    *("mission", "param", "mode not armable", "mode requires", "check fs_", "fence requires", "in fence"),
+)
+_PASSING = ("gps", "ekf", "ahrs", "position", "inconsistent", "settl", "wait", "init", "fix")
+"""Words of arming checks that stay until somebody mends them, and of those that pass by themselves."""
+
+
+def lasting_reasons(telemetry: Telemetry, since: Ns) -> Sequence[str]:
+    """Return the arming checks that were reported more than once since then and stay.
+
+    Args:
+        telemetry: telemetry with the texts.
+        since: begin of the wait, ns.
+    """
+    said = [text.text for text in telemetry.texts if text.at >= since and text.text.startswith("PreArm: ")]
+    repeated = dict.fromkeys(text for text in said if said.count(text) > 1)
+    return [text for text in repeated if _stays(text.lower())]
+
+
+def _stays(text: str) -> bool:
+    return any(word in text for word in _LASTING) and not any(word in text for word in _PASSING)
 
 
 class ArduPilotBackend(Backend, Protocol):
@@ -103,6 +129,10 @@ class ArduPilotMavlink(MavlinkClient):
 
     def _requested_parameters(self) -> Sequence[str]:
         return LINK_LOSS_PARAMETERS.get(self.telemetry.kind, ())
+
+    def lasting_reasons(self, since: Ns) -> Sequence[str]:
+        """Return the arming checks that fail since then and that waiting does not mend."""
+        return lasting_reasons(self.telemetry, since)
 
     def set_mode(self, mode: str) -> None:
         """Send DO_SET_MODE."""
@@ -167,6 +197,10 @@ class ArduPilotMavros(MavrosBackend):
         target = "mavros_msgs/msg/GlobalPositionTarget"
         self._target = node.advertise(self._name("setpoint_raw/global"), target)
         self._override = node.advertise(self._name("rc/override"), "mavros_msgs/msg/OverrideRCIn")
+
+    def lasting_reasons(self, since: Ns) -> Sequence[str]:
+        """Return the arming checks that fail since then and that waiting does not mend."""
+        return lasting_reasons(self.telemetry, since)
 
     def turn(self, degrees: float) -> None:
         """Call ``cmd/command`` with CONDITION_YAW."""

@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 
 from volery.base.errors import CapabilityError, LinkError, UsageError
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
+from volery.base.time import Ns
 from volery.kernel.api import Action
 from volery.links.mavlink_messages import constant
 from volery.vehicles.telemetry import Telemetry
@@ -132,6 +133,9 @@ class Backend(Protocol):
 
     def request_arming_checks(self) -> None:
         """Request the texts of the arming checks that fail now."""
+
+    def lasting_reasons(self, since: Ns) -> Sequence[str]:
+        """Return the arming checks that fail since then and that waiting does not mend."""
 
     def upload(self, items: Sequence[Item]) -> None:
         """Replace the mission; continues an upload in progress."""

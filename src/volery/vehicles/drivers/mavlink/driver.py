@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
-from volery.base.errors import CapabilityError, LinkError
+from volery.base.errors import CapabilityError, LinkError, Refused
 from volery.base.geoid import Geoid
 from volery.base.time import Ns, S
 from volery.kernel.api import Action, Kernel
@@ -32,7 +32,9 @@ from volery.vehicles.drivers.steps import (
 from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry
 
-ARMING_CHECKS_PERIOD: Ns = 10 * S
+ARMING_CHECKS_PERIOD: Ns = 5 * S
+LASTS_AFTER: Ns = 6 * S
+"""Time after which an arming check counts as one that stays: it has been reported twice."""
 
 ROVER_CAPABILITIES = frozenset(
     {
@@ -109,6 +111,7 @@ class MavlinkDriver:
         self.name = name
         self.telemetry = backend.telemetry
         self.cycle: Action | None = backend.cycle
+        self._kernel = kernel
         self._backend = backend
         self._takeover = Takeover(kernel, backend.telemetry, self.obeys)
         self._last_item: int | None = None  # the item at which the mission on board ends in the air
@@ -147,7 +150,21 @@ class MavlinkDriver:
         """Wait until the arming checks pass and there is a position."""
         advice = "give it a view of the sky, stand it still and level, and look at its arming checks"
         keep = Repeat(ARMING_CHECKS_PERIOD, self._backend.request_arming_checks)
-        return (ready_step(within, advice, keep),)
+        began: Ns | None = None
+
+        def send() -> None:
+            nonlocal began
+            began = self._kernel.now()
+            self._backend.request_arming_checks()
+
+        def never() -> str:
+            if began is None or self._kernel.now() - began < LASTS_AFTER:
+                return ""
+            reasons = "; ".join(self._backend.lasting_reasons(began))
+            return f"arming checks fail that waiting does not mend: {reasons}" if reasons else ""
+
+        step = ready_step(within, advice, keep)
+        return (replace(step, send=send, fails=never, failure=Refused),)
 
     def arm(self) -> Sequence[Step]:
         """Arm in the present mode."""

@@ -116,7 +116,7 @@ class PX4Mavlink(MavlinkClient):
     _decoder: PX4Decoder
 
     def _make_decoder(self, record: bool) -> PX4Decoder:
-        return PX4Decoder(self._kernel, self.telemetry, record=record)
+        return PX4Decoder(self._kernel, self.telemetry, record=record, request=self._request_events)
 
     def _requested_parameters(self) -> Sequence[str]:
         return LINK_LOSS_PARAMETERS
@@ -127,11 +127,19 @@ class PX4Mavlink(MavlinkClient):
         return self._decoder.last_heartbeat_ns
 
     def _on_refusal(self, key: str) -> None:
-        if key == Ack.ARM and not self.telemetry.armed:
-            self._decoder.add_failing_checks()
+        if key == Ack.ARM and not self.telemetry.armed and not self._decoder.add_failing_checks():
+            self.request_arming_checks()
 
     def request_arming_checks(self) -> None:
-        """Do nothing: PX4 reports failing checks by itself whenever one of them changes."""
+        """Send RUN_PREARM_CHECKS, which reports all failing checks; without it only changes are reported."""
+        self._command("MAV_CMD_RUN_PREARM_CHECKS")
+
+    def lasting_reasons(self, since: Ns) -> Sequence[str]:
+        """Return the arming checks that fail and that waiting does not mend."""
+        return self._decoder.lasting_reasons()
+
+    def _request_events(self, first: int, last: int) -> None:
+        self._send_to("REQUEST_EVENT", first_sequence=first, last_sequence=last)
 
     def set_mode(self, mode: str) -> None:
         """Send DO_SET_MODE."""
@@ -192,6 +200,10 @@ class PX4Mavros(MavrosBackend):
 
     def request_arming_checks(self) -> None:
         """Do nothing: PX4 reports failing checks in events, which do not pass MAVROS."""
+
+    def lasting_reasons(self, since: Ns) -> Sequence[str]:
+        """Return nothing: see ``request_arming_checks``."""
+        return ()
 
     def _takeoff_fields(self) -> Mapping[str, float]:
         return {"latitude": nan, "longitude": nan, "yaw": nan}

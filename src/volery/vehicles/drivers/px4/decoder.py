@@ -8,9 +8,10 @@ meet. Others are shown as their number.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.vehicles.drivers.mavlink.decoder import Fields, TelemetryDecoder
 from volery.vehicles.drivers.px4.modes import HOLD, MANUAL_MODES, MODES, mode_name
@@ -20,6 +21,11 @@ ALL_MODES = 0xFFFFFFFF
 ERROR, WARNING = 3, 4
 """Log levels of syslog. An arming check for all modes that is not an error is only a warning."""
 NOT_FOR_PEOPLE = 8
+SEQUENCES = 65_536
+KEPT_EVENTS = 20
+"""Number of past events that are requested; those that PX4 keeps no longer are reported as errors."""
+EXPLAINS_WITHIN: Ns = S
+"""Time after a refusal within which a report of the arming checks is its reason."""
 
 _BASIS, _PRIME = 0x811C9DC5, 0x01000193
 _AUTOPILOT = 1 << 24
@@ -47,35 +53,51 @@ REPORT_ENDS = event_id("commander_health_summary")
 
 NO_MANUAL_CONTROL = event_id("check_modes_manual_control")
 
-CHECKS: Mapping[int, str] = {
-    event_id(name): words
-    for name, words in {
-        "check_modes_cannot_takeoff": "mode not suitable for arming",
-        "check_modes_angular_velocity": "angular velocity not valid",
-        "check_modes_attitude": "no valid attitude estimate",
-        "check_modes_local_pos": "no valid local position estimate",
-        "check_modes_global_pos": "no valid global position estimate",
-        "check_modes_local_alt": "no valid altitude estimate",
-        "check_modes_mission": "no valid mission available",
-        "check_modes_home_position": "home position not set",
-        "check_modes_manual_control": "no manual control input",
-        "check_modes_offboard_signal": "no offboard signal",
-        "check_modes_not_supported": "mode not supported by this vehicle",
-        "check_rc_dl_no_dllink": "no connection to the ground station",
-        "check_estimator_missing_data": "waiting for the estimator",
-        "check_missing_gps": "no GPS",
-        "check_estimator_gps_fix_too_low": "GPS fix too low",
-        "check_estimator_gps_num_sats_too_low": "too few GPS satellites",
-        "check_battery_low": "low battery",
-        "check_battery_critical": "critically low battery",
-        "check_system_usb_connected": "USB connected",
-        "check_gyro_missing": "no gyroscope",
-        "check_accel_missing": "no accelerometer",
-        "check_mag_missing": "no compass",
-        "check_baro_missing": "no barometer",
-    }.items()
+_CHECK_NAMES: Mapping[str, str] = {
+    "check_modes_cannot_takeoff": "mode not suitable for arming",
+    "check_modes_angular_velocity": "angular velocity not valid",
+    "check_modes_attitude": "no valid attitude estimate",
+    "check_modes_local_pos": "no valid local position estimate",
+    "check_modes_global_pos": "no valid global position estimate",
+    "check_modes_local_alt": "no valid altitude estimate",
+    "check_modes_mission": "no valid mission available",
+    "check_modes_home_position": "home position not set",
+    "check_modes_manual_control": "no manual control input",
+    "check_modes_offboard_signal": "no offboard signal",
+    "check_modes_not_supported": "mode not supported by this vehicle",
+    "check_rc_dl_no_dllink": "no connection to the ground station",
+    "check_estimator_missing_data": "waiting for the estimator",
+    "check_missing_gps": "no GPS",
+    "check_estimator_gps_fix_too_low": "GPS fix too low",
+    "check_estimator_gps_num_sats_too_low": "too few GPS satellites",
+    "check_battery_low": "low battery",
+    "check_battery_critical": "critically low battery",
+    "check_system_usb_connected": "USB connected",
+    "check_gyro_missing": "no gyroscope",
+    "check_accel_missing": "no accelerometer",
+    "check_mag_missing": "no compass",
+    "check_baro_missing": "no barometer",
 }
+CHECKS: Mapping[int, str] = {event_id(name): words for name, words in _CHECK_NAMES.items()}
 """Arming checks."""
+
+_PASSING = (
+    "estimator",
+    "gps",
+    "_pos",
+    "home",
+    "attitude",
+    "angular",
+    "local_alt",
+    "heading",
+    "offboard",
+    "_mag",
+)
+
+LASTING_CHECKS = frozenset(
+    event_id(name) for name in _CHECK_NAMES if not any(word in name for word in _PASSING)
+)
+"""Arming checks that stay until somebody mends them: batteries, missions, sticks, missing hardware."""
 
 KNOWN_EVENTS: Mapping[int, str] = {
     event_id(name): words
@@ -160,8 +182,19 @@ class ArmingChecks:
         return True
 
     def reasons(self, mode: str) -> list[str]:
-        """Return why the vehicle cannot arm in *mode*."""
-        return [event_text(event.id) for event in self._failing if _forbids(event, mode)]
+        """Return why the vehicle cannot arm in *mode*.
+
+        A check for all modes that is milder than an error is reported in the same way whether it forbids
+        arming or not: COM_ARM_MIS_REQ's is an information. It is the reason if there is no other.
+        """
+        found = [event for event in self._failing if _forbids(event, mode)]
+        found = found or [event for event in self._failing if event.modes == ALL_MODES]
+        return [event_text(event.id) for event in found]
+
+    def lasting(self, mode: str) -> list[str]:
+        """Return the reasons that waiting does not mend."""
+        staying = [event_text(event.id) for event in self._failing if event.id in LASTING_CHECKS]
+        return [reason for reason in self.reasons(mode) if reason in staying]
 
 
 def _forbids(event: Event, mode: str) -> bool:
@@ -183,9 +216,21 @@ class PX4Decoder(TelemetryDecoder):
     autopilot = "PX4"
     resting = HOLD
 
-    def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool = True) -> None:
+    def __init__(
+        self,
+        kernel: Kernel,
+        telemetry: Telemetry,
+        *,
+        record: bool = True,
+        request: Callable[[int, int], None] = lambda first, last: None,
+    ) -> None:
         super().__init__(kernel, telemetry, record=record)
         self._checks = ArmingChecks()
+        self._request = request  # requests events by their first and last sequence number
+        self._sequence: int | None = None  # of the newest event that was received or requested
+        self._past: set[int] = set()  # requested events from before this program has connected
+        self._explains_until: Ns = -1
+        self._handlers["CURRENT_EVENT_SEQUENCE"] = lambda fields: self._request_missed(fields["sequence"])
         self._estimator_reports = False
         self._handlers["ESTIMATOR_STATUS"] = self._estimator_status
         self._handlers["EVENT"] = self._event
@@ -208,16 +253,47 @@ class PX4Decoder(TelemetryDecoder):
         super().add_text(severity, text.rstrip("\t"))
 
     def _event(self, fields: Fields) -> None:
-        event = event_of(fields)
-        if self._checks.handle_event(event) or event.severity >= NOT_FOR_PEOPLE:
+        event, sequence = event_of(fields), fields["sequence"]
+        past = sequence in self._past
+        self._past.discard(sequence)
+        if not past:
+            self._request_missed((sequence - 1) % SEQUENCES)
+            self._sequence = sequence
+        if self._checks.handle_event(event):
+            if event.id == REPORT_ENDS and self._kernel.now() <= self._explains_until:
+                self.add_failing_checks()
+            return
+        if past or event.severity >= NOT_FOR_PEOPLE:
             return
         unknown = event.id not in KNOWN_EVENTS and event.severity <= WARNING
         if event.id in WITHOUT_TEXT or unknown:
             self.add_text(event.severity, event_text(event.id))
 
-    def add_failing_checks(self) -> None:
-        """Add the reasons of a refusal to arm as texts, from the last report, which may be old."""
-        if not self._checks.reported:
-            self.add_text(WARNING, "Arming check: not all are done yet")
-        for reason in self._checks.reasons(self._telemetry.mode):
+    def _request_missed(self, sequence: int) -> None:
+        """Request the events up to *sequence* that were missed; at first those that PX4 still keeps.
+
+        PX4 reports its arming checks when one of them changes, so one that runs already has reported them.
+        """
+        if self._sequence is None:
+            first = (sequence - KEPT_EVENTS + 1) % SEQUENCES
+            self._past = {(first + step) % SEQUENCES for step in range(KEPT_EVENTS)}
+        else:
+            first = (self._sequence + 1) % SEQUENCES
+        if (sequence - first) % SEQUENCES < KEPT_EVENTS:
+            self._request(first, sequence)
+            self._sequence = sequence
+
+    def add_failing_checks(self) -> bool:
+        """Add the reasons of a refusal to arm as texts; return False if they are not known yet.
+
+        They are added then as soon as the report arrives.
+        """
+        reasons = self._checks.reasons(self._telemetry.mode)
+        self._explains_until = -1 if reasons else self._kernel.now() + EXPLAINS_WITHIN
+        for reason in reasons:
             self.add_text(WARNING, f"Arming check: {reason}")
+        return bool(reasons)
+
+    def lasting_reasons(self) -> list[str]:
+        """Return the arming checks that fail in the present mode and that waiting does not mend."""
+        return self._checks.lasting(self._telemetry.mode)

@@ -86,7 +86,6 @@ class PX4(MavlinkDriver):
 
     def __init__(self, kernel: Kernel, name: str, backend: PX4Backend) -> None:
         super().__init__(kernel, name, backend)
-        self._kernel = kernel
         self._offboard = OffboardStream(kernel, backend, self._takeover)
         self._manual = ManualControlStream(kernel, backend)
         self._at_own_speed = True

@@ -149,7 +149,7 @@ class OffboardStream:
 
 
 TAKEN_IN: Ns = 500 * MS
-"""Time after which manual control counts: a mode of sticks was refused at the first sample, and accepted 0.3 s
+"""Time after which manual control counts: a mode of sticks was refused at the first sample, accepted 0.3 s
 later.
 """
 

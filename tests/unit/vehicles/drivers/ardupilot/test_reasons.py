@@ -1,0 +1,47 @@
+"""Why ArduPilot does not get ready: arming checks that stay end the wait, others do not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from volery.base.errors import Refused
+from volery.base.time import S
+
+Make = Callable[..., Any]
+RUN_CHECKS = 401
+
+
+def fails(at: Any, text: str) -> None:
+    """An arming check fails, and is reported whenever the checks are run."""
+    at.craft.health = 0
+    at.autopilot.on_command = lambda command, _: (
+        at.autopilot.text(text, 2) if command == RUN_CHECKS and at.craft.health == 0 else None
+    )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "PreArm: Battery 1 below minimum arming voltage",
+        "PreArm: Radio failsafe on",
+        "PreArm: Check FS_THR_VALUE",
+    ],
+)
+def test_a_take_off_ends_at_once_if_waiting_does_not_mend_it(bench: Make, text: str) -> None:
+    at = bench()
+    fails(at, text)
+    with pytest.raises(Refused, match=f"waiting does not mend: {text}"):
+        at.fly(lambda drone: drone.takeoff(10))
+    assert at.kernel.now() < 15 * S
+
+
+@pytest.mark.parametrize("text", ["PreArm: Need Position Estimate", "PreArm: Gyros inconsistent"])
+def test_a_take_off_waits_for_what_passes(bench: Make, text: str) -> None:
+    at = bench()
+    fails(at, text)
+    at.after(30, lambda: setattr(at.craft, "health", 0x10000000))
+    at.fly(lambda drone: drone.takeoff(10))
+    assert at.craft.armed
