@@ -127,7 +127,7 @@ def test_code_is_counted_where_the_core_is_known(run_model):
             counted[one.component] += one.caller
     assert 0 < counted["other"] < counted["one"] < 100_000, "one of them does a few rounds more"
     [doubt] = [one.text for one in outcome.of(Text) if one.source == "volery"]
-    assert "comes from its code alone" in doubt
+    assert "comes from the code alone" in doubt
 
 
 @pytest.mark.usefixtures("llvm")
