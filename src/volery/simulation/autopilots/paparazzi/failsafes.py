@@ -22,7 +22,6 @@ from volery.simulation.autopilots.paparazzi.modes import (
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import RADIO_REALLY_LOST, state_of
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
-
 KILL_AFTER: Ns = 800 * MS
 """Time after which FAILSAFE on the ground becomes KILL: observed 0.8 s, recorded 1.3 s in the telemetry."""
 

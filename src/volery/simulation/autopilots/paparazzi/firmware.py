@@ -1,7 +1,7 @@
 """Paparazzi's rotorcraft firmware: modes and boot, composed as a firmware, and the list of assumptions.
 
-Protocol and rules follow public definitions and sources of the static autopilot, and recordings of version 6.2
-in its own simulator NPS (stock example ``ardrone2``). The figures of an airframe file stand in
+Protocol and rules follow public definitions and sources of the static autopilot, and recordings of version
+6.2 in its own simulator NPS (stock example ``ardrone2``). The figures of an airframe file stand in
 ``parameters.FIGURES``.
 """
 

@@ -21,7 +21,7 @@ LIFT_OFF_M = 0.3
 """Height [m] above which the plan's target takes a standing vehicle off the ground."""
 
 BELOW_M, SINKING_M_S = 0.2, 0.1
-"""Distance below the vehicle [m] and sink rate [m/s] from which a set-point of GUIDED keeps it on the ground."""
+"""Distance below the vehicle [m] and sink rate [m/s] from which GUIDED keeps it on the ground."""
 
 OFFSET_AT_LIFT_OFF = 0.35
 """Height to which GUIDED lifts a standing aircraft when its motors run; observed 0.4 to 0.5 m [m]."""

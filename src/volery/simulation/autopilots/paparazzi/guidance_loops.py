@@ -1,11 +1,12 @@
 """Response of the rotorcraft's guidance loops to set-points, as recorded.
 
 The original moves a reference with limited speed and acceleration towards the set-point and follows it by
-proportional, differential and integral loops through the lean of the airframe. The loops are soft: on a leg of
-50 m the aircraft first falls behind, reaches 7.5 m/s to catch up with a reference of 5 m/s, passes the goal at
-4 m/s and swings about it. Gains and lags are fitted to the recorded flight of the stock ``ardrone2`` (a leg of
-50 m, and a velocity of 3 m/s with the stop after it; the error is 0.13 m and m/s). Heights end above the
-set-point by an offset that vertical motion builds up and that fades slowly, as recorded; its cause is not known.
+proportional, differential and integral loops through the lean of the airframe. The loops are soft: on a leg
+of 50 m the aircraft first falls behind, reaches 7.5 m/s to catch up with a reference of 5 m/s, passes the
+goal at 4 m/s and swings about it. Gains and lags are fitted to the recorded flight of the stock ``ardrone2``
+(a leg of 50 m, and a velocity of 3 m/s with the stop after it; the error is 0.13 m and m/s). Heights end
+above the set-point by an offset that vertical motion builds up and that fades slowly, as recorded; its cause
+is not known.
 
 The response is a position and a velocity that the flight stack follows.
 """

@@ -1,7 +1,8 @@
 """Figures of the airframe as parameters, and settings that a ground station reads and writes by number.
 
-Names are the firmware's own where it has one. Values are observed of the stock rotorcraft, documented defaults
-of the firmware, or assumptions (docs/paparazzi.md). The numbers of settings are those of the stock rotorcraft.
+Names are the firmware's own where it has one. Values are observed of the stock rotorcraft, documented
+defaults of the firmware, or assumptions (docs/paparazzi.md). The numbers of settings are those of the stock
+rotorcraft.
 Values outside the bounds of a setting are accepted, as in the firmware: only the ground station checks the
 bounds.
 """
@@ -124,7 +125,7 @@ def _set_telemetry_mode(vehicle: Vehicle, value: float) -> None:
 
 
 def _stored(number: int) -> Variable:
-    """Return a setting that is only stored: a number beyond the known settings, or hardware without a model."""
+    """Return a setting that is only stored: beyond the known numbers, or without a model."""
 
     def write(vehicle: Vehicle, value: float) -> None:
         vehicle.firmware_state.stored_settings[number] = value

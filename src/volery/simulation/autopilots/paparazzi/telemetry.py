@@ -265,7 +265,7 @@ AUTOPILOT_VERSION, of which nothing here makes use.
 """
 
 OTHER_MODES = range(1, 10)
-"""Values of ``telemetry_mode_Main`` that are other lists of messages. Beyond them no periodic message is sent."""
+"""Values of ``telemetry_mode_Main`` that are other lists. Beyond them no periodic message is sent."""
 NOT_IN_OTHER_MODES = frozenset({"ROTORCRAFT_FP", "ROTORCRAFT_NAV_STATUS"})
 
 
