@@ -141,6 +141,11 @@ class PaparazziDecoder:
         self._tell_lack()
         return handler is not None
 
+    def is_old(self) -> bool:
+        """Return whether ROTORCRAFT_FP is not sent any more while other messages arrive."""
+        last = self._telemetry.last_message_ns
+        return last - max(self._flight_at, self._resumed_at) > MISSED_AFTER
+
     def lacks_position(self) -> str:
         """Return why there is no position that counts, in words; empty if there is one."""
         last = self._telemetry.last_message_ns
@@ -151,7 +156,7 @@ class PaparazziDecoder:
             return "it has not reported the origin of its local frame (INS_REF)"
         if self._flight_at < 0:
             return "it has not reported its position (ROTORCRAFT_FP)"
-        if last - max(self._flight_at, self._resumed_at) > MISSED_AFTER:
+        if self.is_old():
             ago = to_seconds(last - self._flight_at)
             return (
                 f"its position (ROTORCRAFT_FP) is not sent any more, the last {ago:.1f} s ago, while other "

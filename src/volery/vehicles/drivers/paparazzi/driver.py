@@ -207,12 +207,20 @@ class Paparazzi:
         """Enter ATTITUDE_DIRECT with manual control repeated; in the air not with an idle throttle."""
         self._setpoints.hold_any()
         check_throttle(self.telemetry, self._setpoints.held)
-        return (self._steps.check_settings(), self._steps.heard(), self._steps.change_mode(ATTITUDE_MODE))
+        return (
+            self._steps.check_settings(),
+            self._steps.wait_for_sticks(),
+            self._steps.change_mode(ATTITUDE_MODE),
+        )
 
     def altitude_hold(self) -> Sequence[Step]:
         """Enter ATTITUDE_RC_CLIMB with manual control repeated."""
         self._setpoints.hold_any()
-        return (self._steps.check_settings(), self._steps.heard(), self._steps.change_mode(HEIGHT_MODE))
+        return (
+            self._steps.check_settings(),
+            self._steps.wait_for_sticks(),
+            self._steps.change_mode(HEIGHT_MODE),
+        )
 
     def manual(self) -> Sequence[Step]:
         """Raise ``CapabilityError``: this is for rovers."""

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import isnan, radians
+from math import hypot, isnan, radians
 
 from volery.base.errors import CapabilityError, Refused
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.api import Action, Kernel
-from volery.vehicles.driver import Repeat, Step
+from volery.vehicles.driver import ManualControl, Repeat, Step
 from volery.vehicles.drivers.paparazzi.backend import (
     COME_DOWN,
     STOP,
@@ -28,6 +28,7 @@ from volery.vehicles.drivers.paparazzi.modes import (
     CHANGE,
     FAILSAFE,
     GUIDED,
+    HEIGHT_MODE,
     HOME,
     KILL,
     LAND_BLOCK,
@@ -39,7 +40,6 @@ from volery.vehicles.drivers.paparazzi.modes import (
 from volery.vehicles.drivers.steps import (
     AT_REST_M_S,
     NEAR_UP_M,
-    at_rest,
     disarmed_step,
     horizontal_distance,
     immediate_step,
@@ -69,6 +69,8 @@ OVERSHOT_M, CREEPING_M_S = 1.0, 0.1
 SUNK_M = 0.5
 NOT_SINKING_FOR: Ns = 10 * S
 """Time in which FAILSAFE must lower the height by ``SUNK_M``; it should descend at 1.5 m/s."""
+SINKING_THROTTLE = 0.25
+RESCUE = "land() again once it has a fix, or fly it by hand"
 
 WATCH_PERIOD: Ns = 250 * MS
 STANDING_M_S = 0.1
@@ -116,7 +118,7 @@ class PaparazziSteps:
         """Return steps that enter GUIDED and only then release manual control."""
         return self.check_settings(), self.change_mode(GUIDED), self.release()
 
-    def heard(self) -> Step:
+    def wait_for_sticks(self) -> Step:
         """Return a step that waits until sticks by datalink count; without them no mode obeys them."""
         return Step(
             ask="take its sticks from the datalink",
@@ -307,16 +309,17 @@ class TakeoffAndLanding:
         return (steps.check_settings(), stop, steps.release())
 
     def _stop_when_down(self) -> Repeat:
-        """Return a repetition that stops motors which go on running after a status without flight."""
-        began = self._steps.kernel.now()
+        """Return a repetition that stops motors which go on running on the ground."""
+        began, touch_down = self._steps.kernel.now(), _TouchDown(self._steps)
 
         def stop() -> None:
             telemetry = self._telemetry
             landed = self._steps.decoder.status_at > began and telemetry.armed and not telemetry.flying
-            if landed and at_rest(telemetry):
+            if landed and _is_still(telemetry):
                 self._backend.set_motors(False)
+            touch_down.watch()
 
-        return Repeat(2 * WATCH_PERIOD, stop)
+        return Repeat(WATCH_PERIOD, stop)
 
     # -- take-off
 
@@ -387,36 +390,77 @@ class TakeoffAndLanding:
             return self.stop_on_ground()
         if steps.decoder.good_fix:
             return self.land_by_plan(within) if self._by_plan() else self._descend(within)
+        return self._land_without_fix(within)
+
+    def _land_without_fix(self, within: Ns) -> Sequence[Step]:
+        """Return steps that land in FAILSAFE or, where that keeps the height, by sticks over the datalink.
+
+        Once there is a fix again, the plan lands it.
+        """
+        steps = self._steps
+        by_hand = steps.setpoints.held is not None and steps.decoder.transmitter
 
         def fail_safely() -> None:
             self._backend.set_mode(FAILSAFE)
             self._backend.send_emergency(COME_DOWN)
 
-        enter = steps.change_mode(FAILSAFE, fail_safely)
-        sink = replace(
-            disarmed_step("land", FAILSAFE, within, (KILL,)),
-            done=lambda seen: not seen.armed or steps.decoder.good_fix,
-            fails=self._sinking(),
-        )
-        # FAILSAFE may keep its height: once there is a fix again, the plan lands it
-        by_plan = (replace(step, skippable=True) for step in self.land_by_plan(within))
-        return (steps.check_settings(), enter, steps.release(), sink, *by_plan)
+        def take_sticks() -> None:
+            steps.decoder.note_commanded(self._telemetry.mode)
+            steps.setpoints.hold(ManualControl())
 
-    def _sinking(self) -> Callable[[], str]:
-        """Return a function that tells in words that FAILSAFE does not sink."""
-        lowest: list[tuple[Ns, float]] = []
+        def until_fixed(step: Step) -> Step:
+            """Skip or end the step once it is down, or has a fix."""
+            done = step.done
+            return replace(
+                step,
+                skippable=True,
+                done=lambda seen: not seen.armed or steps.decoder.good_fix or done(seen),
+            )
+
+        failsafe = self._sinking(FAILSAFE)
+        level = (
+            until_fixed(steps.change_mode(FAILSAFE, fail_safely)),
+            replace(
+                until_fixed(disarmed_step("land", FAILSAFE, within, (KILL,))),
+                done=lambda seen: not seen.armed or steps.decoder.good_fix or bool(failsafe()),
+            ),
+        )
+        refused = f"FAILSAFE keeps its height, and sticks by datalink are not obeyed; {RESCUE}"
+        take = until_fixed(steps.wait_for_sticks())
+        take = replace(take, send=take_sticks, advice=refused)
+        sink = replace(
+            until_fixed(disarmed_step("land", HEIGHT_MODE, within, (FAILSAFE, KILL))),
+            send=lambda: steps.setpoints.hold(ManualControl(throttle=SINKING_THROTTLE)),
+            keep=self._stop_when_down(),
+            fails=self._sinking(HEIGHT_MODE),
+        )
+        let_go = replace(
+            until_fixed(steps.wait_for_sticks()),
+            ask="let go of the sticks",
+            send=steps.setpoints.release,
+            done=lambda seen: not steps.decoder.transmitter or not seen.armed or steps.decoder.good_fix,
+        )
+        # with sticks neither a setting nor their switch ends FAILSAFE: by way of GUIDED, once they count
+        leave = () if by_hand else (take, let_go, until_fixed(steps.change_mode(GUIDED)), take)
+        by_sticks = (*leave, until_fixed(steps.change_mode(HEIGHT_MODE)), sink)
+        by_plan = (replace(step, skippable=True) for step in self.land_by_plan(within))
+        before = () if by_hand else level
+        return (steps.check_settings(), *before, *by_sticks, *by_plan, steps.release())
+
+    def _sinking(self, mode: str) -> Callable[[], str]:
+        """Return a function that tells in words that it does not sink in *mode*."""
+        kept: list[tuple[Ns, float]] = []
 
         def tell() -> str:
             seen, now = self._telemetry, self._steps.kernel.now()
-            if seen.mode != FAILSAFE or isnan(seen.above_home):
-                lowest.clear()
-            elif not lowest or seen.above_home < lowest[0][1] - SUNK_M:
-                lowest[:] = [(now, seen.above_home)]
-            elif now - lowest[0][0] > NOT_SINKING_FOR:
-                seconds = to_seconds(now - lowest[0][0])
+            if seen.mode != mode or isnan(seen.above_home):
+                kept.clear()
+            elif not kept or abs(seen.above_home - kept[0][1]) > SUNK_M:
+                kept[:] = [(now, seen.above_home)]
+            elif now - kept[0][0] > NOT_SINKING_FOR:
+                height, seconds = seen.above_home, to_seconds(now - kept[0][0])
                 return (
-                    f"in FAILSAFE it does not sink: {seen.above_home:.1f} m above home after {seconds:.0f} s"
-                    f"; land() again once it has a fix, or fly it by hand"
+                    f"in {mode} it does not sink: {height:.1f} m above home after {seconds:.0f} s; {RESCUE}"
                 )
             return ""
 
@@ -500,7 +544,7 @@ class _TouchDown:
         up = self._steps.telemetry.velocity.up
         if up <= -SINKING_M_S / 2:
             self._sinking_thrust = decoder.thrust
-        standing = self._sinking_thrust >= 0 and abs(up) <= STANDING_M_S and not decoder.lacks_position()
+        standing = self._sinking_thrust >= 0 and abs(up) <= STANDING_M_S and not decoder.is_old()
         if not standing:
             self._standing_since = None
             return
@@ -510,6 +554,11 @@ class _TouchDown:
         carried = decoder.thrust <= CARRIED * self._sinking_thrust
         if carried and now - self._standing_since >= needed:
             self._steps.backend.set_motors(False)
+
+
+def _is_still(seen: Telemetry) -> bool:
+    """Return whether it does not move, as far as that is known: without a fix by its climb rate alone."""
+    return abs(seen.velocity.up) <= AT_REST_M_S and not hypot(*seen.velocity[:2]) > AT_REST_M_S
 
 
 def _climbed_to(height: float) -> Callable[[Telemetry], bool]:

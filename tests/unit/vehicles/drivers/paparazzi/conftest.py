@@ -84,6 +84,8 @@ class FakePaparazzi:
     transmitter: bool = False
     fingerprint: tuple[int, ...] = stock_aircraft().fingerprint
     sticks_by_datalink: bool = True
+    throttle: float = 0.0
+    climbs_by_stick: bool = True
     lands_late: bool = False
     on_ground: Callable[[], object] = bool
     silenced: set[str] = field(default_factory=set)
@@ -221,6 +223,9 @@ class FakePaparazzi:
     def _rc_up(self, fields: dict[str, Any]) -> None:
         if self.sticks_by_datalink:
             self.sticks_at = self.kernel.now()
+            self.throttle = fields["channels"][3] / 127
+        if self.craft.mode == "FAILSAFE":
+            return  # only a switch at MANUAL ends it
         if (
             self._hears_sticks()
             and fields["channels"][4] == 127
@@ -277,6 +282,10 @@ class FakePaparazzi:
                 self._sink(LANDED)
         elif craft.mode == "FAILSAFE" and craft.armed:
             self._sink(craft.block)
+        elif craft.mode == "ATTITUDE_RC_CLIMB" and craft.flying and self.climbs_by_stick:
+            rate = 4.0 * (self.throttle - 0.5) if craft.up > 0.0 or self.throttle > 0.6 else 0.0
+            craft.velocity = (0.0, 0.0, rate)
+            craft.up = max(0.0, craft.up + rate / 10)
 
     def _sink(self, then: int) -> None:
         craft = self.craft

@@ -575,7 +575,7 @@ def keep_height(at: Any) -> None:
     at.autopilot._sink = lambda then: sink(then) if at.craft.mode != "FAILSAFE" else None
 
 
-def test_a_failsafe_that_does_not_sink_is_told_and_the_plan_lands_once_there_is_a_fix(bench: Make) -> None:
+def test_a_failsafe_that_does_not_sink_is_landed_by_sticks(bench: Make) -> None:
     at = bench()
     keep_height(at)
 
@@ -583,9 +583,41 @@ def test_a_failsafe_that_does_not_sink_is_told_and_the_plan_lands_once_there_is_
         drone.takeoff(10)
         at.craft.fix = "NO_FIX"
         sleep(at.kernel, 2 * S)
-        with pytest.raises(
-            NotArrived, match=r"in FAILSAFE it does not sink: 10\.\d m above home after 1\d s"
-        ):
+        drone.land()
+        sleep(at.kernel, 3 * S)
+        before = len(at.autopilot.sent("RC_UP"))
+        sleep(at.kernel, 3 * S)
+        assert len(at.autopilot.sent("RC_UP")) == before, "the sticks are not let go"
+
+    at.fly(mission)
+    assert (at.craft.armed, at.craft.up) == (False, 0.0)
+
+
+def test_neither_failsafe_nor_sticks_bring_it_down(bench: Make) -> None:
+    at = bench()
+    keep_height(at)
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        at.craft.fix = "NO_FIX"
+        sleep(at.kernel, 2 * S)
+        drone.land()
+
+    at.autopilot.climbs_by_stick = False
+    with pytest.raises(NotArrived, match=r"in ATTITUDE_RC_CLIMB it does not sink: 10\.\d m above home"):
+        at.fly(mission)
+
+
+def test_a_failsafe_that_does_not_sink_is_told_and_the_plan_lands_once_there_is_a_fix(bench: Make) -> None:
+    at = bench()
+    keep_height(at)
+    at.autopilot.sticks_by_datalink = False
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        at.craft.fix = "NO_FIX"
+        sleep(at.kernel, 2 * S)
+        with pytest.raises(NotArrived, match="FAILSAFE keeps its height, and sticks by datalink are not"):
             drone.land()
         at.craft.fix = "3D"
         sleep(at.kernel, 2 * S)
@@ -593,7 +625,7 @@ def test_a_failsafe_that_does_not_sink_is_told_and_the_plan_lands_once_there_is_
 
     at.fly(mission)
     first, second = at.recorded(Operation)[-2:]
-    assert first.end - first.start < 15 * S
+    assert first.end - first.start < 18 * S
     assert (second.outcome, at.craft.armed, at.craft.up) == ("ok", False, 0.0)
 
 
@@ -639,10 +671,11 @@ def test_the_end_of_a_program_tells_what_does_not_sink(bench: Make) -> None:
         drone.takeoff(10)
         at.craft.fix = "NO_FIX"
         at.autopilot.enter("FAILSAFE")
+        at.autopilot.sticks_by_datalink = False
         sleep(at.kernel, 2 * S)
         drone.come_to_rest()
 
-    with pytest.raises(NotArrived, match="in FAILSAFE it does not sink"):
+    with pytest.raises(NotArrived, match="FAILSAFE keeps its height"):
         at.fly(mission)
     assert at.kernel.now() < 90 * S
 
