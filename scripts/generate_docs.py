@@ -22,7 +22,7 @@ from volery.cost import load_catalogue
 from volery.model.document import schema
 from volery.model.faults import FAULTS, TRIAL_FAULTS, Fault
 from volery.model.fields import entries, summary
-from volery.requirements.observables import OBSERVABLES
+from volery.requirements.observables import NOTED, OBSERVABLES
 from volery.simulation.autopilots.ardupilot import FIRMWARE as ARDUPILOT
 from volery.simulation.autopilots.firmware import FirmwareFamily
 from volery.simulation.autopilots.px4 import FIRMWARE as PX4
@@ -51,6 +51,20 @@ def observables() -> str:
             subject = one.subject
             lines += [f"\n## Of the {subject}\n", "| quantity | unit | what it is |", "|---|---|---|"]
         lines.append(f"| `{one.quantity}` | {one.unit} | {one.description} |")
+    lines += [
+        "\n## Of your own\n",
+        f"`{NOTED.subject}.{NOTED.quantity}` counts {NOTED.description}.",
+        "Kind, subject and state are words of your own; a component states them while it runs:\n",
+        "```python",
+        'volery.note("point", "north-east corner", "inspected")',
+        "```\n",
+        "and a requirement bounds the count, here that four different points were inspected:\n",
+        "```yaml",
+        "requirements:",
+        "  all_inspected: {observe: note.point.inspected, min: 4}",
+        "```\n",
+        "A state that was never noted counts 0, also one that is misspelt.",
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -18,7 +18,14 @@ class _Altitude:
 
     def __init__(self, metres: float) -> None:
         """Store the value without dataclass overhead: one is created for most messages of a vehicle."""
-        if not isfinite(metres):
+        try:
+            finite = isfinite(metres)
+        except TypeError:
+            kind = type(self).__name__
+            raise UsageError(
+                f"{kind}({metres!r}): an altitude is a number of metres, as in {kind}(10)"
+            ) from None
+        if not finite:
             raise UsageError(f"an altitude of {metres} m is not finite")
         self.__dict__["metres"] = metres
 
@@ -67,10 +74,27 @@ class Position:
     altitude: Altitude
 
     def __init__(self, latitude: float, longitude: float, altitude: Altitude) -> None:
-        if not -90.0 <= latitude <= 90.0:
-            raise UsageError(f"latitude {latitude} is off the globe: -90 to 90 degrees, north positive")
-        if not -180.0 <= longitude <= 180.0:
-            raise UsageError(f"longitude {longitude} is off the globe: -180 to 180 degrees, east positive")
+        """Check the arguments, which come from missions and consoles without a type checker."""
+        try:
+            if not -90.0 <= latitude <= 90.0:
+                swapped = abs(longitude) <= 90.0 and abs(latitude) <= 180.0
+                hint = f"; did you mean Position({longitude}, {latitude}, ...)?" if swapped else ""
+                raise UsageError(
+                    f"latitude {latitude} is off the globe: -90 to 90 degrees, north positive{hint}"
+                )
+            if not -180.0 <= longitude <= 180.0:
+                raise UsageError(
+                    f"longitude {longitude} is off the globe: -180 to 180 degrees, east positive"
+                )
+        except TypeError:
+            raise UsageError(
+                f"Position({latitude!r}, {longitude!r}, ...): latitude and longitude are numbers, in degrees"
+            ) from None
+        if not isinstance(altitude, _Altitude):
+            raise UsageError(
+                f"Position({latitude}, {longitude}, {altitude!r}): say what the altitude is measured from, "
+                f"as in AMSL({altitude}) or AboveHome({altitude})"
+            )
         own = self.__dict__
         own["latitude"], own["longitude"], own["altitude"] = latitude, longitude, altitude
 

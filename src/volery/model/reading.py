@@ -18,6 +18,10 @@ from volery.model.text import Node, Path, Problems
 T = TypeVar("T")
 
 
+NOTE_PREFIX = "note"
+"""First word of the observables ``note.<kind>.<state>`` that an application makes with ``volery.note()``."""
+
+
 @dataclass(frozen=True, slots=True)
 class Observable:
     """A quantity that requirements may bound: ``<subject>.<quantity>``.

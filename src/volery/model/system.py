@@ -40,7 +40,7 @@ from volery.model.fields import (
     WrongValueError,
 )
 from volery.model.instances import Instance
-from volery.model.reading import Observable, Reading
+from volery.model.reading import NOTE_PREFIX, Observable, Reading
 from volery.model.text import Node, Path
 
 SCHEDULERS = ("fixed-priority", "round-robin", "fifo")
@@ -251,6 +251,8 @@ class _Bound(Syntax):
 
 
 def _observable(reading: Reading, path: Path, text: str) -> Observable | None:
+    if text.partition(".")[0] == NOTE_PREFIX:
+        return _noted(reading, path, text)
     subject, _, quantity = text.rpartition(".")
     kinds = {
         "application": "application",
@@ -264,6 +266,16 @@ def _observable(reading: Reading, path: Path, text: str) -> Observable | None:
     kind = kinds[subject]
     offered = {one.quantity: one for one in reading.vocabulary.observables if one.subject == kind}
     return offered[quantity] if reading.known(path, quantity, f"quantity of a {kind}", offered) else None
+
+
+def _noted(reading: Reading, path: Path, text: str) -> Observable | None:
+    """Return the count of what ``volery.note()`` puts into a state; the words are the application's."""
+    _, kind, state = (*text.split(".", 2), "", "")[:3]
+    if kind and state:
+        return Observable(NOTE_PREFIX, text, "", "number of noted things")
+    what = f"{text!r}: write {NOTE_PREFIX}.<kind>.<state>, as in volery.note(kind, subject, state)"
+    reading.problems.add(path, what)
+    return None
 
 
 BOUND = _Bound()

@@ -17,7 +17,7 @@ from volery.model.document import DOCUMENT, Document
 from volery.model.environment import Environment, Vehicle
 from volery.model.fields import TEXT, ListOf, read_child
 from volery.model.instances import Instance, TargetKind, check_cycles
-from volery.model.reading import Reading, Vocabulary
+from volery.model.reading import NOTE_PREFIX, Reading, Vocabulary
 from volery.model.system import Network, System
 from volery.model.text import CollectedModelError, Path
 
@@ -80,7 +80,7 @@ def _missing(instance: Instance, what: str, figures: tuple[Figure, ...], kind: s
 DEFAULT_FILE = "model.yaml"
 """The file that a folder stands for."""
 
-RESERVED = ("application", "environment")
+RESERVED = ("application", "environment", NOTE_PREFIX)
 """Names that messages, observables and ports use for the whole."""
 
 

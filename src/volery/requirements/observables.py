@@ -17,7 +17,7 @@ from typing import Any
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns, S, to_seconds
-from volery.model.reading import Observable
+from volery.model.reading import NOTE_PREFIX, Observable
 from volery.requirements.accounts import DELIVERED, FAILED, ORDERED, PARCEL
 from volery.requirements.ledgers import ChainLedger, ComponentLedger, Distribution, VehicleLedger
 from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
@@ -259,6 +259,17 @@ def _parcels(state: str) -> Make:
     return make
 
 
+def _noted(kind: str, state: str) -> Observer:
+    """Count the subjects of *kind* that ``volery.note()`` ever put into *state*."""
+    seen: dict[str, None] = {}
+
+    def take(event: Milestone) -> None:
+        if event.kind == kind and event.state == state:
+            seen[event.subject] = None
+
+    return Observer((Milestone,), take, lambda at: float(len(seen)))
+
+
 def _delivery_time(reading: Callable[[Distribution], float | None]) -> Make:
     """Observe times from a parcel's first state to its delivery."""
 
@@ -409,6 +420,14 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
 OBSERVABLES = tuple(Observable(*row[:4]) for row in TABLE)
 """Everything that can be observed. An empty unit stands for a count or a share."""
 
+NOTED = Observable(
+    NOTE_PREFIX,
+    "<kind>.<state>",
+    "",
+    "subjects that volery.note(kind, subject, state) has put into the state, each counted once",
+)
+"""What an application observes itself. Kinds and states are its own words, so ``TABLE`` has no entries."""
+
 _MAKERS = {(subject, quantity): make for subject, quantity, _, _, make in TABLE}
 
 
@@ -423,6 +442,10 @@ def make_observer(expression: str, setup: RunSetup | None = None) -> Observer:
     Raises:
         UsageError: the quantity is not in the table.
     """
+    prefix, _, noted = expression.partition(".")
+    kind, _, state = noted.partition(".")
+    if prefix == NOTE_PREFIX and kind and state:
+        return _noted(kind, state)
     circumstances = setup or RunSetup()
     subject, _, quantity = expression.rpartition(".")
     kind = _kind(subject, quantity, circumstances)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isfinite, nan
+from numbers import Real
 
 from volery.base.errors import OutOfBounds, Refused, UsageError
 from volery.base.frames import LocalFrame
@@ -57,6 +58,8 @@ class Drone(Vehicle):
             Refused: it flies already, or the autopilot refuses.
         """
         self._require(Capability.TAKEOFF)
+        if not isinstance(height, Real):
+            raise UsageError(f"{self.name}: takeoff({height!r}): give metres above home, as in takeoff(10)")
         asked = f"take off to {height:g} m"
         if not isfinite(height) or height <= 0:
             raise UsageError(f"{self.name}: {asked}: give metres above home, above 0")
@@ -104,6 +107,11 @@ class Drone(Vehicle):
             Refused: it is on the ground, or the autopilot refuses.
         """
         self._require(Capability.GOTO)
+        if not isinstance(goal, Position):
+            raise UsageError(
+                f"{self.name}: goto({goal!r}): a goal is a Position, as in "
+                "goto(Position(46.0826, -103.8995, AboveHome(10))); altitudes are AMSL(...) or AboveHome(...)"
+            )
         asked = f"go to {goal}"
         if speed is not None:
             self._check_speed(asked, speed)

@@ -46,3 +46,25 @@ def test_values_do_not_change() -> None:
         altitude.metres = 5.0
     with pytest.raises(AttributeError):
         Position(1.0, 2.0, altitude).latitude = 5.0
+
+
+@pytest.mark.parametrize("altitude", [940, 940.0, "940", None])
+def test_a_bare_altitude_is_refused_with_what_to_write(altitude: object) -> None:
+    with pytest.raises(
+        UsageError, match=rf"measured from, as in AMSL\({altitude}\) or AboveHome\({altitude}\)"
+    ):
+        Position(46.0, 7.0, altitude)  # type: ignore[arg-type]
+
+
+def test_values_that_are_no_numbers_are_refused() -> None:
+    with pytest.raises(UsageError, match=r"Position\('46', 7.0, ...\): latitude and longitude are numbers"):
+        Position("46", 7.0, AMSL(0.0))  # type: ignore[arg-type]
+    with pytest.raises(
+        UsageError, match=r"AMSL\('940'\): an altitude is a number of metres, as in AMSL\(10\)"
+    ):
+        AMSL("940")  # type: ignore[arg-type]
+
+
+def test_swapped_coordinates_are_suspected() -> None:
+    with pytest.raises(UsageError, match=r"did you mean Position\(46.0, -103.9, ...\)"):
+        Position(-103.9, 46.0, AMSL(0.0))

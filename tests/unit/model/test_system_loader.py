@@ -307,3 +307,17 @@ def test_a_fault_is_read_with_its_arguments_and_defaults(workshop):
     assert weak == MotorDead(name="weak", at_ns=5 * S, vehicle="drone_1", motor=1, thrust=0.6)
     assert (front.speed_m_s, front.direction_deg, front.duration_ns) == (10.0, 270.0, 20 * S)
     assert (weak.kind, weak.subject, front.subject) == ("motor-dead", "drone_1", "wind")
+
+
+def test_a_requirement_may_bound_what_the_application_notes(workshop):
+    workshop.change("requirements:\n", "requirements:\n  seen: {observe: note.point.inspected, min: 4}\n")
+    bound = next(one for one in workshop.load().requirements if one.name == "seen")
+    assert (bound.observe, bound.relation, bound.bound, bound.unit) == ("note.point.inspected", "min", 4, "")
+
+
+def test_a_note_without_a_state_is_wrong(workshop):
+    workshop.change("requirements:\n", "requirements:\n  seen: {observe: note.point, min: 4}\n")
+    with pytest.raises(
+        ModelError, match=r"seen.observe: 'note.point': write note.<kind>.<state>"
+    ):
+        workshop.load()

@@ -225,3 +225,34 @@ def test_verdicts():
 def test_what_could_not_be_observed_is_not_met():
     assert not judge(Bound("r", "x.y", "max", 1.0), nan, 0).met
     assert not judge(Bound("r", "x.y", "min", 1.0), nan, 0).met
+
+
+def test_the_landing_at_the_end_of_a_run_is_no_landing_and_no_failure_of_the_vehicle():
+    events = [operation("come_to_rest", horizontal=8.0), operation("come_to_rest", outcome="Refused")]
+    assert isnan(observed("drone_1.landing_offset", events))
+    assert observed("drone_1.failures", events) == 0
+
+
+def noted(subject, state, kind="point"):
+    return Milestone(1 * S, "inspector", kind, subject, state, "")
+
+
+def test_what_the_application_notes_is_counted_once_for_each_subject():
+    events = [
+        noted("north", "seen"),
+        noted("north", "inspected"),
+        noted("north", "inspected"),
+        noted("south", "inspected"),
+        noted("south", "inspected", kind="pole"),
+    ]
+    assert observed("note.point.inspected", events) == 2
+    assert observed("note.point.seen", events) == 1
+    assert observed("note.pole.inspected", events) == 1
+    assert observed("note.point.in the air", events) == 0
+    assert observed("note.point.lost. twice", [noted("x", "lost. twice")]) == 1
+
+
+@pytest.mark.parametrize("expression", ["note.point", "note.", "note.point."])
+def test_a_note_needs_a_kind_and_a_state(expression):
+    with pytest.raises(UsageError):
+        make_observer(expression)

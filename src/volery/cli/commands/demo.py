@@ -203,7 +203,10 @@ def _begin_process(queue: Any, parent: int) -> None:
 
 
 class _Reports:
-    """The queue for progress and the process that reads it, set once when a process starts: a queue cannot be sent later."""
+    """The queue for progress and the process that reads it.
+
+    Both are set once when a process starts: a queue cannot be sent later.
+    """
 
     queue: Any = None
     parent = 0

@@ -112,12 +112,12 @@ def schema(output: Output) -> int:
 @commands.add("json")
 def observables(output: Output) -> int:
     """List the observables that a requirement may bound."""
-    from volery.requirements.observables import OBSERVABLES
+    from volery.requirements.observables import NOTED, OBSERVABLES
 
     listed = make_table("observe", "unit", "meaning")
-    for one in OBSERVABLES:
-        subject = "application" if one.subject == "application" else f"<{one.subject}>"
+    for one in (*OBSERVABLES, NOTED):
+        subject = one.subject if one.subject in ("application", NOTED.subject) else f"<{one.subject}>"
         listed.add_row(f"{subject}.{one.quantity}", one.unit or "-", one.description)
     output.show(listed)
-    output.give([asdict(one) for one in OBSERVABLES])
+    output.give([asdict(one) for one in (*OBSERVABLES, NOTED)])
     return OK
