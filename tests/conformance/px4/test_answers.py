@@ -275,6 +275,64 @@ def test_a_reposition_beyond_the_geofence_is_accepted_and_not_flown(bench: Any) 
     assert rig.ned[0] > 20.0
 
 
+def upload(rig: Any, kind: int, items: list[dict[str, Any]]) -> int:
+    """Upload a list of points, and return the MAV_MISSION_RESULT."""
+    rig.send("MISSION_COUNT", target_system=1, target_component=1, count=len(items), mission_type=kind)
+    for sequence, item in enumerate(items):
+        rig.run(0.05)
+        rig.send(
+            "MISSION_ITEM_INT",
+            **{
+                "target_system": 1,
+                "target_component": 1,
+                "seq": sequence,
+                "frame": 5,
+                "current": 0,
+                "autocontinue": 1,
+                "param1": 0.0,
+                "param2": 0.0,
+                "param3": 0.0,
+                "param4": 0.0,
+                "z": 0.0,
+                "mission_type": kind,
+                **item,
+            },
+        )
+    rig.run(0.1)
+    result: int = rig.latest["MISSION_ACK"]["type"]
+    return result
+
+
+def test_a_fence_is_stored_and_a_reposition_beyond_it_is_not_flown(bench: Any) -> None:
+    """Observed: the upload of a fence is accepted, where the simulated one refused it."""
+    rig = bench()
+    rig.airborne()
+    latitude, longitude, amsl = rig.vehicle.estimate.geodetic
+    corners = [(-3e-4, -3e-4), (3e-4, -3e-4), (3e-4, 3e-4), (-3e-4, 3e-4)]
+    polygon = [
+        {
+            "command": 5001,
+            "param1": 4.0,
+            "x": round((latitude + north) * 1e7),
+            "y": round((longitude + east) * 1e7),
+        }
+        for north, east in corners
+    ]
+    assert upload(rig, 1, polygon) == 0
+    assert upload(rig, 2, [{"command": 5100, "x": polygon[0]["x"], "y": polygon[0]["y"], "z": 50.0}]) == 0
+    assert upload(rig, 1, [{"command": 16, "x": 0, "y": 0}]) != 0
+    rig.send("MISSION_REQUEST_LIST", target_system=1, target_component=1, mission_type=1)
+    rig.run(0.1)
+    assert (rig.latest["MISSION_COUNT"]["count"], rig.latest["MISSION_COUNT"]["mission_type"]) == (4, 1)
+    there = {"y": round(longitude * 1e7), "z": amsl, "param4": nan}
+    for north, flown in ((6e-4, False), (2e-4, True)):
+        target = round((latitude + north) * 1e7)
+        assert rig.command_int(192, param1=-1, param2=1, x=target, **there) == ACCEPTED
+        rig.run(9.0)
+        assert (rig.ned[0] > 15.0) == flown
+    assert "Reposition is outside geofence\t" in rig.texts()
+
+
 def test_a_required_mission_refuses_arming_and_says_so_in_an_event(bench: Any) -> None:
     """Observed with COM_ARM_MIS_REQ 1: the check is only of level Info, names all modes, and blocks."""
     rig = bench(parameters={"COM_ARM_MIS_REQ": 1}, warm=False)

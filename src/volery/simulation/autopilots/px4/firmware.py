@@ -24,7 +24,7 @@ from volery.simulation.autopilots.mavlink.firmware import (
     StatusTextPolicy,
     TelemetryPolicy,
 )
-from volery.simulation.autopilots.px4 import mission, telemetry
+from volery.simulation.autopilots.px4 import geofence, mission, telemetry
 from volery.simulation.autopilots.px4.commands import DO_SET_MODE, MESSAGE_HANDLERS, set_mode
 from volery.simulation.autopilots.px4.modes import LOITER, READY_AFTER, Commander, commander_of
 from volery.simulation.autopilots.vehicle_state import (
@@ -220,6 +220,7 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
                 mission.request_message, received="", falls_back_to_int=True, keeps_old=True
             ),
             stored_item=mission.stored_item,
+            stored_point=geofence.stored_point,
         ),
         parameters=PARAMETERS,
         texts=TEXTS,
