@@ -54,10 +54,10 @@ def next_release(counted_from: Ns, period: Ns, now: Ns) -> tuple[Ns, Ns]:
 def read_clock(kernel: Kernel) -> Ns:
     """Return the time for component code, ns. An interaction point.
 
-    A loop that times itself reads the clock once a cycle to find out how long to sleep, and does not sleep when
-    it is late. So when a task with a period or a deadline reads the clock twice at one place without having
-    waited, and was late at the first reading, then its activation ended at the first reading and the next one
-    began, which was due a period after its predecessor.
+    A loop that times itself reads the clock once a cycle to find out how long to sleep, and does not sleep
+    when it is late. So when a task with a period or a deadline reads the clock twice at one place without
+    having waited, and was late at the first reading, then its activation ended at the first reading and the
+    next one began, which was due a period after its predecessor.
     """
     with kernel:
         now, task = kernel.now(), kernel.current()

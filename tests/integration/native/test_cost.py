@@ -208,3 +208,95 @@ def test_caches_cost_cycles_and_memory_costs_time(tmp_path):
     assert behind.seconds(1500.0) / 20000 == pytest.approx(law.memory.latency_ns * 1e-9, rel=0.05)
     assert behind.seconds(600.0) < 1.3 * behind.seconds(1500.0) < first.seconds(600.0) * 100
     assert first.seconds(600.0) == pytest.approx(2.5 * first.seconds(1500.0))
+
+
+ASSEMBLY = r"""
+#include <cstdint>
+static volatile std::uint64_t kept;
+static inline std::uint64_t rotl(std::uint64_t x) {
+#ifdef __x86_64__
+    __asm__("rolq $7, %0" : "+r"(x));
+    return x;
+#elif defined(__aarch64__)
+    __asm__("ror %0, %0, #57" : "+r"(x));
+    return x;
+#else
+    return x << 7 | x >> 57;
+#endif
+}
+void work(int n) { std::uint64_t s = 1; for (int i = 0; i < n; ++i) s = rotl(s + i); kept = s; }
+"""
+
+DISTANCE_HEADER = r"""
+#pragma once
+#include <cstdint>
+#if defined(__SSE2__) && \
+    !defined(NO_SSE)
+#include <emmintrin.h>
+inline int sad(const std::uint8_t *a, const std::uint8_t *b) {
+    __m128i d = _mm_sad_epu8(_mm_loadu_si128((const __m128i *)a), _mm_loadu_si128((const __m128i *)b));
+    return _mm_cvtsi128_si32(d) + _mm_extract_epi16(d, 4);
+}
+#elif defined(__ARM_NEON)
+#include <arm_neon.h>
+#error never
+#else
+inline int sad(const std::uint8_t *a, const std::uint8_t *b) {
+    int s = 0;
+    for (int i = 0; i < 16; ++i) s += a[i] > b[i] ? a[i] - b[i] : b[i] - a[i];
+    return s;
+}
+#endif
+"""
+
+DISTANCE = r"""
+#include "sad.h"
+static std::uint8_t a[4096], b[4096]; static volatile int kept;
+void work(int n) {
+    int s = 0;
+    for (int k = 0; k < n; ++k)
+        for (int i = 0; i < 4096; i += 16)
+            s += sad(a + i, b + i);
+    kept = s;
+}
+"""
+
+UNGUARDED = r"""#include <emmintrin.h>
+static unsigned char a[16]; static volatile int kept;
+void work(int n) {
+    __m128i d = _mm_loadu_si128((const __m128i *)a);
+    for (int i = 0; i < n; ++i)
+        d = _mm_sad_epu8(d, d);
+    kept = _mm_cvtsi128_si32(d);
+}
+"""
+
+
+def test_code_behind_macros_of_this_machine_takes_the_portable_branch(tmp_path):
+    """Inline assembly, an intrinsic in a header, and the same without them cost the same on the target."""
+    law = load_catalogue().processor("rpi4-cortex-a72").core_law()
+    files = {"sad.h": DISTANCE_HEADER, "assembly.cpp": ASSEMBLY, "distance.cpp": DISTANCE}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    for name in ("assembly.cpp", "distance.cpp"):
+        text = (tmp_path / name).read_text(encoding="utf-8")
+        plain = tmp_path / f"plain_{name}"
+        plain.write_text(text.replace("__x86_64__", "NO").replace("__aarch64__", "NO"), encoding="utf-8")
+        shown = estimate_program(compile_program([tmp_path / name], law), Invocation("work(100)"))
+        bare = estimate_program(compile_program([plain], law, ["-DNO_SSE"]), Invocation("work(100)"))
+        assert shown.instructions == bare.instructions > 0
+        assert not any("asm" in one or "psad" in one for one in shown.library_calls)
+
+
+def test_on_this_machine_its_own_branch_is_compiled(tmp_path):
+    file = tmp_path / "assembly.cpp"
+    file.write_text(ASSEMBLY, encoding="utf-8")
+    assert "rolq" in compile_program([file], load_catalogue().processor("intel-i5-3470").core_law()).text
+
+
+def test_code_of_one_instruction_set_without_a_macro_is_an_error_with_line_and_remedy(tmp_path):
+    file = tmp_path / "unguarded.cpp"
+    file.write_text(UNGUARDED, encoding="utf-8")
+    law = load_catalogue().processor("rpi4-cortex-a72").core_law()
+    with pytest.raises(CompilerError, match=r"unguarded.cpp:6: the intrinsic _mm_sad_epu8 .*#else"):
+        compile_program([file], law)

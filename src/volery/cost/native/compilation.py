@@ -19,6 +19,7 @@ from volery.base.errors import UsageError
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native.llvm_ir import BasicBlock, basic_blocks, retarget, with_counters, with_trace_calls
 from volery.cost.native.machine_code import MachineBlock, machine_blocks
+from volery.cost.native.target_macros import HOST_ISA, SHOWN, foreign_code, overlay_options, without_hints
 
 VERSIONS = ("-19", "-18", "-17", "")
 """Suffixes of LLVM's programs in the order of preference; Debian 12 and the tests use 19."""
@@ -183,18 +184,7 @@ def compile_program(sources: Sequence[Path], law: CoreLaw, flags: Sequence[str] 
     with TemporaryDirectory(prefix="volery-native-") as folder:
         modules = []
         for number, source in enumerate(sources):
-            plain = run_tool(
-                [
-                    tools.clang,
-                    "-x",
-                    "c" if source.suffix in C_SUFFIXES else "c++",
-                    *FRONT_END_OPTIONS,
-                    *flags,
-                    str(source),
-                    "-o",
-                    "-",
-                ]
-            )
+            plain = _front_end(source, law.isa, flags, Path(folder, str(number)))
             module = Path(folder, f"{number}.ll")
             retargeted = retarget(plain, *TARGETS[law.isa])
             run_tool(
@@ -203,3 +193,45 @@ def compile_program(sources: Sequence[Path], law: CoreLaw, flags: Sequence[str] 
             modules.append(str(module))
         text = run_tool([tools.link, "-S", "-o", "-", *modules])
     return Program(text, law, tuple(basic_blocks(text)))
+
+
+def _front_end(source: Path, isa: str, flags: Sequence[str], folder: Path) -> str:
+    """Return the intermediate code of a source before any optimisation.
+
+    Code for another instruction set is first compiled as code for it, then as code for neither.
+
+    Raises:
+        CompilerError: The source does not compile, or a part of it is of one instruction set only.
+    """
+    language = "c" if source.suffix in C_SUFFIXES else "c++"
+    command = [llvm_toolchain().clang, "-x", language, *flags]
+
+    def compiled(*options: str) -> str:
+        return run_tool([*command, *FRONT_END_OPTIONS, *options, str(source), "-o", "-"])
+
+    if isa == HOST_ISA:
+        return compiled()
+
+    def included(options: Sequence[str]) -> str:
+        try:
+            return run_tool([*command, "-MM", *options, str(source)])
+        except CompilerError:  # it is reported by the compilation itself
+            return ""
+
+    copies = overlay_options(source, isa, folder, included)
+    try:
+        text = without_hints(compiled(*copies, f"-D{SHOWN[isa]}=1"))
+        if not foreign_code(text):
+            return text
+    except CompilerError:
+        pass
+    text = without_hints(compiled(*copies))
+    foreign = foreign_code(text)
+    if foreign:
+        raise CompilerError(
+            f"{foreign} is of one instruction set, and the code has to run on this machine ({HOST_ISA}) and "
+            f"to be compiled for {isa}: put it behind a macro of its instruction set, such as __x86_64__ or "
+            "__SSE2__, with a portable branch beside it (#else), or switch it off with the library's "
+            "own macro (--flag -D...)"
+        )
+    return text
