@@ -30,8 +30,8 @@ HUNG_AFTER: Ns = 30 * MINUTE
 
 THROTTLE, MODE_SWITCH = 2, 4
 """RC channels of a transmitter, from 0."""
-SWITCH_AWAY, THROTTLE_DOWN = 1000, 1100
-"""Pulses, us: mode switch to a mode without program control, throttle nearly down."""
+BOTH_ENDS, THROTTLE_DOWN = 3000, 1100
+"""Pulses, us: sum of both ends of the mode switch, of which one is program control; throttle nearly down."""
 
 AWAY_DEG = 0.0005
 """Distance of the neighbour east of the vehicle, degrees of longitude: about 40 m."""
@@ -43,10 +43,11 @@ class SafetyPilot(Commander):
     def __init__(self, kernel: VirtualKernel, driver: Driver, autopilot: Autopilot) -> None:
         super().__init__(kernel, driver, protocol="a graph")
         self._channels = autopilot.vehicle.rc.transmitter
+        self._away = BOTH_ENDS - self._channels[MODE_SWITCH]
 
     def land(self) -> None:
         """Land by RC channels."""
-        self._channels[MODE_SWITCH] = SWITCH_AWAY
+        self._channels[MODE_SWITCH] = self._away
         self._channels[THROTTLE] = THROTTLE_DOWN
 
     def sender_to(self, place: Position) -> Callable[[], None]:

@@ -44,7 +44,7 @@ def mission(stage: Stage) -> None:
 def mission_that_returns(stage: Stage) -> None:
     """Check that a mission that ends with a return home ends there, disarmed."""
     stage.drone.wait_ready()
-    stage.drone.upload_mission([TakeOff(10), Waypoint(stage.at(15, 0)), ReturnHome()])
+    stage.drone.upload_mission([TakeOff(10), Waypoint(stage.at(25, 0)), ReturnHome()])
     home = stage.drone.home
     stage.drone.start_mission(within=300)
     demand(not stage.drone.armed, "it is armed")

@@ -143,8 +143,11 @@ def test_in_the_air_it_is_not_disarmed_unless_by_force(ready: Any) -> None:
     ready.take_off(3.0)
     assert ready.command("cmd/arming", "CommandBool", value=False) == (False, 2)
     assert "it flies, and would fall" in ready.texts[-1]
-    assert ready.command("cmd/command", "CommandLong", command=400, param2=21196.0)[0]
-    assert not ready.driver.telemetry.armed
+    stopped = ready.command("cmd/command", "CommandLong", command=400, param2=21196.0)[0]
+    # node 3.8 of DJI stops no motors in the air, and says so
+    assert stopped == (kind_of(ready) != "dji")
+    assert ready.driver.telemetry.armed != stopped
+    assert stopped or "only the pilot can" in ready.texts[-1]
 
 
 def test_a_command_that_is_overtaken_is_cancelled(flown: Any) -> None:
