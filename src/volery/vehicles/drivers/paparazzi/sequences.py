@@ -75,7 +75,6 @@ RESCUE = "land() again once it has a fix, or fly it by hand"
 WATCH_PERIOD: Ns = 250 * MS
 STANDING_M_S = 0.1
 STANDING_FOR: Ns = S
-STANDING_UNWEIGHED_FOR: Ns = 3 * S
 CARRIED = 0.85
 """Share of the thrust of a steady descent below which a vehicle that does not move stands on the ground."""
 
@@ -535,7 +534,7 @@ class _TouchDown:
 
     def __init__(self, steps: PaparazziSteps) -> None:
         self._steps = steps
-        self._sinking_thrust = -1  # before it sinks
+        self._sinking_thrust = 0  # unknown before it sinks
         self._standing_since: Ns | None = None
 
     def watch(self) -> None:
@@ -544,15 +543,14 @@ class _TouchDown:
         up = self._steps.telemetry.velocity.up
         if up <= -SINKING_M_S / 2:
             self._sinking_thrust = decoder.thrust
-        standing = self._sinking_thrust >= 0 and abs(up) <= STANDING_M_S and not decoder.is_old()
+        standing = self._sinking_thrust > 0 and abs(up) <= STANDING_M_S and not decoder.is_old()
         if not standing:
             self._standing_since = None
             return
         if self._standing_since is None:
             self._standing_since = now
-        needed = STANDING_FOR if self._sinking_thrust > 0 else STANDING_UNWEIGHED_FOR
         carried = decoder.thrust <= CARRIED * self._sinking_thrust
-        if carried and now - self._standing_since >= needed:
+        if carried and now - self._standing_since >= STANDING_FOR:
             self._steps.backend.set_motors(False)
 
 
