@@ -145,6 +145,7 @@ class StepExecutor:
         if not telemetry.flying:
             telemetry.stream_lost = ""
             return
+        ours = self.is_ours()  # lets the driver notice a stream that has ended
         if telemetry.stream_lost:
             self.release_control()
             raise Failsafe(
@@ -153,7 +154,7 @@ class StepExecutor:
                 f"{telemetry.stream_lost}: the autopilot is in {telemetry.mode} (status {telemetry.status})"
                 f"{self.last_text()}; resume() takes the vehicle back, land() lands it",
             )
-        if self.is_ours():
+        if ours:
             return
         self.release_control()
         cause = failsafe_cause(telemetry, self._kernel.now())

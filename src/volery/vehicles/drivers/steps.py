@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import hypot, inf, isnan
 
-from volery.base.errors import UsageError
+from volery.base.errors import Refused, UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MINUTE, MS, Ns, S
@@ -41,6 +41,8 @@ SAME_TARGET_M = 0.5
 """Targets nearer to each other than this are the same."""
 OTHER_TARGET_FOR: Ns = S
 """Time for which another target must be reported: an unreliable link may deliver an old message late."""
+TAKEN_UP_WITHIN: Ns = 8 * S
+"""Time for which a vehicle may stand still before a target that it does not report."""
 CHECK_PERIOD: Ns = 100 * MS
 
 
@@ -211,8 +213,36 @@ class TargetMonitor:
         self._other_since = None
         self._telemetry.target = None
 
-    def step(self, goal: Position, send: Action, mode: str, within: Ns, *, rover: bool = False) -> Step:
-        """Return a step that goes to *goal* in *mode*; *send* is repeated until the target is reported."""
+    def step(
+        self,
+        goal: Position,
+        send: Action,
+        mode: str,
+        within: Ns,
+        *,
+        rover: bool = False,
+        kernel: Kernel | None = None,
+    ) -> Step:
+        """Return a step that goes to *goal* in *mode*; *send* is repeated until the target is reported.
+
+        With a *kernel* the step ends with ``Refused`` when the target is not taken up.
+        """
+        still_since: Ns | None = None
+
+        def ignored() -> str:
+            nonlocal still_since
+            seen = self._telemetry
+            if kernel is None or self.confirmed or self._goal is None:
+                return ""
+            now = kernel.now()
+            if still_since is None or not at_rest(seen) or not seen.located:
+                still_since = now
+            if now - still_since < TAKEN_UP_WITHIN or arrived_at(goal, rover)(seen):
+                return ""
+            return (
+                f"the autopilot does not take up the target: it stands still "
+                f"{horizontal_distance(seen.position, goal):.0f} m from it; its own fence may exclude it"
+            )
 
         def send_unless_confirmed() -> None:
             if self._goal is None or not self.confirmed:
@@ -228,6 +258,8 @@ class TargetMonitor:
             mode=mode,
             armed=True,
             lost=self.lost,
+            fails=ignored,
+            failure=Refused,
         )
 
     def lost(self) -> str:

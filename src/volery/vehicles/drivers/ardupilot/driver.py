@@ -94,7 +94,7 @@ class ArduPilot(MavlinkDriver):
             self._backend.request_target()
 
         monitor = TargetMonitor(self.telemetry, self._takeover)
-        reach = monitor.step(goal, send, GUIDED, within, rover=rover)
+        reach = monitor.step(goal, send, GUIDED, within, rover=rover, kernel=self._kernel)
         if speed is None:
             return (*start, reach)
         return (*start, self._set_speed(speed, GUIDED), reach)

@@ -23,7 +23,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import isfinite, nan
 
-from volery.base.errors import UsageError, VehicleError
+from volery.base.errors import Refused, UsageError, VehicleError
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.base.time import MINUTE, MS, Ns, S
 from volery.kernel.api import Kernel
@@ -71,6 +71,9 @@ TAKEOFF_SHORT_M = 1.5
 LEVELLED_WITHIN: Ns = MINUTE
 REPEATED_FOR: Ns = 1500 * MS
 """MISSION_ITEM_REACHED was repeated eleven times, for a second."""
+
+OUTSIDE = "outside geofence"
+"""Words of the text with which PX4 refuses a target beyond its own geofence, although it acknowledges it."""
 
 NO_PLACE = constant("MAV_FRAME_MISSION")
 WAYPOINT_RADIUS_M = 2.0
@@ -172,9 +175,15 @@ class PX4(MavlinkDriver):
         rover = self.telemetry.kind == ROVER_KIND
         monitor = TargetMonitor(self.telemetry, self._takeover)
 
+        began = self._kernel.now()
+
         def send() -> None:
             monitor.set(self._reposition(goal()))
             self._backend.request_target()
+
+        def refused() -> str:
+            said = [text for text in self.telemetry.texts_since(began) if OUTSIDE in text.lower()]
+            return f"the autopilot refused to {ask}: {said[-1]}" if said else ""
 
         return Step(
             ask=ask,
@@ -186,6 +195,8 @@ class PX4(MavlinkDriver):
             enters=HOLD,
             armed=True,
             lost=monitor.lost,
+            fails=refused,
+            failure=Refused,
         )
 
     def _reposition(self, goal: Position) -> Position:

@@ -38,7 +38,7 @@ class OffboardStream:
     The stream ends as soon as another mode is seen. PX4 returns to OFFBOARD by itself when a missing stream
     resumes (observed even from RTL and LAND), so a stream that continued after a takeover would take the
     aircraft back. For the same reason the stream pauses while nothing is received from the autopilot, until a
-    heartbeat reports that the mode is still OFFBOARD.
+    heartbeat reports that the mode is still OFFBOARD, and likewise after this program has been frozen.
     """
 
     def __init__(self, kernel: Kernel, backend: PX4Backend, takeover: Takeover) -> None:
@@ -52,7 +52,9 @@ class OffboardStream:
         self._commanded_at: Ns | None = None  # when OFFBOARD was commanded
         self._hold_commanded_at: Ns = 0
         self._streaming = self._entered = self._leaving = False
-        self._in_doubt_at: Ns = -1  # when the link was silent last
+        self._in_doubt_at: Ns = -1  # when the link was silent last, or this program
+        self._doubted = False  # no younger heartbeat has reported OFFBOARD
+        self._ticked_at: Ns = 0
         self._timer: Handle | None = None
 
     def check(self) -> None:
@@ -95,7 +97,9 @@ class OffboardStream:
             self._commanded_at = None
         self._leaving = False
         self._streaming = True
-        self._backend.send_setpoint(setpoint)
+        self._note_gap(now)
+        if not self._is_in_doubt():
+            self._backend.send_setpoint(setpoint)
         if self._timer is None and self._backend.cycle is None:
             self._in_doubt_at = -1
             self._timer = self._kernel.every(SETPOINT_PERIOD, self._tick)
@@ -109,8 +113,29 @@ class OffboardStream:
         """Note that another mode is being commanded; the stream goes on until that mode is seen."""
         self._leaving = True
 
+    def _note_gap(self, now: Ns) -> None:
+        """Doubt OFFBOARD after a gap in the stream: this program was frozen, or its computer.
+
+        What arrives within a second after it may be older than the gap.
+        """
+        timed = self._backend.cycle is None
+        if timed and self._entered and now - self._ticked_at > LINK_IN_DOUBT_AFTER:
+            self._in_doubt_at, self._doubted = now + S, True
+        self._ticked_at = now
+
+    def _is_in_doubt(self) -> bool:
+        return self._entered and self._backend.last_heartbeat_ns <= self._in_doubt_at
+
+    def _note_if_lost(self) -> None:
+        """Note a failsafe that an interruption of the stream has caused."""
+        seen = self._telemetry
+        if self._entered and self._doubted and seen.failsafe and seen.mode != OFFBOARD:
+            seen.stream_lost = "the stream of set-points was interrupted"
+
     def stop(self) -> None:
         """Stop the stream."""
+        self._note_if_lost()
+        self._doubted = False
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
@@ -118,6 +143,7 @@ class OffboardStream:
 
     def _tick(self) -> None:
         now = self._kernel.now()
+        self._note_gap(now)
         if not self.entered():
             if now - self._began > ENTERED_WITHIN:
                 self.stop()
@@ -126,9 +152,10 @@ class OffboardStream:
             self._end()
             return
         if now - self._telemetry.last_message_ns > LINK_IN_DOUBT_AFTER:
-            self._in_doubt_at = now
-        if self._entered and self._backend.last_heartbeat_ns <= self._in_doubt_at:
+            self._in_doubt_at, self._doubted = now, True
+        if self._is_in_doubt():
             return
+        self._doubted = False
         if self._until is not None and now >= self._until:
             self._command_hold(now)
         self._backend.send_setpoint(self._setpoint)

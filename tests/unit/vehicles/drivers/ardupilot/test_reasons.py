@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from volery.base.errors import Refused
+from volery.base.position import AboveHome, Position
 from volery.base.time import S
 
 Make = Callable[..., Any]
@@ -45,3 +46,18 @@ def test_a_take_off_waits_for_what_passes(bench: Make, text: str) -> None:
     at.after(30, lambda: setattr(at.craft, "health", 0x10000000))
     at.fly(lambda drone: drone.takeoff(10))
     assert at.craft.armed
+
+
+def test_a_target_that_is_not_taken_up_is_refused_in_seconds(bench: Make) -> None:
+    at = bench()
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        at.autopilot.take = lambda name, fields: None  # beyond its own fence: ignored without a word
+        here = drone.position
+        began = at.kernel.now()
+        with pytest.raises(Refused, match="does not take up the target: it stands still 333 m from it"):
+            drone.goto(Position(here.latitude + 0.003, here.longitude, AboveHome(10)))
+        assert at.kernel.now() - began < 10 * S
+
+    at.fly(mission)

@@ -305,7 +305,5 @@ def test_a_mode_of_sticks_is_asked_for_when_px4_has_taken_them_in() -> None:
         drone.land()
 
     field.fly(by_sticks)
-    refused = [
-        event for event in field.events if isinstance(event, Text) and "not available" in event.text
-    ]
+    refused = [event for event in field.events if isinstance(event, Text) and "not available" in event.text]
     assert refused == []
