@@ -28,6 +28,9 @@ from volery.run.simulate import simulate
 TOLERANCE = 0.15
 """Allowed relative error of an estimate, unless the measured runs differ by more."""
 
+MAX_SPREAD = 0.3
+"""Greatest half of the inter-quartile range, relative to the measured time, by which an estimate is judged."""
+
 
 @dataclass(frozen=True)
 class NodeEstimate:
@@ -73,12 +76,22 @@ class NodeComparison:
     @property
     def allowed(self) -> float:
         """The greater of ``TOLERANCE`` and half the spread, relative to the measured time."""
-        return max(TOLERANCE, self.spread_s / 2.0 / self.measured_s)
+        return max(TOLERANCE, self.half_spread)
+
+    @property
+    def half_spread(self) -> float:
+        """Half the inter-quartile range of the runs, relative to the measured time."""
+        return self.spread_s / 2.0 / self.measured_s
+
+    @property
+    def is_conclusive(self) -> bool:
+        """Whether the runs agree well enough to judge an estimate by them."""
+        return self.half_spread <= MAX_SPREAD
 
     @property
     def holds(self) -> bool:
-        """Whether the estimate is within the allowed error."""
-        return abs(self.difference) <= self.allowed
+        """Whether the runs are conclusive and the estimate is within the allowed error."""
+        return self.is_conclusive and abs(self.difference) <= self.allowed
 
     # -- Table IV
 
@@ -117,6 +130,7 @@ class NodeComparison:
             "spread_s": self.spread_s,
             "difference": self.difference,
             "allowed": self.allowed,
+            "conclusive": self.is_conclusive,
             "holds": self.holds,
             "ros_share": self.ros_share,
             "impact_of_ros_error": self.impact,

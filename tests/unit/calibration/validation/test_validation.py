@@ -10,6 +10,7 @@ from volery.base.time import S
 from volery.calibration.validation.meters.rospy import imported
 from volery.calibration.validation.node_comparison import NodeComparison, NodeEstimate, compare, compare_nodes
 from volery.calibration.validation.node_processes import node_programs, process_cpu
+from volery.cli.commands.validate import _verdict
 from volery.model.system_loader import load
 from volery.run.assembly.vocabulary import vocabulary
 
@@ -72,6 +73,23 @@ def test_a_node_in_the_tables() -> None:
     assert NODE.ros_share == pytest.approx(0.9)
     assert NODE.ros_error == pytest.approx(0.02 / 0.09)
     assert NODE.impact == pytest.approx(0.9 * 0.02 / 0.09)
+
+
+@pytest.mark.parametrize("runs_s", [(0.02, 0.03, 0.12, 0.3, 0.6), (0.0001, 0.12, 0.5)])
+def test_no_estimate_holds_against_runs_that_differ_by_more_than_thirty_per_cent(
+    runs_s: tuple[float, ...],
+) -> None:
+    noisy = replace(NODE, runs_s=runs_s)
+    assert abs(noisy.difference) < 0.01
+    assert noisy.half_spread > 0.3
+    assert (noisy.is_conclusive, noisy.holds) == (False, False)
+    assert _verdict(noisy).plain == "too noisy"
+    assert noisy.as_data()["conclusive"] is False
+
+
+def test_an_estimate_holds_or_is_too_far_against_runs_that_agree() -> None:
+    assert _verdict(NODE).plain == "too far"
+    assert _verdict(replace(NODE, runs_s=(0.115, 0.12, 0.125))).plain == "holds"
 
 
 def test_runs_that_differ_allow_more() -> None:
