@@ -29,7 +29,7 @@ TOLERANCE = 0.15
 """Allowed relative error of an estimate, unless the measured runs differ by more."""
 
 MAX_SPREAD = 0.3
-"""Greatest half of the inter-quartile range, relative to the measured time, by which an estimate is judged."""
+"""Greatest half of the inter-quartile range, relative to the measured time, that judges an estimate."""
 
 
 @dataclass(frozen=True)
