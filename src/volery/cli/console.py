@@ -7,8 +7,61 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rich import box
-from rich.console import Console, RenderableType
+from rich.console import (
+    Console,
+    ConsoleOptions,
+    ConsoleRenderable,
+    RenderableType,
+    RenderHook,
+    RenderResult,
+)
+from rich.measure import Measurement
+from rich.segment import Segment
 from rich.table import Column, Table
+
+_CONTROLS = {
+    number: f"\\x{number:02x}" for number in (*range(0x20), *range(0x7F, 0xA0)) if chr(number) not in "\n\t"
+} | {
+    number: f"\\u{number:04x}" for number in (0x200E, 0x200F, *range(0x202A, 0x202F), *range(0x2066, 0x206A))
+}
+"""Control characters, and those that change the direction of text, as they are printed."""
+LONGEST_ERROR = 20_000
+"""Characters of an error that are printed."""
+
+
+def printable(text: str) -> str:
+    r"""Return *text* with control characters written out: ``\x1b``."""
+    return text.translate(_CONTROLS)
+
+
+class _Printable:
+    """A renderable whose text has no control characters. The terminal's own controls are kept."""
+
+    def __init__(self, inner: ConsoleRenderable) -> None:
+        self._inner = inner
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        for segment in console.render(self._inner, options):
+            if segment.control is None:
+                yield Segment(printable(segment.text), segment.style)
+            else:
+                yield segment
+
+    def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
+        return Measurement.get(console, options, self._inner)
+
+
+class _PrintableOnly(RenderHook):
+    """Names and texts of models, vehicles and recordings reach the terminal without control characters."""
+
+    def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
+        return [_Printable(one) for one in renderables]
+
+
+def _console(*, stderr: bool = False) -> Console:
+    made = Console(stderr=stderr)
+    made.push_render_hook(_PrintableOnly())
+    return made
 
 
 def make_table(*headings: Column | str, title: str | None = None, show_header: bool = True) -> Table:
@@ -36,8 +89,8 @@ class Output:
     quiet: bool = False
     json: bool = False
     debug: bool = False
-    results: Console = field(default_factory=Console)
-    notes: Console = field(default_factory=lambda: Console(stderr=True))
+    results: Console = field(default_factory=_console)
+    notes: Console = field(default_factory=lambda: _console(stderr=True))
 
     @property
     def shows_progress(self) -> bool:
@@ -56,7 +109,9 @@ class Output:
             self.notes.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def complain(self, text: str) -> None:
-        """Print an error on standard error in any case."""
+        """Print an error on standard error in any case; only the beginning of a very long one."""
+        if len(text) > LONGEST_ERROR:
+            text = f"{text[:LONGEST_ERROR]} ... ({len(text) - LONGEST_ERROR} more characters)"
         self.notes.print(text, markup=False, highlight=False, soft_wrap=True, style="red")
 
     def give(self, data: Any) -> None:

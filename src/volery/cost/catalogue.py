@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from volery.base.errors import EstimateError, ModelError, choices, did_you_mean
 from volery.base.extras import require_extra
+from volery.base.files import read_text
 from volery.cost.code_laws import CodeLaw, CoreLaw, check_range
 from volery.cost.figures import PowerLaw, WithProvenance
 from volery.cost.ros_law import RosLaw
@@ -148,7 +149,7 @@ def parse_catalogue(text: str, name: str = "catalogue") -> Catalogue:
 def read_catalogue(file: Path) -> Catalogue:
     """Read a user's catalogue; raise ``ModelError`` if it is missing or wrong."""
     try:
-        text = file.read_text(encoding="utf-8")
+        text = read_text(file)
     except (OSError, UnicodeDecodeError) as error:
         raise ModelError(f"{file}: this catalogue cannot be read: {error}") from error
     return parse_catalogue(text, str(file))

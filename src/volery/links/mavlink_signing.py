@@ -1,9 +1,9 @@
 """MAVLink 2 signing: frames that only owners of a key can make.
 
-Source: https://mavlink.io/en/guide/message_signing.html. pymavlink computes and checks the signatures. A signed link sends signed frames only, and receives nothing else
-but RADIO_STATUS, which the radio at this end sends and cannot sign. A frame is refused if its signature is
-wrong or if its time is not later than that of the frame before it (a replay). Signing authenticates; it does
-not encrypt.
+pymavlink computes and checks the signatures. A signed link sends signed frames only, and receives nothing
+else but RADIO_STATUS, which the radio at this end sends and cannot sign. A frame is refused if its signature
+is wrong or if its time is not later than that of the frame before it (a replay). Signing authenticates; it
+does not encrypt. Source: https://mavlink.io/en/guide/message_signing.html
 """
 
 from __future__ import annotations

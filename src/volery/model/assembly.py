@@ -11,6 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path as FilePath
 
+from volery.base import files
 from volery.base.errors import Location, ModelError, UsageError
 from volery.model.document import GEOGRAPHY, keys_at, names_are_free, short_key
 from volery.model.system import Source
@@ -159,7 +160,7 @@ def read_text(path: FilePath, name: str, where: Location | None = None, at: Path
         ModelError: the file cannot be read.
     """
     try:
-        return path.read_text(encoding="utf-8")
+        return files.read_text(path)
     except FileNotFoundError:
         what = f"there is no file {name!r}{_near(path)}"
     except IsADirectoryError:

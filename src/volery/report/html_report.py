@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import json
 import os
+from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -18,6 +20,7 @@ from rich.console import RenderableType
 
 from volery.base.errors import UsageError
 from volery.base.extras import require_extra
+from volery.base.files import write_text
 from volery.report.comparison import all_comparisons
 from volery.report.digest import Digest, Json
 from volery.report.grids import (
@@ -137,21 +140,34 @@ def write_document(material: ReportContent, folder: Path) -> Path:
     """Write ``report.html`` from gathered content and return its path."""
     path = folder / REPORT_FILE
     try:
-        path.write_text(render(material), encoding="utf-8")
+        write_text(path, render(material))
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
     return path
 
 
+SCRIPTS = ("stage", "map", "charts", "player")
+"""Scripts of a page, in the order in which they run."""
+
+
 def environment() -> Environment:
-    """Return the template environment; it escapes every value."""
-    return Environment(
+    """Return the template environment; it escapes every value, and the pages allow its own scripts only."""
+    made = Environment(
         loader=PackageLoader("volery.report"),
         autoescape=select_autoescape(default=True, default_for_string=True),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    scripts = [made.get_template(f"{name}.js").render() for name in SCRIPTS]
+    made.globals["scripts"] = [Markup(script) for script in scripts]
+    made.globals["script_hashes"] = " ".join(map(_content_hash, scripts))
+    return made
+
+
+def _content_hash(script: str) -> str:
+    """Return how a content security policy names a script that may run."""
+    return f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'"
 
 
 def render(material: ReportContent) -> str:
@@ -370,7 +386,7 @@ def write_comparison(folders: Sequence[Path], into: Path) -> Path:
     path = into / COMPARISON_FILE
     text = compare(folders, into).html
     try:
-        path.write_text(text, encoding="utf-8")
+        write_text(path, text)
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
     return path

@@ -15,6 +15,7 @@ from time import perf_counter
 
 from volery.base.errors import UsageError
 from volery.base.extras import MissingExtraError
+from volery.base.files import create_file
 from volery.base.registry import Registry
 from volery.base.time import Ns
 from volery.requirements.accounts import Accounts, Circumstances
@@ -57,7 +58,7 @@ def make_folder(out: Path) -> Path:
     try:
         out.mkdir(parents=True, exist_ok=True)
         probe = out / ".writable"
-        probe.write_bytes(b"")
+        create_file(probe).close()
         probe.unlink()
     except OSError as error:
         raise UsageError(

@@ -6,6 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from volery.base.errors import UsageError
+from volery.base.files import create_file
 
 
 class Output:
@@ -23,7 +24,7 @@ class Output:
         self.size = 0
         self.problem = ""
         try:
-            self._file = path.open("wb", buffering=0)
+            self._file = create_file(path)
         except OSError as error:
             raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
 

@@ -1,7 +1,10 @@
 """The documents of a run folder: from the trace alone, whole or cut, in one file, safe, small."""
 
+import base64
+import hashlib
 import json
 import re
+from html import unescape
 from html.parser import HTMLParser
 from io import StringIO
 from pathlib import Path
@@ -11,7 +14,15 @@ from rich.console import Console, RenderableType
 
 from volery.base.errors import UsageError
 from volery.base.time import S
-from volery.report.html_report import compare, gather, recover, render, write_comparison, write_report
+from volery.report.html_report import (
+    compare,
+    environment,
+    gather,
+    recover,
+    render,
+    write_comparison,
+    write_report,
+)
 from volery.report.terminal import comparison_table, cost_table, short_comparison, summary_table
 from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RunRecord, read_record, write_record
@@ -312,3 +323,21 @@ def test_the_band_of_power_figures_is_shown_where_energy_is(tmp_path: Path) -> N
     assert "±" not in told(None)
     in_words = "±\N{NO-BREAK SPACE}20\N{NO-BREAK SPACE}%"
     assert told(0.2).count(in_words) == 1 + len(known.processors)  # the components' heading, each processor
+
+
+def test_a_page_runs_its_own_scripts_only() -> None:
+    made = environment()
+    page = made.from_string(
+        '{% extends "page.html.j2" %}{% block body %}{% for script in scripts %}<script>{{ script }}</script>'
+        "{% endfor %}<script>alert(1)</script>{% endblock %}"
+    ).render()
+    policy = re.search(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
+    assert policy is not None
+    allowed = unescape(policy[1])
+    assert "default-src 'none'" in allowed
+    assert "'unsafe-inline'" not in allowed.split("style-src")[0]
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    known = [
+        base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() in allowed for script in scripts
+    ]
+    assert known == [True, True, True, True, False]

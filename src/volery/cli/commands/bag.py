@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, from_seconds, to_seconds
@@ -44,7 +45,7 @@ def info(output: Output, recording: Recording) -> int:
     listed = make_table("topic", "type", number_column("messages"), number_column("Hz"), title=title)
     for topic in bag.topics:
         rate = f"{topic.messages / duration:.3g}" if duration else ""
-        listed.add_row(topic.name, topic.type, str(topic.messages), rate)
+        listed.add_row(Text(topic.name), Text(topic.type), str(topic.messages), rate)
     output.show(listed)
     _note_defects(output, bag)
     return OK
@@ -86,6 +87,7 @@ def play(
             lambda played, at: show(to_seconds(at - bag.start)),
         )
         played = play_bag(node, bag, options)
+    _note_damage(output, bag)
     output.give({"played": played})
     output.show(f"played {played} messages")
     return OK
@@ -157,6 +159,7 @@ def convert(output: Output, recording: Recording, out: NewRecording, topics: Top
             show(to_seconds(recorded.at - bag.start))
     for topic, why in left_out.items():
         output.note(f"{topic} is left out: {why}")
+    _note_damage(output, bag)
     output.give({"written": written, "left_out": left_out})
     output.show(f"wrote {written} messages to {out}")
     return OK
@@ -167,6 +170,13 @@ def _note_defects(output: Output, bag: Bag) -> None:
         output.note(f"{bag.path} is truncated; only its complete part is read")
     for topic, why in bag.unreadable.items():
         output.note(f"{topic} is left out: {why}")
+    _note_damage(output, bag)
+
+
+def _note_damage(output: Output, bag: Bag) -> None:
+    """Report what reading the messages has found to be damaged."""
+    for what in bag.damage:
+        output.note(what)
 
 
 @contextmanager

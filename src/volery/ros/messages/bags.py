@@ -8,23 +8,27 @@ from __future__ import annotations
 
 import bz2
 import struct
+from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import lz4.frame
+import zstandard
 from mcap.exceptions import McapError
-from mcap.records import Channel, Schema
+from mcap.records import Channel, Chunk, Schema
 from mcap.records import Message as McapMessage
-from mcap.stream_reader import StreamReader
+from mcap.stream_reader import StreamReader, breakup_chunk
 from rosbags.interfaces import MessageDefinitionFormat
 from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag1 import ReaderError as Reader1Error
+from rosbags.rosbag1 import reader as rosbag1_reader
 from rosbags.rosbag2 import Reader as Reader2
 from rosbags.rosbag2 import ReaderError as Reader2Error
+from rosbags.rosbag2 import storage_mcap
 from rosbags.typesys import get_types_from_idl, get_types_from_msg
 from rosbags.typesys.base import TypesysError
 
@@ -40,6 +44,62 @@ _STAMP = struct.Struct("<II")
 _MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
 _LARGEST = 1 << 30
 """Length, bytes, above which a record is taken as damaged."""
+MAX_CHUNK = 256 << 20
+"""Decompressed size, bytes, above which a chunk is taken as damaged: 46 kB can hold 1.5 GB."""
+DAMAGE = (
+    Reader1Error,
+    Reader2Error,
+    McapError,
+    TypesysError,
+    zstandard.ZstdError,
+    struct.error,
+    EOFError,
+    OSError,
+    RuntimeError,
+    ArithmeticError,
+    AssertionError,
+    LookupError,
+    MemoryError,
+    TypeError,
+    ValueError,
+)
+"""What the readers of rosbags and mcap raise at damaged bytes."""
+
+
+def decompressed(compression: str, data: bytes) -> bytes:
+    """Return the content of a chunk.
+
+    Raises:
+        ValueError: The data is damaged, larger than ``MAX_CHUNK`` or compressed in an unknown way.
+    """
+    limit = MAX_CHUNK + 1
+    try:
+        match compression:
+            case "" | "none":
+                content = data
+            case "bz2":
+                content = bz2.BZ2Decompressor().decompress(data, limit)
+            case "lz4":
+                content = bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, limit))
+            case "zstd":
+                with zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK).stream_reader(data) as reader:
+                    content = reader.read(limit)
+            case _:
+                raise ValueError(f"compression {compression!r} is unknown")
+    except (OSError, RuntimeError, EOFError, zstandard.ZstdError) as error:
+        raise ValueError(f"{compression} data is damaged: {error}") from None
+    if len(content) > MAX_CHUNK:
+        raise ValueError(f"a chunk holds more than {MAX_CHUNK} bytes")
+    return content
+
+
+# rosbags decompresses without a limit; its tables of decompressors are replaced.
+storage_mcap.DECOMPRESSORS.update(
+    lz4=lambda data, size: decompressed("lz4", data), zstd=lambda data, size: decompressed("zstd", data)
+)
+rosbag1_reader.decompressors.update(
+    bz2=lambda data: decompressed("bz2", data), lz4=lambda data: decompressed("lz4", data)
+)
 
 
 class RawMessage(NamedTuple):
@@ -119,21 +179,18 @@ def _fields(header: bytes) -> dict[str, bytes]:
 def _unpacked(header: dict[str, bytes], data: bytes) -> bytes:
     """Return a chunk's content, decompressed; empty if it is damaged."""
     try:
-        compression = header.get("compression", b"none")
-        if compression == b"bz2":
-            return bz2.decompress(data)
-        return bytes(lz4.frame.decompress(data)) if compression == b"lz4" else data
-    except (OSError, RuntimeError, ValueError):
+        return decompressed(header.get("compression", b"none").decode(errors="replace"), data)
+    except ValueError:
         return b""
 
 
 def recover_mcap(path: Path) -> Iterator[RawMessage]:
-    """Yield the complete messages of an MCAP file, in the order of the file."""
+    """Yield the complete messages of an MCAP file, in the order of the file. Damaged chunks are skipped."""
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     with path.open("rb") as file:
         try:
-            for record in StreamReader(file, emit_chunks=False).records:
+            for record in _mcap_records(file):
                 if isinstance(record, Schema):
                     schemas[record.id] = record
                 elif isinstance(record, Channel):
@@ -144,8 +201,20 @@ def recover_mcap(path: Path) -> Iterator[RawMessage]:
                     name = schema.name if schema else ""
                     text = schema.data.decode(errors="replace") if schema else ""
                     yield RawMessage(record.log_time, channel.topic, name, text, record.data)
-        except (McapError, struct.error, EOFError, ValueError, RuntimeError):
+        except DAMAGE:
             return  # the file ends here or is damaged
+
+
+def _mcap_records(file: BinaryIO) -> Iterator[object]:
+    """Yield the records of an MCAP file, those of its chunks among them."""
+    for record in StreamReader(file, emit_chunks=True, record_size_limit=_LARGEST).records:
+        if not isinstance(record, Chunk):
+            yield record
+            continue
+        with suppress(*DAMAGE):
+            content = decompressed(record.compression, record.data)
+            whole = replace(record, compression="", data=content)
+            yield from breakup_chunk(whole, validate_crc=True)
 
 
 OF_THE_RUN = "/volery/"
@@ -183,6 +252,7 @@ class Bag:
         end: Time of the last message, ns.
         complete: False if the recording was cut short; its complete messages are read.
         unreadable: Reasons why messages of a topic cannot be decoded, by topic.
+        damage: What was found to be damaged while messages were read; their reader appends to it.
     """
 
     path: Path
@@ -192,6 +262,7 @@ class Bag:
     end: Ns
     complete: bool
     unreadable: dict[str, str]
+    damage: list[str] = field(default_factory=list, compare=False)
 
     @property
     def usual(self) -> list[str]:
@@ -206,17 +277,46 @@ class Bag:
         decode = from_ros1 if self.format == ROSBAG1 else from_cdr
         for raw in self._raw():
             if raw.topic in wanted:
-                with suppress(UsageError, ValueError, IndexError):  # damaged messages are skipped
-                    yield BagMessage(raw.at, raw.topic, decode(wanted[raw.topic], raw.data))
+                try:
+                    message = decode(wanted[raw.topic], raw.data)
+                except (UsageError, RecursionError, *DAMAGE):
+                    self._note(f"messages of {raw.topic} that do not fit their type are left out")
+                    continue
+                yield BagMessage(raw.at, raw.topic, message)
+
+    def _note(self, what: str) -> None:
+        if what not in self.damage:
+            self.damage.append(what)
 
     def _raw(self) -> Iterator[RawMessage]:
         if not self.complete:
-            salvaged = recover_rosbag1 if self.format == ROSBAG1 else recover_mcap
-            yield from sorted(salvaged(self.path), key=lambda raw: raw.at)
+            yield from self._salvaged()
             return
-        with _reader(self.path, self.format) as reader:
-            for connection, at, data in reader.messages():
-                yield RawMessage(at, connection.topic, connection.msgtype, "", bytes(data))
+        last, given = -1, Counter[tuple[str, bytes]]()  # of the messages at time `last`
+        try:
+            with _reader(self.path, self.format) as reader:
+                for connection, at, data in reader.messages():
+                    raw = RawMessage(at, connection.topic, connection.msgtype, "", bytes(data))
+                    if at != last:
+                        last, given = at, Counter()
+                    given[raw.topic, raw.data] += 1
+                    yield raw
+        except DAMAGE as error:
+            self._note(f"a part of {self.path} is damaged and left out: {error}")
+            for raw in self._salvaged():
+                if raw.at == last and given[raw.topic, raw.data]:
+                    given[raw.topic, raw.data] -= 1
+                elif raw.at >= last:
+                    yield raw
+
+    def _salvaged(self) -> list[RawMessage]:
+        """Return the complete messages of the undamaged chunks, in order of time."""
+        if self.format == ROSBAG2 and self.path.is_dir():
+            files = sorted(self.path.glob("*.mcap"))
+        else:
+            files = [self.path]
+        recover = recover_rosbag1 if self.format == ROSBAG1 else recover_mcap
+        return sorted((raw for file in files for raw in recover(file)), key=lambda raw: raw.at)
 
 
 def open_bag(path: Path) -> Bag:
@@ -235,7 +335,7 @@ def open_bag(path: Path) -> Bag:
         raise UsageError(f"{path}: a recording is a .bag or .mcap file, or the folder of a rosbag 2")
     try:
         return _indexed(path, kind)
-    except (Reader1Error, Reader2Error, OSError, ValueError, KeyError, AssertionError) as error:
+    except DAMAGE as error:
         if kind != ROSBAG2:
             return _salvaged(path, kind, str(error))
         inside = sorted(path.glob("*.mcap")) if path.is_dir() else []
@@ -289,5 +389,5 @@ def _learn(topic: str, name: str, text: str, unreadable: dict[str, str], *, idl:
     try:
         parsed = parse(text) if idl else parse(text, name)
         store().register({key: what for key, what in parsed.items() if key not in store().fielddefs})
-    except TypesysError as error:
+    except (RecursionError, *DAMAGE) as error:
         unreadable[topic] = f"its type {name} is not known and not defined in the recording: {error}"

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from volery.base.errors import UsageError, choices
+from volery.base.files import read_text
 from volery.base.position import AMSL, AboveHome
 from volery.vehicles import Fence, Zone
 from volery.vehicles.limits import Corner
@@ -35,7 +36,7 @@ def read_fence(path: Path) -> Fence:
             raise UsageError(
                 f"{path}: the file is larger than {_MAX_BYTES // 1_000_000} MB; simplify the outline"
             )
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except OSError as error:
         raise UsageError(f"cannot read the fence {str(path)!r}: {error.strerror or error}") from None
     except UnicodeDecodeError:

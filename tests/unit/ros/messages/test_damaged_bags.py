@@ -1,0 +1,122 @@
+"""Recordings of others: damaged, compressed beyond measure, with hostile names and definitions."""
+
+from __future__ import annotations
+
+import bz2
+from io import BytesIO
+from pathlib import Path
+from random import Random
+
+import lz4.frame
+import pytest
+import zstandard
+from mcap.writer import CompressionType, Writer
+
+from volery.base.errors import UsageError
+from volery.ros.messages import bags
+from volery.ros.messages.bags import decompressed, open_bag
+
+CHUNK = 700
+MESSAGES = 60
+WORD = "a word"
+
+
+def recorded(
+    path: Path, compression: CompressionType, definition: str = "string data\n", kind: str = "x_msgs/msg/Word"
+) -> bytes:
+    """Write an MCAP file of many small chunks and return its bytes."""
+    stream = BytesIO()
+    writer = Writer(stream, chunk_size=CHUNK, compression=compression)
+    writer.start(profile="ros2")
+    schema = writer.register_schema(kind, "ros2msg", definition.encode())
+    channel = writer.register_channel("/words", "cdr", schema)
+    text = WORD.encode() + b"\0"
+    payload = b"\0\1\0\0" + len(text).to_bytes(4, "little") + text
+    for number in range(MESSAGES):
+        writer.add_message(channel, number * 1000, payload, number * 1000)
+    writer.finish()
+    path.write_bytes(stream.getvalue())
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_a_spoiled_recording_is_salvaged_or_refused_with_its_name(
+    tmp_path: Path, compression: CompressionType
+) -> None:
+    file = tmp_path / "spoiled.mcap"
+    whole = recorded(file, compression)
+    random = Random(7)
+    counts = []
+    for _ in range(150):
+        spoiled = bytearray(whole)
+        for _ in range(random.randint(1, 3)):
+            spoiled[random.randrange(8, len(spoiled))] ^= 1 << random.randrange(8)
+        if random.random() < 0.3:
+            del spoiled[random.randrange(8, len(spoiled)) :]
+        file.write_bytes(spoiled)
+        try:
+            counts.append(len(list(open_bag(file).messages())))
+        except UsageError as error:
+            assert str(file) in str(error)  # noqa: PT017
+    assert max(counts) >= MESSAGES - 2 * CHUNK // 40
+    assert max(counts) <= MESSAGES
+
+
+@pytest.mark.parametrize("compression", [CompressionType.LZ4, CompressionType.ZSTD])
+def test_one_flipped_bit_in_a_chunk_loses_that_chunk_only_and_is_reported(
+    tmp_path: Path, compression: CompressionType
+) -> None:
+    file = tmp_path / "flipped.mcap"
+    whole = bytearray(recorded(file, compression))
+    magic = b"\x04\x22\x4d\x18" if compression == CompressionType.LZ4 else b"\x28\xb5\x2f\xfd"
+    second = whole.index(magic, whole.index(magic) + 4)
+    whole[second + 20] ^= 1
+    file.write_bytes(whole)
+    bag = open_bag(file)
+    read = list(bag.messages())
+    assert MESSAGES / 2 < len(read) < MESSAGES
+    assert [one.at for one in read] == sorted({one.at for one in read})
+    assert bag.damage or not bag.complete
+
+
+def test_the_bare_magic_is_no_recording(tmp_path: Path) -> None:
+    file = tmp_path / "bare.mcap"
+    file.write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(UsageError, match=r"bare\.mcap: nothing of it can be read"):
+        open_bag(file)
+
+
+@pytest.mark.parametrize(
+    ("kind", "compress"),
+    [("bz2", bz2.compress), ("lz4", lz4.frame.compress), ("zstd", zstandard.compress)],
+)
+def test_a_chunk_is_decompressed_up_to_a_limit(
+    monkeypatch: pytest.MonkeyPatch, kind: str, compress: type
+) -> None:
+    data = bytes(100_000)
+    assert decompressed(kind, compress(data)) == data
+    monkeypatch.setattr(bags, "MAX_CHUNK", 99_999)
+    with pytest.raises(ValueError, match="more than 99999 bytes"):
+        decompressed(kind, compress(data))
+    with pytest.raises(ValueError, match="damaged"):
+        decompressed(kind, b"no such data")
+
+
+def test_a_recording_whose_chunks_exceed_the_limit_is_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bags, "MAX_CHUNK", 100)
+    file = tmp_path / "bomb.mcap"
+    recorded(file, CompressionType.ZSTD)
+    bag = open_bag(file)
+    assert list(bag.messages()) == []
+    assert "bomb.mcap is damaged and left out" in bag.damage[0]
+
+
+def test_a_type_that_contains_itself_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "recursive.mcap"
+    definition = "x_msgs/Loop again\n" + "=" * 80 + "\nMSG: x_msgs/Loop\nx_msgs/Loop r\n"
+    recorded(file, CompressionType.NONE, definition, "x_msgs/msg/Holder")
+    bag = open_bag(file)
+    assert list(bag.messages()) == []
+    assert "/words" in str(bag.damage) or "/words" in bag.unreadable
