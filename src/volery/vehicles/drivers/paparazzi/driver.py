@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import radians
 
-from volery.base.errors import CapabilityError, LinkError, Refused
+from volery.base.errors import CapabilityError, LinkError, NotArrived, Refused
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Action, Kernel
@@ -146,7 +146,7 @@ class Paparazzi:
     def _reach(self, goal: Position, within: Ns) -> Step:
         monitor = TargetMonitor(self.telemetry, self._takeover)
         step = monitor.step(goal, lambda: self._backend.send_setpoint(self._steps.at(goal)), GUIDED, within)
-        return replace(step, fails=self._steps.decoder.lacks_position)
+        return replace(step, fails=self._steps.decoder.lacks_position, failure=NotArrived)
 
     def hold(self) -> Sequence[Step]:
         """Stop in GUIDED by a velocity of zero, then hold that position."""
