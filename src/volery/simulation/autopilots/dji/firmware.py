@@ -228,7 +228,8 @@ DOCUMENTED: Mapping[str, Source] = {
         f"after {to_seconds(RC_LOST_AFTER):g} s it goes home, or hovers if Assistant 2 is set so", GUIDES
     ),
     "no transmitter since power-on": Source(
-        f"stays within {NO_RC_RADIUS_M:g} m and {NO_RC_HEIGHT_M:g} m: missions are refused, set-points stop",
+        f"stays within {NO_RC_RADIUS_M:g} m and {NO_RC_HEIGHT_M:g} m: missions beyond are refused; "
+        "set-points, which stop there, are not limited in the simulation",
         "support (Onboard-SDK #359; ROS #169)",
     ),
     "low battery": Source("goes home after 10 s; critical: lands at once; both override the program", GUIDES),

@@ -468,6 +468,32 @@ def test_missions_that_make_no_sense_are_refused(
     assert any(why in text for text in yard.texts())
 
 
+@pytest.mark.parametrize(
+    ("parameters", "north", "up", "code"),
+    [
+        ({"RC_CONNECTED": 0}, 60.0, 10.0, 0xC7),  # far from home
+        ({"RC_CONNECTED": 0}, 40.0, 35.0, 0xC0),  # too high
+        ({"RC_CONNECTED": 0}, 40.0, 10.0, 0),
+        ({}, 31_000.0, 10.0, 0xE2),  # too long
+        ({"AIRCRAFT": 5}, 40.0, 10.0, 255),  # an M300 takes missions of another kind
+    ],
+)
+def test_a_mission_is_refused_with_the_code_of_the_aircraft(
+    apron: Make, parameters: dict[str, float], north: float, up: float, code: int
+) -> None:
+    yard = apron(parameters=parameters)
+
+    def body() -> None:
+        yard.wait(0.5)
+        yard.activate()
+        assert yard.authority()
+        task = _mission("dji_sdk", (0.0, 5.0, 6.0), (0.0, north, up))
+        response = yard.call("mission_waypoint_upload", "MissionWpUpload", waypoint_task=task)
+        assert (response.result, response.ack_data) == (code == 0, code)
+
+    yard.run(body)
+
+
 def test_the_vehicle_node_of_4_1_has_its_services_beside_its_topics(apron: Make) -> None:
     yard = apron("dji_osdk_ros")
 
