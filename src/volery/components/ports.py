@@ -81,7 +81,7 @@ class Port:
             )
         outcome = "ok"
         try:
-            return self._call_remote(task, operation, args, kwargs)
+            return self._execute(task, operation, args, kwargs)
         except BaseException as error:
             outcome = type(error).__name__
             raise
@@ -89,7 +89,7 @@ class Port:
             with kernel.guard:
                 kernel.record(Call(start, kernel.now(), self._caller, self._callee.name, operation, outcome))
 
-    def _call_remote(self, task: Task, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+    def _execute(self, task: Task, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
         callee = self._callee
         far = task.context.processor is not callee.context.processor
         if far:

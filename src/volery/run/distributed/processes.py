@@ -67,9 +67,12 @@ class WorkerProcess:
 
     def check(self) -> None:
         """Raise ``ComponentError`` if the component cannot become ready."""
+        over = self.over
+        if over:
+            self._reader.join(EXIT_WITHIN_S)  # the reason is in the pipe before the process ends
         if self.start_error:
             raise ComponentError(self.name, self.start_error.removeprefix(f"{self.name}: "))
-        if self.over:
+        if over:
             raise ComponentError(
                 self.name, f"its process ({self.pid}) {_how(self._process.returncode)} before it was ready"
             )

@@ -157,7 +157,7 @@ class RemotePort(Port):
         self._clients = clients
         self._values = values
 
-    def _there_and_back(
+    def _execute(
         self, task: Task, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]
     ) -> Any:
         what = f"the arguments of {self.component}.{operation}"
