@@ -83,7 +83,8 @@ class EventLog:
             return
         level = next(name for name, most in LEVELS.items() if severity <= most)
         line = f"{clock(at)} {level:7} {source}: {' '.join(text.split())}\n"
-        self._guarded(lambda: (self._file.write(line), self._file.flush()))
+        self._guarded(lambda: self._file.write(line))
+        self._guarded(self._file.flush)
 
     def _guarded(self, write: Callable[[], object]) -> None:
         try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import isfinite, nan
-from numbers import Real
 
 from volery.base.errors import OutOfBounds, Refused, UsageError
 from volery.base.frames import LocalFrame
@@ -58,9 +57,11 @@ class Drone(Vehicle):
             Refused: it flies already, or the autopilot refuses.
         """
         self._require(Capability.TAKEOFF)
-        if not isinstance(height, Real):
-            raise UsageError(f"{self.name}: takeoff({height!r}): give metres above home, as in takeoff(10)")
-        asked = f"take off to {height:g} m"
+        try:
+            asked = f"take off to {height:g} m"
+        except (TypeError, ValueError):
+            what = f"takeoff({height!r}): give metres above home, as in takeoff(10)"
+            raise UsageError(f"{self.name}: {what}") from None
         if not isfinite(height) or height <= 0:
             raise UsageError(f"{self.name}: {asked}: give metres above home, above 0")
         telemetry = self._driver.telemetry

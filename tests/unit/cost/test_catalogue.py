@@ -169,3 +169,38 @@ def test_a_catalogue_of_ones_own_adds_processors_and_laws(tmp_path: Path) -> Non
 def test_a_missing_catalogue_is_named(tmp_path: Path) -> None:
     with pytest.raises(ModelError, match=r"nowhere\.yaml: this catalogue cannot be read"):
         load_catalogue(tmp_path / "nowhere.yaml")
+
+
+@pytest.mark.parametrize(
+    ("kind", "cores", "mhz"),
+    [
+        ("rpi5-cortex-a76", 4, (1500, 2400)),
+        ("rpi-zero-2w-cortex-a53", 4, (600, 1000)),
+        ("jetson-orin-nano-cortex-a78ae", 6, (1500, 1500)),
+        ("stm32h743-cortex-m7", 1, (480, 480)),
+    ],
+)
+def test_computers_of_which_little_is_published(kind: str, cores: int, mhz: tuple[int, int]) -> None:
+    entry = load_catalogue().processor(kind)
+    assert (entry.cores, entry.least_mhz, entry.greatest_mhz) == (cores, *mhz)
+    with pytest.raises(EstimateError, match="no figures of ROS calls"):
+        entry.ros_law("roscpp")
+    with pytest.raises(EstimateError, match="no power figures"):
+        entry.power_law()
+    with pytest.raises(EstimateError, match="no figures of compiled code"):
+        entry.core_law()
+
+
+@pytest.mark.parametrize("kind", ["rpi5-cortex-a76", "rpi-zero-2w-cortex-a53"])
+def test_an_estimated_factor_states_its_error(kind: str) -> None:
+    factor = load_catalogue().processor(kind).code_law().slowdown
+    assert factor.provenance == "estimated"
+    assert factor.error is not None
+    assert factor.error >= 0.5
+    assert "Raspberry Pi 4" in factor.source
+
+
+@pytest.mark.parametrize("kind", ["jetson-orin-nano-cortex-a78ae", "stm32h743-cortex-m7"])
+def test_a_missing_factor_is_an_error_and_not_zero(kind: str) -> None:
+    with pytest.raises(EstimateError, match="no figure for counted python code"):
+        load_catalogue().processor(kind).code_law()
