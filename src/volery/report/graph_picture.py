@@ -17,6 +17,9 @@ from volery.trace.reader import Reading
 
 GRAPH_NAME_PREFIX = "/"
 
+_NOT_XML = dict.fromkeys((*range(32), *range(127, 160), *range(55296, 57344), 65534, 65535), "�")
+"""Characters of a name that XML forbids, and controls of a terminal."""
+
 
 def graph_of_run(folder: Path) -> GraphSnapshot:
     """Return the graph of a finished run from its trace; rates are means over the whole run.
@@ -152,7 +155,7 @@ def _boxes(
     for name, y in places.items():
         box = f'x="{x:.1f}" y="{y - 12:.1f}" width="{width:.1f}" height="24" rx="{radius}"'
         yield f'<rect class="{kind}" {box}/>'
-        yield f'<text x="{x + 12:.1f}" y="{y + 4:.1f}">{escape(name)}</text>'
+        yield f'<text x="{x + 12:.1f}" y="{y + 4:.1f}">{escape(name.translate(_NOT_XML))}</text>'
         note = notes.get(name, "") if notes else ""
         if note:
             at = f'x="{x + width - 8:.1f}" y="{y + 4:.1f}" text-anchor="end"'

@@ -5,7 +5,7 @@ from pymavlink.dialects.v10 import ardupilotmega as dialect_v1
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.links.link import Frame
-from volery.links.mavlink_codec import CHECKSUM, HEADER, MavlinkParser, encode
+from volery.links.mavlink_codec import CHECKSUM, HEADER, MavlinkParser, encode, frame_length
 
 BEAT = encode(Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "base_mode": 81, "mavlink_version": 3}, 1, 1), 0)
 BOOT = b"\n\nInit ArduCopter V4.5.6 (7ce11b41)\n\nFree RAM: 131072\nBooting 0/0\n"
@@ -85,3 +85,34 @@ def test_a_broken_connection_leaves_no_half_frame() -> None:
     parser.feed(BEAT[:10])
     parser.reset()
     assert len(parser.feed(BEAT)) == 1
+
+
+UNKNOWN_V1 = bytes((0xFE, 3, 0, 1, 1, 145))
+"""The header of a MAVLink 1 frame of a message that the dialect lacks."""
+
+
+def test_noise_that_looks_like_mavlink_1_is_no_frame() -> None:
+    parser = MavlinkParser()
+    noise = UNKNOWN_V1 + bytes(11)
+    assert len(parser.feed(noise + BEAT)) == 1
+    received = parser.statistics
+    assert (received.unknown, received.garbage, received.octets) == (0, len(noise), len(noise) + len(BEAT))
+
+
+def test_six_bytes_decide_about_a_header_of_mavlink_1() -> None:
+    parser = MavlinkParser()
+    parser.feed(UNKNOWN_V1[:-1])
+    assert parser.statistics.garbage == 0
+    parser.feed(UNKNOWN_V1[-1:])
+    assert parser.statistics.garbage == len(UNKNOWN_V1)
+
+
+@pytest.mark.parametrize("before", [0, 1, 8, 300])
+def test_the_length_of_a_frame_anywhere_in_the_data(before: int) -> None:
+    for frame in (BEAT, old_beat()):
+        data = bytes(before) + frame
+        assert frame_length(data + BEAT, before) == len(frame)
+        assert frame_length(data, before) == len(frame)
+        assert frame_length(data[:-1], before) == 0
+        assert frame_length(data[:-1] + b"\0", before) == 0
+        assert frame_length(data, before + 1) == 0

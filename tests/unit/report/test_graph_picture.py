@@ -55,3 +55,8 @@ def test_the_graph_of_a_run(tmp_path: Path) -> None:
 def test_a_folder_without_a_run(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="cannot read"):
         graph_of_run(tmp_path)
+
+
+def test_control_characters_of_names_are_not_written_into_the_picture() -> None:
+    svg = graph_svg(GraphSnapshot(("/\x1b[2J\x07\x00node",), (), ()))
+    assert "/\ufffd[2J\ufffd\ufffdnode" in words(svg)
