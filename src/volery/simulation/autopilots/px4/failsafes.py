@@ -62,7 +62,7 @@ LOSS_DETECTION_DELAY = 145 * MS
 """Recorded: with COM_RC_LOSS_T = 0.5 s the loss was detected 0.63 to 0.65 s after the last sample."""
 
 ON_GROUND_AFTER: Ns = 300 * MS
-"""Without motors the vehicle counts as on the ground, in the air too: told 0.42 s after a kill at 25 m."""
+"""Without motors the vehicle counts as on the ground, in the air too: reported 0.42 s after a kill."""
 
 RECOVERY = 0.25
 """Hold time [s] that is regained for each second without a failsafe, as recorded."""

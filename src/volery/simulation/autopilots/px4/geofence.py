@@ -65,7 +65,7 @@ def _within_points(vehicle: Vehicle, point: Vector) -> bool:
 
 
 def _areas(vehicle: Vehicle) -> Iterator[tuple[int, Sequence[Vector], float]]:
-    """Yield command, corners or centre, and radius [m] of each area; a polygon's corners follow each other."""
+    """Yield command, corners or centre, and radius [m] of each area; corners follow each other."""
     items = vehicle.points.get(FENCE, [])
     place = 0
     while place < len(items):
