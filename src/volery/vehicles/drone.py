@@ -318,7 +318,7 @@ class Drone(Vehicle):
     def _acts_by_itself(self) -> bool:
         """Return whether a failsafe of the autopilot lands or returns the drone; it may hold first.
 
-        A landing by this program would overrule it: it would come down where it is instead of at home.
+        A landing by this program would overrule it: it would land where it is instead of at home.
         """
         telemetry = self._driver.telemetry
         if (

@@ -119,7 +119,7 @@ class Fence:
 
 def states_amsl(fence: Fence) -> bool:
     """Return whether a boundary of the fence or of a zone is an altitude AMSL."""
-    areas = (fence, *fence.no_fly)
+    areas: tuple[Fence | Zone, ...] = (fence, *fence.no_fly)
     return any(isinstance(height, AMSL) for area in areas for height in (area.floor, area.ceiling))
 
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -139,3 +141,22 @@ def test_home_is_where_the_local_frame_begins(east: float, north: float) -> None
     assert local[0] == pytest.approx(east, abs=0.01)
     assert local[1] == pytest.approx(north, abs=0.01)
     assert local[2] == pytest.approx(25.0)
+
+
+def test_a_fence_with_longitude_before_latitude_is_named_only_if_that_is_the_mistake() -> None:
+    home = Position(46.0, 8.0, AMSL(900.0))
+    around = ((45.99, 7.99), (45.99, 8.01), (46.01, 8.01), (46.01, 7.99))
+    swapped = tuple((longitude, latitude) for latitude, longitude in around)
+    elsewhere = tuple((latitude + 1.0, longitude) for latitude, longitude in around)
+    hints = {}
+    for name, polygon in (("swapped", swapped), ("elsewhere", elsewhere)):
+        with pytest.raises(UsageError, match="outside the fence's polygon") as caught:
+            Bounds(home, Limits(), Fence(polygon))
+        hints[name] = "are they swapped?" in str(caught.value)
+    assert hints == {"swapped": True, "elsewhere": False}
+
+
+def test_limits_and_fences_do_not_change() -> None:
+    for stated in (Limits(), Fence(SQUARE)):
+        with pytest.raises(FrozenInstanceError):
+            stated.lowest = -1000.0  # type: ignore[union-attr]

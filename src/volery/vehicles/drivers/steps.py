@@ -28,6 +28,8 @@ READY_WITHIN: Ns = 2 * MINUTE
 STOPPED_WITHIN: Ns = 30 * S
 TURNED_WITHIN: Ns = 30 * S
 TURNED_DEG = 3.0
+STEADY_FOR: Ns = S
+"""Time for which a heading must be reached: half the period of a swing past it."""
 IDLE_THROTTLE = 0.1
 
 NEAR_M, NEAR_UP_M = 0.6, 0.3
@@ -94,11 +96,21 @@ def check_throttle(telemetry: Telemetry, held: ManualControl | None, least: floa
 
 
 def heading_reached(degrees: float) -> Callable[[Telemetry], bool]:
-    """Return a condition: the heading is *degrees* clockwise from north."""
+    """Return a condition: the heading has stayed at *degrees* clockwise from north.
+
+    A real multirotor swings up to 16 degrees past it. So the heading must have been within 3 degrees for as
+    long as the reports of the position take that carry it, at least ``STEADY_FOR``.
+    """
+    since: Ns | None = None
 
     def turned(seen: Telemetry) -> bool:
+        nonlocal since
         off = (seen.attitude.heading - degrees + 180.0) % 360.0 - 180.0
-        return abs(off) <= TURNED_DEG
+        if not abs(off) <= TURNED_DEG:
+            since = None
+            return False
+        since = seen.last_message_ns if since is None else since
+        return seen.last_message_ns - since >= STEADY_FOR
 
     return turned
 

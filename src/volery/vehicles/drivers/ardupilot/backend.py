@@ -51,7 +51,7 @@ _LASTING = (
     *("mission", "param", "mode not armable", "mode requires", "check fs_", "fence requires", "in fence"),
 )
 _PASSING = ("gps", "ekf", "ahrs", "position", "inconsistent", "settl", "wait", "init", "fix")
-"""Words of arming checks that stay until somebody mends them, and of those that pass by themselves."""
+"""Words of arming checks that stay until they are mended, and of those that pass by themselves."""
 
 
 def lasting_reasons(telemetry: Telemetry, since: Ns) -> Sequence[str]:

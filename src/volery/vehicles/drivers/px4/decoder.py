@@ -97,7 +97,7 @@ _PASSING = (
 LASTING_CHECKS = frozenset(
     event_id(name) for name in _CHECK_NAMES if not any(word in name for word in _PASSING)
 )
-"""Arming checks that stay until somebody mends them: batteries, missions, sticks, missing hardware."""
+"""Arming checks that stay until they are mended: batteries, missions, sticks, missing hardware."""
 
 KNOWN_EVENTS: Mapping[int, str] = {
     event_id(name): words

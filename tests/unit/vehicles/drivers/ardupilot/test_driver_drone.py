@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import pytest
@@ -688,3 +689,21 @@ def test_a_mode_that_is_refused_leaves_the_one_before_ours(bench: Make) -> None:
         assert drone.come_to_rest() == "landed"
 
     at.fly(mission)
+
+
+def test_a_turn_ends_when_the_heading_stays_and_not_when_it_first_passes(bench: Make) -> None:
+    at = bench()
+
+    def swing(command: int, _: dict[str, Any]) -> None:
+        if command == YAW:
+            for seconds, heading in ((0.0, 90.0), (0.6, 104.0), (1.2, 82.0), (1.8, 90.0)):
+                at.after(seconds, partial(setattr, at.craft, "heading", heading))
+
+    def mission(drone: Any) -> float:
+        drone.takeoff(10)
+        at.autopilot.on_command = swing
+        began = at.kernel.now()
+        drone.set_heading(90)
+        return float(at.kernel.now() - began) / S
+
+    assert at.fly(mission) > 2.5
