@@ -184,3 +184,11 @@ def test_a_warm_publish_costs_the_same_without_a_separate_figure() -> None:
     text = MEASURED + "          publish_next: {provenance: measured, source: s, constant: {offset: 7000}}\n"
     apart = parse_catalogue(text).processor("here").ros_law("rospy").price("publish_next", 3, 2600)
     assert (apart.caller, apart.background) == (7000, 0)
+
+
+def test_service_requests_cost_what_a_law_states_and_nothing_where_it_has_no_figure() -> None:
+    plain = law(INTEL)
+    assert plain.price("serve", 0, 3000) == plain.price("call_service", 0, 3000) == Price(0, 0)
+    figures = plain.calls["init"].model_copy(update={"points": {1600.0: 730_000.0, 3000.0: 730_000.0}})
+    priced = plain.model_copy(update={"calls": {**plain.calls, "serve": figures}})
+    assert priced.price("serve", 0, 3000).caller == 730_000

@@ -247,6 +247,13 @@ class NodeContext:
         if background and self.processor is not None:
             self.processor.load(self.context, background)
 
+    def consume_if_priced(self, call: str) -> None:
+        """Execute a call as ``consume`` does, if the law has a figure for it."""
+        if self._tariff is not None:
+            cost = self._tariff(call, 0.0)
+            if cost.caller or cost.background:
+                self.consume(call)
+
     def charge_background(self, what: str, x: float = 0.0) -> None:
         """Execute in the background a cost beside the calls; see ``Tariff`` for `what` and `x`."""
         processor = self.processor

@@ -102,6 +102,8 @@ class EmbeddedService:
         """Run the handler and send the answer; an exception is reported to the caller and raised again."""
         if exchange not in self._pending:
             return
+        with self.node.kernel:
+            self.node.consume_if_priced("serve")
         try:
             answer = self._handler(exchange.request)
             if not isinstance(answer, self._kind.response):
@@ -151,6 +153,7 @@ class EmbeddedClient:
         with node.kernel as kernel:
             start = kernel.now()
             server = self._server(request)
+            node.consume_if_priced("call_service")
             exchange = Exchange(node, node.graph.copy(request), self.name)
             node.graph.carry(
                 node,

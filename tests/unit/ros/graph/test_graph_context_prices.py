@@ -188,3 +188,29 @@ def test_a_second_publish_within_a_millisecond_is_priced_as_publish_next(rig: An
         ("/answerer", "publish_next"),
     ]
     assert {event.kind for event in rig.of(Charge) if "publish" in event.kind} == {"ros:publish"}
+
+
+@pytest.mark.parametrize("priced", [True, False])
+def test_a_request_costs_its_caller_and_its_server_what_the_law_says(rig: Any, priced: bool) -> None:
+    if priced:
+        rig.prices["call_service"] = type("P", (), {"caller": 40 * US, "background": 60 * US})()
+        rig.prices["serve"] = type("P", (), {"caller": 700 * US, "background": 0})()
+
+    def server() -> None:
+        node = rig.graph.node("server")
+        node.serve("switch", SET_BOOL, lambda request: messages.service(SET_BOOL).response())
+        node.spin_once()
+
+    def client() -> None:
+        node = rig.graph.node("client")
+        caller = node.client("switch", SET_BOOL)
+        node.wait_for_service("switch")
+        caller.call(messages.service(SET_BOOL).request())
+
+    rig.run(server, client)
+    charged = {one.kind: (one.caller, one.background) for one in rig.of(Charge)}
+    if priced:
+        assert charged["ros:call_service"] == (40 * US, 60 * US)
+        assert charged["ros:serve"] == (700 * US, 0)
+    else:
+        assert not {"ros:call_service", "ros:serve"} & set(charged)
