@@ -150,9 +150,9 @@ def test_a_fence_with_longitude_before_latitude_is_named_only_if_that_is_the_mis
     elsewhere = tuple((latitude + 1.0, longitude) for latitude, longitude in around)
     hints = {}
     for name, polygon in (("swapped", swapped), ("elsewhere", elsewhere)):
-        with pytest.raises(UsageError, match="outside the fence's polygon") as caught:
-            Bounds(home, Limits(), Fence(polygon))
-        hints[name] = "are they swapped?" in str(caught.value)
+        said = Bounds(home, Limits(), Fence(polygon)).home_violation
+        assert "outside the fence's polygon" in said
+        hints[name] = "are they swapped?" in said
     assert hints == {"swapped": True, "elsewhere": False}
 
 
