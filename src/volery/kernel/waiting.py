@@ -143,8 +143,13 @@ class Rate:
         """End the activation; block the current task until the next one is due."""
         with self._kernel as kernel:
             task = current_task(kernel)
+            before = task.released
             end_activation(kernel, task)
             due, self._counted_from = next_release(self._counted_from, self.period, kernel.now())
+            if (
+                before is None or due <= before
+            ):  # it was not this loop that was late: it waited for something else
+                due = max(due, self._counted_from)
             kernel.sleep_until(due)
             task.release(due, self._counted_from)
 
