@@ -1,4 +1,4 @@
-"""What scripted autopilots that speak MAVLink have in common: they do at once what they are commanded, and can be
+"""Base of scripted MAVLink autopilots: they obey at once, and can be
 set to misbehave.
 """
 

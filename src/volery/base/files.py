@@ -1,6 +1,6 @@
 """Files of a user: regular ones only are read, and none is written through a symbolic link.
 
-A run folder or a model may come from somebody else. A link in it must not let a run overwrite another file,
+A run folder or a model may come from another person. A link in it must not let a run overwrite another file,
 and a FIFO or a device in it must not let a command wait or read for ever.
 """
 

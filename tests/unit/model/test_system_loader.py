@@ -317,7 +317,5 @@ def test_a_requirement_may_bound_what_the_application_notes(workshop):
 
 def test_a_note_without_a_state_is_wrong(workshop):
     workshop.change("requirements:\n", "requirements:\n  seen: {observe: note.point, min: 4}\n")
-    with pytest.raises(
-        ModelError, match=r"seen.observe: 'note.point': write note.<kind>.<state>"
-    ):
+    with pytest.raises(ModelError, match=r"seen.observe: 'note.point': write note.<kind>.<state>"):
         workshop.load()

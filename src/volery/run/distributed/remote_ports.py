@@ -157,9 +157,7 @@ class RemotePort(Port):
         self._clients = clients
         self._values = values
 
-    def _execute(
-        self, task: Task, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]
-    ) -> Any:
+    def _execute(self, task: Task, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
         what = f"the arguments of {self.component}.{operation}"
         asked = request(CALL, arguments=self._values.to_text([list(args), kwargs], what))
         try:
