@@ -16,8 +16,6 @@ from delivery_types import DONE
 import volery
 from volery import VoleryError
 
-GAIN = 0.7
-"""m/s of horizontal velocity for each metre of offset."""
 MOST_SIDEWAYS = 2.0
 DESCENT_GAIN = 0.35
 """m/s of descent for each metre of height."""
@@ -41,13 +39,15 @@ class PrecisionLanding:
     """``take_over`` and ``outcome`` answer at once, the landing is done by ``run``.
 
     ``image_ms`` is what finding the beacon in one picture takes at 1500 MHz. The picture is not there in a
-    simulation, so this time is charged instead.
+    simulation, so this time is charged instead. ``gain`` is m/s of horizontal velocity for each metre of
+    offset: an autopilot that overshoots its velocity needs a lower one.
     """
 
-    def __init__(self, drone, beacon, image_ms):
+    def __init__(self, drone, beacon, image_ms, gain):
         self._drone = drone
         self._beacon = beacon
         self._image_s = image_ms / 1000.0
+        self._gain = gain
         self._requests = queue.Queue()
         self._outcomes = {}
 
@@ -84,7 +84,7 @@ class PrecisionLanding:
                 seen, last_seen = _smoothed(seen, picture), volery.now()
                 if _can_let_go(seen, picture.below):
                     return
-                self._drone.set_velocity(*_velocity(seen, picture.below))
+                self._drone.set_velocity(*_velocity(seen, picture.below, self._gain))
             elif volery.now() - last_seen > GIVE_UP_S:
                 volery.log("the beacon is not seen: landing by position", "warning")
                 return
@@ -114,10 +114,10 @@ def _can_let_go(seen, height):
     return height < LET_GO_M and hypot(*seen) < LET_GO_OFFSET_M
 
 
-def _velocity(seen, height):
-    """North, east, up in m/s."""
+def _velocity(seen, height, gain):
+    """Return north, east, up in m/s."""
     offset = hypot(*seen)
-    speed = min(MOST_SIDEWAYS, GAIN * offset)
+    speed = min(MOST_SIDEWAYS, gain * offset)
     share = speed / offset if offset else 0.0
     down = 0.0
     if offset < CENTRED_M + CENTRED_PER_METRE * height and height > LET_GO_M / 2:

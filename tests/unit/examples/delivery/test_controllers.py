@@ -218,6 +218,7 @@ class Landing:
             drone=self.drone,
             beacon=SimpleNamespace(look=self._look),
             image_ms=55,
+            gain=0.7,
         )
         self.pad = city.places["port_b"].position
 
