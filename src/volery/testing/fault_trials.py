@@ -115,7 +115,7 @@ PHASES: Mapping[str, Program] = {
 }
 
 
-LONGEST: Ns = 15 * MINUTE
+LONGEST: Ns = 4 * MINUTE
 """Time after which a call is taken as hanging, s; the time-outs of these short flights are shorter."""
 
 WATCHED: Ns = 100 * MS
