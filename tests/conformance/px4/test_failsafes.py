@@ -1,4 +1,4 @@
-"""Failsafes, most of them without a recording: what the firmware's parameters are documented to do, and no hang."""
+"""Failsafes without a recording: what the firmware's parameters are documented to do, and no hang."""
 
 from __future__ import annotations
 
