@@ -148,7 +148,7 @@ def test_a_paparazzi_goes_by_the_names_of_mavros(debian: Run, start: Start) -> N
 
 
 def test_a_dji_on_the_graph_gets_other_names_there(debian: Run, start: Start) -> None:
-    served = start(*COMMAND, "serve", "dji", "--graph", "ros1", "--speed", "4")
+    served = start(*COMMAND, "serve", "dji", "--graph", "ros1", "--speed", "2")
     assert "serving dji on ros1" in served.stdout.readline()
     bridged(start, "dji+ros1:///dji_sdk", "--names", "mavros", "--namespace", "/dji")
     assert 'mode: "P_GPS"' in armed_by_tools(debian, "/dji")

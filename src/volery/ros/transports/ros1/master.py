@@ -29,7 +29,7 @@ from volery.base.errors import LinkError, LinkSilent, UsageError
 
 DEFAULT_URI = "http://localhost:11311"
 URI_VARIABLE = "ROS_MASTER_URI"
-PATIENCE_S = 3.0
+PATIENCE_S = 10.0
 FOUND = 1
 FRESH_S = 0.5
 
