@@ -148,10 +148,11 @@ def test_a_paparazzi_goes_by_the_names_of_mavros(debian: Run, start: Start) -> N
 
 
 def test_a_dji_on_the_graph_gets_other_names_there(debian: Run, start: Start) -> None:
-    served = start(*COMMAND, "serve", "dji", "--graph", "ros1", "--speed", "2")
+    served = start(*COMMAND, "serve", "dji", "--graph", "ros1", "--speed", "4")
     assert "serving dji on ros1" in served.stdout.readline()
     bridged(start, "dji+ros1:///dji_sdk", "--names", "mavros", "--namespace", "/dji")
-    assert 'mode: "P_GPS"' in armed_by_tools(debian, "/dji")
+    state = armed_by_tools(debian, "/dji")
+    assert 'mode: "P_GPS"' in state or 'mode: "ENGINE_START"' in state  # for 2 s after the motors start
 
 
 def test_whose_name_is_taken_is_told(roscore: Roscore, start: Start, ours: Any) -> None:
