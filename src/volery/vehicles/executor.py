@@ -26,7 +26,7 @@ from volery.vehicles.telemetry import Telemetry
 RESTARTS = 3
 """How often a sequence that is undone before lift-off is started again."""
 RECENT_CAUSE: Ns = 5 * S
-"""Age up to which a text of the autopilot tells why it has changed its mode."""
+"""Age up to which a text of the autopilot counts as the reason of a mode change."""
 REASON_WAIT: Ns = 500 * MS
 """Time to wait for the text with the reason, which often follows a refusal."""
 RECENT_TEXT_S = 3.0

@@ -447,7 +447,7 @@ class TakeoffAndLanding:
         return (steps.check_settings(), *before, *by_sticks, *by_plan, steps.release())
 
     def _sinking(self, mode: str) -> Callable[[], str]:
-        """Return a function that tells in words that it does not sink in *mode*."""
+        """Return a function that describes a vehicle that does not sink in *mode*."""
         kept: list[tuple[Ns, float]] = []
 
         def tell() -> str:

@@ -239,7 +239,7 @@ class PX4Decoder(TelemetryDecoder):
         return mode_name(number)
 
     def _update_ready(self) -> None:
-        """Update ``ready``; a PX4 that does not report its estimator tells by reporting a position."""
+        """Update ``ready``; without an estimator report, a reported position counts."""
         if not self._estimator_reports:
             self._estimates_position = True
         super()._update_ready()
