@@ -34,6 +34,7 @@ RecoverRun = Callable[[VoleryError, str], Run]
 """Finishes the recording of a run that died of an error, blamed on a component or on ``run``."""
 
 _PR_SET_PDEATHSIG = 1
+_FORWARDED = (signal.SIGINT, signal.SIGTERM)
 
 
 @dataclass(frozen=True)
@@ -62,17 +63,17 @@ def run_supervised(work: Work, show: Show | None, supervision: Supervision, reco
     )
     sys.stdout.flush()
     sys.stderr.flush()
-    child.start()
-    theirs.close()
-    os.close(crash_pipe)
     try:
-        with _signals_forwarded(child):
+        with _started(child):
+            theirs.close()
+            os.close(crash_pipe)
             result = _listen(ours, show)
             child.join()
         return result or _recover(child, read_crash(report, supervision.libraries), recover)
     finally:
-        child.kill()  # still running only after an exception above
-        child.join()
+        if child.pid is not None:
+            child.kill()  # still running only after an exception above
+            child.join()
         ours.close()
         os.close(report)
 
@@ -102,17 +103,33 @@ def _recover(child: BaseProcess, crash: Crash | None, recover: RecoverRun) -> Ru
 
 
 @contextmanager
-def _signals_forwarded(child: BaseProcess) -> Iterator[None]:
+def _started(child: BaseProcess) -> Iterator[None]:
+    """Start the child and pass SIGINT and SIGTERM on to it until the block ends.
+
+    The handlers are in place before the fork, and the child begins with both signals blocked: Python drops
+    an exception that a signal raises during a fork, and the child must have its own handlers first.
+    """
     if threading.current_thread() is not threading.main_thread():
+        child.start()
         yield
         return
+    early: list[int] = []
 
     def forward(number: int, frame: FrameType | None) -> None:
-        if child.pid is not None and child.is_alive():
+        if child.pid is None:
+            early.append(number)
+        elif child.is_alive():
             os.kill(child.pid, number)
 
-    before = {number: signal.signal(number, forward) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: signal.signal(number, forward) for number in _FORWARDED}
     try:
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, _FORWARDED)
+        try:
+            child.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for number in early:
+            forward(number, None)
         yield
     finally:
         for number, handler in before.items():
@@ -125,7 +142,7 @@ def _signals_forwarded(child: BaseProcess) -> Iterator[None]:
 def _child_main(work: Work, shown: bool, supervision: Supervision, to: Connection, crash_pipe: int) -> None:
     os.setpgid(0, 0)  # Ctrl-C reaches the parent, which forwards it
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in _FORWARDED:
         signal.signal(number, signal.default_int_handler)
     framework_runtime(supervision.framework).supervise(crash_pipe, supervision.patience_s)
 
@@ -133,6 +150,7 @@ def _child_main(work: Work, shown: bool, supervision: Supervision, to: Connectio
         to.send(("show", progress))
 
     try:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _FORWARDED)  # may raise KeyboardInterrupt at once
         to.send(("run", work(show if shown else None)))
     except BaseException as error:
         to.send(("raised", error))

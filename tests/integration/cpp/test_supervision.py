@@ -61,16 +61,32 @@ def test_a_process_that_dies_is_reported(end, said):
     assert said in error
 
 
+def _wait_for_ever() -> None:
+    while True:
+        signal.pause()  # returns at any signal, such as those of the supervision
+
+
 def test_ctrl_c_is_passed_on():
     parent = os.getpid()
 
     def work(show: Any) -> Any:
         try:
             os.kill(parent, signal.SIGINT)
-            while True:
-                signal.pause()  # returns at any signal, such as those of the supervision
+            _wait_for_ever()
         except KeyboardInterrupt:
             return "interrupted"
 
     result, _ = _supervised(work)
     assert result == "interrupted"
+
+
+def test_ctrl_c_during_the_fork_is_passed_on():
+    parent, pending = os.getpid(), [signal.SIGINT]
+
+    def interrupt() -> None:
+        if pending and os.getpid() == parent:  # a hook cannot be removed
+            os.kill(parent, pending.pop())
+
+    os.register_at_fork(after_in_parent=interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        _supervised(lambda show: _wait_for_ever())
