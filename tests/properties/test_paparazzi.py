@@ -18,7 +18,7 @@ from volery.links.pprzlink_messages import message_type
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.paparazzi import FIRMWARE
-from volery.simulation.autopilots.paparazzi.commands import HANDLERS
+from volery.simulation.autopilots.paparazzi.endpoint import HANDLERS
 from volery.simulation.world.body_specs import Multirotor
 
 AIRCRAFT = 1

@@ -21,8 +21,13 @@ from volery.kernel.api import Action, Handle, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.links.link import Link
 from volery.ros.graph import RosGraph
-from volery.simulation.autopilots.endpoint import GraphEndpoint, LinkEndpoint, ProtocolEndpoint
-from volery.simulation.autopilots.firmware import Firmware, FirmwareFamily
+from volery.simulation.autopilots.firmware import (
+    Firmware,
+    FirmwareFamily,
+    GraphEndpoint,
+    LinkEndpoint,
+    ProtocolEndpoint,
+)
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import VehicleState

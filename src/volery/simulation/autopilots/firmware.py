@@ -1,22 +1,77 @@
-"""What differs between simulated firmwares, as data and small functions grouped by subject.
+"""Firmwares of simulated autopilots, as data and small functions by subject, and their protocol endpoints.
 
 The flight stack reads these groups and never branches on the name of a firmware. What a ``Vehicle`` needs
 of its firmware stands in ``VehicleRules``; what manoeuvres and protocol endpoints need is passed to them
-directly.
+directly. A protocol endpoint is one protocol of one vehicle: on any number of links, or as a node on a ROS
+graph.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
-from volery.base.registry import Registry
+from volery.base.installed import Registry
 from volery.base.time import MS, Ns
-from volery.links.link import Codec
+from volery.kernel.task import ExecutionContext
+from volery.links.link import Codec, Link
 from volery.links.mavlink_codec import MAVLINK
-from volery.simulation.autopilots.endpoint import ProtocolEndpoint
-from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction, VehicleRules, do_nothing
+from volery.ros.graph import RosGraph
+from volery.simulation.autopilots.vehicle_state import (
+    Vehicle,
+    VehicleAction,
+    VehicleOutput,
+    VehicleRules,
+    do_nothing,
+)
+
+
+class ProtocolEndpoint(VehicleOutput, Protocol):
+    """One vehicle's protocol."""
+
+    def start(self) -> None:
+        """Start what is sent regularly, at the phase of the boot."""
+
+    def stop(self) -> None:
+        """Stop sending: the vehicle was switched off."""
+
+    def close(self) -> None:
+        """Close all links or the node."""
+
+
+@runtime_checkable
+class LinkEndpoint(ProtocolEndpoint, Protocol):
+    """A protocol on links."""
+
+    @property
+    def banner(self) -> bytes:
+        """Bytes that the autopilot writes to a new byte connection before any frame."""
+
+    def connect(self, link: Link, use: str = "") -> None:
+        """Serve *link*.
+
+        Args:
+            link: The autopilot's end of the link.
+            use: What the firmware uses the link for; empty: its default.
+        """
+
+    def disconnect(self, link: Link) -> None:
+        """Stop serving *link*."""
+
+
+@runtime_checkable
+class GraphEndpoint(ProtocolEndpoint, Protocol):
+    """A protocol of topics and services on a ROS graph."""
+
+    def join(self, graph: RosGraph, namespace: str, place: ExecutionContext) -> None:
+        """Serve on *graph*.
+
+        Args:
+            graph: The graph.
+            namespace: Prefix of all names.
+            place: Execution context that the node's computing is charged to.
+        """
 
 
 class BootEvent(NamedTuple):

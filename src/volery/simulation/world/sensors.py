@@ -23,7 +23,7 @@ from numba import njit
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.frames import Quaternion, Vector
-from volery.base.registry import Registry
+from volery.base.installed import Registry
 from volery.base.seeds import key
 from volery.base.time import Ns
 from volery.simulation.world.arithmetic import exponential, gaussian

@@ -5,12 +5,12 @@ from types import ModuleType
 
 import pytest
 
-from volery.simulation.autopilots.flight_stack import flight_layout
+from volery.simulation.autopilots.flight_stack import flight_state
 from volery.simulation.autopilots.flight_stack.flight import Setpoint
 from volery.simulation.world import state_layout
 from volery.simulation.world.state_layout import Layout
 
-LAYOUTS = [(state_layout, state_layout.WORLD_LAYOUT), (flight_layout, flight_layout.FLIGHT_LAYOUT)]
+LAYOUTS = [(state_layout, state_layout.WORLD_LAYOUT), (flight_state, flight_state.FLIGHT_LAYOUT)]
 PREFIXES = ("S_", "U_", "M_", "P_", "W_", "C_", "K_")
 UNITS = "1 m s kg rad N J V A W ohm gauss"
 
@@ -38,11 +38,14 @@ def test_fields_cover_every_column_once(module, layout):
 
 @pytest.mark.parametrize(("module", "layout"), LAYOUTS)
 def test_constants_and_declarations_are_the_same(module, layout):
+    before = (
+        None if module is state_layout else state_layout
+    )  # names imported from the layout that it continues
     declared = {field.name: field.column for field in layout.fields}
     constants = {
         name: value
         for name, value in vars(module).items()
-        if name.startswith(PREFIXES) and isinstance(value, int)
+        if name.startswith(PREFIXES) and isinstance(value, int) and getattr(before, name, None) is None
     }
     assert constants == declared
 
@@ -57,7 +60,7 @@ def test_every_field_has_a_unit_a_meaning_and_axes(module, layout):
 
 
 def test_the_flight_stack_continues_the_worlds_layout():
-    assert flight_layout.FLIGHT_LAYOUT.start == state_layout.WORLD == state_layout.WORLD_LAYOUT.end
+    assert flight_state.FLIGHT_LAYOUT.start == state_layout.WORLD == state_layout.WORLD_LAYOUT.end
     names = [field.name for _, layout in LAYOUTS for field in layout.fields]
     assert len(names) == len(set(names))
 
@@ -74,11 +77,11 @@ def test_a_sensor_more_shifts_the_later_fields_and_overlaps_none(with_one_sensor
 def test_a_set_point_fills_the_command_columns_in_their_order():
     commands = [
         field
-        for field in flight_layout.FLIGHT_LAYOUT.fields
+        for field in flight_state.FLIGHT_LAYOUT.fields
         if field.name.startswith("C_") and field.name != "C_AIDED"
     ]
     row = Setpoint(
-        flight_layout.Control.POSITION,
+        flight_state.Control.POSITION,
         position=(1.0, 2.0, 3.0),
         velocity=(4.0, 5.0, 6.0),
         roll=7.0,
@@ -96,10 +99,10 @@ def test_a_set_point_fills_the_command_columns_in_their_order():
         jerk=19.0,
     ).row()
     assert len(row) == sum(field.width for field in commands)
-    by_name = {field.name: row[field.column - flight_layout.C_CONTROL] for field in commands}
+    by_name = {field.name: row[field.column - flight_state.C_CONTROL] for field in commands}
     assert by_name["C_POSITION"] == 1.0
     assert by_name["C_YAW"] == 9.0
-    assert by_name["C_YAW_MODE"] == flight_layout.YAW_ANGLE
+    assert by_name["C_YAW_MODE"] == flight_state.YAW_ANGLE
     assert by_name["C_THROTTLE"] == 10.0
     assert by_name["C_SPEED_DOWN"] == 15.0
     assert by_name["C_JERK"] == 19.0

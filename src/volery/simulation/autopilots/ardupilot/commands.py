@@ -7,7 +7,7 @@ from functools import partial
 from math import isfinite, isnan, pi, radians
 
 from volery.base.frames import wrap
-from volery.simulation.autopilots.ardupilot.fence import admits, on_fence_enable
+from volery.simulation.autopilots.ardupilot.failsafes import fence_admits, on_fence_enable
 from volery.simulation.autopilots.ardupilot.modes import (
     CRITICAL,
     FORCE,
@@ -22,7 +22,7 @@ from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.manoeuvres.rover_driving import GuidedRover
-from volery.simulation.autopilots.mavlink.command import (
+from volery.simulation.autopilots.mavlink.messages import (
     ACCEPTED,
     DENIED,
     FAILED,
@@ -30,8 +30,8 @@ from volery.simulation.autopilots.mavlink.command import (
     UNSUPPORTED,
     Command,
     Handler,
+    all_within,
 )
-from volery.simulation.autopilots.mavlink.message_fields import all_within
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE, MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -229,7 +229,7 @@ def go_to(vehicle: Vehicle, frame: int, place: tuple[float, float, float], yaw: 
         yaw: Heading [rad], or None to leave it to the firmware.
     """
     point = vehicle.point(frame, *place)
-    if not all_within(point, FARTHEST_POINT) or not admits(vehicle, point):
+    if not all_within(point, FARTHEST_POINT) or not fence_admits(vehicle, point):
         return False
     manoeuvre = vehicle.manoeuvre
     if isinstance(manoeuvre, Guided):

@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import cache, partial
 
 from volery.base.time import MS, S, from_seconds, to_seconds
-from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, switches, telemetry
-from volery.simulation.autopilots.ardupilot.failsafes import COPTER_FAILSAFES
-from volery.simulation.autopilots.ardupilot.fence import outside_fence
+from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot.failsafes import COPTER_FAILSAFES, outside_fence
 from volery.simulation.autopilots.ardupilot.firmware import (
     ardupilot_mavlink,
     builders,
@@ -45,18 +44,16 @@ from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.firmware import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, GuidedAttitude
 from volery.simulation.autopilots.manoeuvres.manual_flight import (
+    Acro,
     AltitudeHold,
+    CircleMode,
+    Drift,
     Loiter,
     ManualFlight,
+    ReturnAlongTrack,
     Stabilize,
 )
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
-from volery.simulation.autopilots.manoeuvres.pilot_modes import (
-    Acro,
-    CircleMode,
-    Drift,
-    ReturnAlongTrack,
-)
 from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import LinkStart
@@ -205,10 +202,10 @@ def on_step(vehicle: Vehicle) -> None:
     """Expire overrides, and disarm automatically after a landing or without a take-off."""
     pilot_input.on_step(vehicle)
     boot.find_home(vehicle)
-    switches.read_mode_switch(vehicle, "FLTMODE_CH", "FLTMODE")
-    switches.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
-    switches.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
-    switches.keep_track(vehicle)
+    pilot_input.read_mode_switch(vehicle, "FLTMODE_CH", "FLTMODE")
+    pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
+    pilot_input.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
+    pilot_input.keep_track(vehicle)
     commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))
     if not vehicle.armed:
         return

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 from volery.base.frames import Vector
 from volery.simulation.autopilots.ardupilot.commands import FARTHEST_POINT
-from volery.simulation.autopilots.ardupilot.fence import admits
+from volery.simulation.autopilots.ardupilot.failsafes import fence_admits
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
 from volery.simulation.autopilots.manoeuvres.rover_driving import GuidedRover
-from volery.simulation.autopilots.mavlink.message_fields import all_within
+from volery.simulation.autopilots.mavlink.messages import all_within
 from volery.simulation.autopilots.onboard_mission import (
     BODY_NED,
     BODY_OFFSET_NED,
@@ -128,7 +128,7 @@ def _obey(vehicle: Vehicle, target: Target | None) -> None:
     if target is None or not isinstance(guided, Guided) or (target.force and target.acceleration is not None):
         return
     if target.position is not None:
-        if admits(vehicle, target.position):
+        if fence_admits(vehicle, target.position):
             guided.go_to(target.position, target.turn)
     elif target.velocity is not None:
         guided.follow_velocity(target.velocity, target.turn)
@@ -191,7 +191,7 @@ def _drive(vehicle: Vehicle, target: Target | None, ahead: float) -> None:
         return
     turns = target.turn.yaw is not None or target.turn.rate is not None
     if target.position is not None:
-        if admits(vehicle, target.position):
+        if fence_admits(vehicle, target.position):
             guided.go_to(target.position)
     elif target.velocity is not None:
         north, east, _ = target.velocity

@@ -8,7 +8,7 @@ from volery.simulation.autopilots.ardupilot.commands import HIGHEST, change_spee
 from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, INFO, disarm
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import MissionRules
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint
-from volery.simulation.autopilots.mavlink.message_fields import finite
+from volery.simulation.autopilots.mavlink.messages import finite
 from volery.simulation.autopilots.onboard_mission import (
     CHANGE_SPEED,
     CONDITION_DELAY,

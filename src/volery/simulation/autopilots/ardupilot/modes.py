@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from volery.base.time import Ns, S
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
-from volery.simulation.autopilots.mavlink.command import ACCEPTED, DENIED, FAILED
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED
 from volery.simulation.autopilots.onboard_mission import DELAY, TAKEOFF
 from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
 

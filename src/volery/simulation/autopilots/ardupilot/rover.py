@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import cache, partial
 
 from volery.base.time import MS, S
-from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, switches, telemetry
-from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES
-from volery.simulation.autopilots.ardupilot.fence import outside_fence
+from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES, outside_fence
 from volery.simulation.autopilots.ardupilot.firmware import (
     ALL,
     ardupilot_mavlink,
@@ -46,8 +45,13 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
 )
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.firmware import BootSequence, Firmware, PeriodicWork
+from volery.simulation.autopilots.manoeuvres.manual_flight import (
+    HoldPlace,
+    ReturnAlongTrack,
+    Simple,
+    Steering,
+)
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
-from volery.simulation.autopilots.manoeuvres.pilot_modes import HoldPlace, ReturnAlongTrack, Simple, Steering
 from volery.simulation.autopilots.manoeuvres.rover_driving import (
     GuidedRover,
     Manual,
@@ -57,7 +61,7 @@ from volery.simulation.autopilots.manoeuvres.rover_driving import (
 )
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import LinkStart
-from volery.simulation.autopilots.mavlink.message_fields import Fields
+from volery.simulation.autopilots.mavlink.messages import Fields
 from volery.simulation.autopilots.vehicle_state import (
     Mode,
     ParameterTable,
@@ -196,10 +200,10 @@ def on_step(vehicle: Vehicle) -> None:
     """Expire overrides and count the driving time, at each tick."""
     pilot_input.on_step(vehicle)
     boot.find_home(vehicle)
-    switches.read_mode_switch(vehicle, "MODE_CH", "MODE")
-    switches.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
-    switches.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
-    switches.keep_track(vehicle)
+    pilot_input.read_mode_switch(vehicle, "MODE_CH", "MODE")
+    pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
+    pilot_input.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
+    pilot_input.keep_track(vehicle)
     if vehicle.armed:
         vehicle.ground.flight_time += ROVER.periodic.tick
 

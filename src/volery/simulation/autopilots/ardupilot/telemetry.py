@@ -12,7 +12,7 @@ from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
 from volery.base.time import US, S
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
-from volery.simulation.autopilots.mavlink.message_fields import (
+from volery.simulation.autopilots.mavlink.messages import (
     EPOCH_US,
     Fields,
     boot_ms,

@@ -15,7 +15,7 @@ from math import sqrt
 
 from numba import njit
 
-from volery.simulation.autopilots.flight_stack.flight_layout import (
+from volery.simulation.autopilots.flight_stack.flight_state import (
     IDLE,
     K_ACCEL,
     K_AT_LOWER_LIMIT,

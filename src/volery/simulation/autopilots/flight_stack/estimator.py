@@ -13,7 +13,7 @@ from math import sqrt
 
 from numba import njit
 
-from volery.simulation.autopilots.flight_stack.flight_layout import (
+from volery.simulation.autopilots.flight_stack.flight_state import (
     C_AIDED,
     K_ACCEL,
     K_ACCEL_BIAS,

@@ -11,7 +11,7 @@ from math import sqrt
 
 from numba import njit
 
-from volery.simulation.autopilots.flight_stack.flight_layout import (
+from volery.simulation.autopilots.flight_stack.flight_state import (
     ATTITUDE,
     C_ACCEL,
     C_ACCEL_Z,

@@ -6,7 +6,7 @@ from math import sqrt
 
 from numba import njit
 
-from volery.simulation.autopilots.flight_stack.flight_layout import (
+from volery.simulation.autopilots.flight_stack.flight_state import (
     C_ACCEL,
     C_CONTROL,
     C_POSITION,

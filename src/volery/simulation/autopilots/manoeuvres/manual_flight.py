@@ -1,13 +1,20 @@
-"""Manoeuvres of a multirotor by RC channels: attitude, climb rate, or speed over the ground."""
+"""Manoeuvres by RC channels: attitude, climb rate, speed over the ground, and ArduPilot's other pilot modes.
+
+The other modes keep the structure of ArduPilot's modes, not their gains: ACRO with its trainer's defaults
+(limited lean, levels by itself), DRIFT with the roll stick as a turn, CIRCLE about a point ahead, SMART_RTL
+back along the points that were passed.
+"""
 
 from __future__ import annotations
 
-from math import cos, hypot, sin, tan
+from math import atan2, cos, hypot, radians, sin, tan
 
 from volery.base.frames import Vector
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.manoeuvres.to_point import CLOSE, root_speed
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Circle
+from volery.simulation.autopilots.manoeuvres.rover_driving import STANDING, DriveTo
+from volery.simulation.autopilots.manoeuvres.to_point import CLOSE, Land, ToPoint, root_speed, stopping_point
 from volery.simulation.autopilots.manual_control import StickPositions
 from volery.simulation.autopilots.vehicle_state import IDLE, Manoeuvre, Vehicle
 
@@ -202,3 +209,226 @@ class Loiter(ManualFlight):
                 tilt=tuning.tilt,
             )
         )
+
+
+ACRO_RATE = radians(360.0)
+"""ACRO_RP_RATE at full stick [rad/s]."""
+ACRO_LEVELS = 1.0
+"""ACRO_BAL_ROLL and ACRO_BAL_PITCH: rate of levelling over the lean [1/s]."""
+DRIFT_DAMPING = radians(5.0)
+"""Lean against the speed without a stick [rad per m/s]."""
+ABOVE_START = 2.0
+"""Height above the start of the track from which the vehicle lands [m]."""
+ROVER_TURN_RATE = radians(120.0)
+"""Turn rate at full stick [rad/s]."""
+
+
+class Acro(Stabilize):
+    """Sticks command roll and pitch rates; the trainer limits the lean and levels out."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._roll = self._pitch = 0.0
+        self._last: Ns = vehicle.kernel.now()
+
+    def enter(self) -> None:
+        """Begin with the present lean."""
+        self._roll, self._pitch, _ = self.vehicle.estimate.attitude
+        self._last = self.vehicle.kernel.now()
+
+    def step(self) -> None:
+        """Turn the commanded rates into a lean."""
+        vehicle, pilot, most = self.vehicle, self.pilot, self.vehicle.tuning.tilt
+        now = vehicle.kernel.now()
+        passed, self._last = to_seconds(now - self._last), now
+        self._roll += (pilot.roll * ACRO_RATE - self._roll * ACRO_LEVELS) * passed
+        self._pitch += (pilot.pitch * ACRO_RATE - self._pitch * ACRO_LEVELS) * passed
+        self._roll, self._pitch = max(-most, min(most, self._roll)), max(-most, min(most, self._pitch))
+        if pilot.throttle <= 0.0:
+            vehicle.drive(IDLE)
+            return
+        rate, thrust = pilot.yaw * vehicle.tuning.pilot_yaw_rate, self.thrust(pilot.throttle)
+        vehicle.drive(
+            Setpoint(Control.ATTITUDE, roll=self._roll, pitch=self._pitch, yaw_rate=rate, throttle=thrust)
+        )
+
+
+class Drift(Stabilize):
+    """The pitch stick leans, the roll stick turns; without a stick the lean brakes."""
+
+    def step(self) -> None:
+        """Pass the sticks on, with the brake."""
+        vehicle, pilot, tuning = self.vehicle, self.pilot, self.vehicle.tuning
+        if pilot.throttle <= 0.0:
+            vehicle.drive(IDLE)
+            return
+        north, east, _ = vehicle.estimate.velocity
+        heading = vehicle.estimate.attitude[2]
+        ahead = north * cos(heading) + east * sin(heading)
+        right = east * cos(heading) - north * sin(heading)
+        pitch = pilot.pitch * tuning.tilt if pilot.pitch else DRIFT_DAMPING * ahead
+        most = tuning.tilt
+        vehicle.drive(
+            Setpoint(
+                Control.ATTITUDE,
+                roll=max(-most, min(most, -DRIFT_DAMPING * right)),
+                pitch=max(-most, min(most, pitch)),
+                yaw_rate=(pilot.roll + pilot.yaw) * tuning.pilot_yaw_rate / 2.0,
+                throttle=self.thrust(pilot.throttle),
+            )
+        )
+
+
+class CircleMode(ManualFlight):
+    """Fly circles about a point one radius ahead; the throttle commands the climb."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._circle: Circle | None = None
+        self._centre: Vector = (0.0, 0.0, 0.0)
+        self._last: Ns = vehicle.kernel.now()
+
+    def takeoff_requested(self) -> bool:
+        """Return whether the pilot commands a climb."""
+        return self.climb(self.pilot.throttle) > 0.0
+
+    def enter(self) -> None:
+        """Take the centre ahead of the point where the vehicle can stop."""
+        vehicle, tuning = self.vehicle, self.vehicle.tuning
+        estimate = vehicle.estimate
+        north, east, down = stopping_point(estimate.position, estimate.velocity, tuning.accel, tuning.accel_z)
+        heading = estimate.attitude[2]
+        radius = tuning.circle_radius
+        self._centre = (north + radius * cos(heading), east + radius * sin(heading), down)
+        self._last = vehicle.kernel.now()
+        self._circle = Circle(vehicle, self._centre, radius, tuning.circle_rate)
+        self._circle.enter()
+
+    def step(self) -> None:
+        """Raise or lower the circle as the throttle commands, and fly it."""
+        now = self.vehicle.kernel.now()
+        passed, self._last = to_seconds(now - self._last), now
+        if self._circle is None:
+            return
+        self._circle.raise_by(self.climb(self.pilot.throttle) * passed)
+        self._circle.step()
+
+
+class ReturnAlongTrack(Manoeuvre):
+    """Fly or drive back along the points that were passed since arming, then land or stop."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._left: list[Vector] = []
+        self._leg: ToPoint | DriveTo | None = None
+        self._landing: Land | None = None
+        self._home_at: Ns | None = None
+
+    def enter(self) -> None:
+        """Take the track as it is now."""
+        self._left = list(self.vehicle.ground.track)
+        self._leg = None
+        self._next()
+
+    def _next(self) -> None:
+        if not self._left:
+            return
+        point, vehicle = self._left.pop(), self.vehicle
+        if vehicle.flies:
+            if not self._left:
+                point = (point[0], point[1], point[2] - ABOVE_START)
+            flying = ToPoint(vehicle, point)
+            flying.speed = vehicle.tuning.return_speed
+            flying.enter()
+            self._leg = flying
+        else:
+            self._leg = DriveTo(vehicle, point)
+        self.target = point
+
+    def step(self) -> None:
+        """Continue the leg, begin the next, and land at the first point of the track."""
+        now = self.vehicle.kernel.now()
+        if self._landing is not None:
+            self._landing.step()
+            return
+        if self._leg is None:
+            if not self.vehicle.flies:
+                self.vehicle.drive(STANDING)
+            return
+        if self._left and self._leg.arrived(passing=True):
+            self._next()
+        elif not self._left and self.vehicle.flies and self._leg.arrived():
+            self._home_at = now if self._home_at is None else self._home_at
+            if now - self._home_at >= self.vehicle.tuning.return_wait:
+                self._landing, self.landing, self.target = Land(self.vehicle, self._leg.point), True, None
+        self._leg.step()
+
+
+class Steering(Manoeuvre):
+    """Sticks command a rover's speed and turn rate."""
+
+    def step(self) -> None:
+        """Pass the sticks on."""
+        sticks, channels, tuning = self.vehicle.tuning.sticks, self.vehicle.rc, self.vehicle.tuning
+        turn = sticks.travels[0].deflection(channels[sticks.roll])
+        speed = sticks.travels[2].deflection(channels[sticks.throttle]) * tuning.speed
+        self.vehicle.drive(
+            Setpoint(
+                Control.DRIVE,
+                velocity=(speed, 0.0, 0.0),
+                yaw_rate=turn * ROVER_TURN_RATE,
+                speed=max(abs(speed), tuning.speed),
+                accel=tuning.accel,
+            )
+        )
+
+
+class Simple(Manoeuvre):
+    """Sticks command a rover's course about the heading at which the mode was entered."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._ahead = 0.0
+
+    def enter(self) -> None:
+        """Take the present heading as straight ahead."""
+        self._ahead = self.vehicle.estimate.attitude[2]
+
+    def step(self) -> None:
+        """Drive in the direction of the sticks."""
+        sticks, channels, tuning = self.vehicle.tuning.sticks, self.vehicle.rc, self.vehicle.tuning
+        right = sticks.travels[0].deflection(channels[sticks.roll])
+        ahead = sticks.travels[2].deflection(channels[sticks.throttle])
+        speed = min(1.0, hypot(right, ahead)) * tuning.speed
+        self.vehicle.drive(
+            Setpoint(
+                Control.DRIVE,
+                velocity=(speed, 0.0, 0.0),
+                yaw=self._ahead + atan2(right, ahead) if speed else None,
+                speed=tuning.speed,
+                accel=tuning.accel,
+            )
+        )
+
+
+class HoldPlace(Manoeuvre):
+    """Keep a rover near the point where it stopped."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._driving = DriveTo(vehicle, vehicle.estimate.position)
+
+    def enter(self) -> None:
+        """Take the stopping point."""
+        vehicle, tuning = self.vehicle, self.vehicle.tuning
+        estimate = vehicle.estimate
+        point = stopping_point(estimate.position, estimate.velocity, tuning.accel, tuning.accel_z)
+        self._driving = DriveTo(vehicle, point)
+        self.target = point
+
+    def step(self) -> None:
+        """Stand within the waypoint radius; drive back from beyond it."""
+        if self._driving.distance() < self.vehicle.tuning.waypoint_radius:
+            self.vehicle.drive(Setpoint(Control.DRIVE, speed=1.0, accel=self.vehicle.tuning.accel))
+        else:
+            self._driving.step()

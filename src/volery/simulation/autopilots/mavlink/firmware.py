@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 from volery.base.time import MS, Ns, S
-from volery.simulation.autopilots.mavlink.command import Handler
+from volery.simulation.autopilots.mavlink.messages import Handler
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction, do_nothing
 

@@ -18,16 +18,16 @@ from volery.links.mavlink_conventions import from_bytewise, to_bytewise
 from volery.links.mavlink_messages import message_type_of
 from volery.simulation.autopilots.autopilot_parameters import Parameter
 from volery.simulation.autopilots.mavlink.channel import MavlinkChannel, Peer
-from volery.simulation.autopilots.mavlink.command import (
+from volery.simulation.autopilots.mavlink.firmware import MavlinkFirmware, ParameterPolicy
+from volery.simulation.autopilots.mavlink.messages import (
     ACCEPTED,
     FAILED,
     UNSUPPORTED,
     Command,
+    finite,
     from_int,
     from_long,
 )
-from volery.simulation.autopilots.mavlink.firmware import MavlinkFirmware, ParameterPolicy
-from volery.simulation.autopilots.mavlink.message_fields import finite
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
 

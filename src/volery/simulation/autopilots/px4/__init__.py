@@ -4,9 +4,8 @@ The multirotor follows recordings of the firmware's own simulator.
 """
 
 from volery.simulation.autopilots.firmware import DefaultLink, FirmwareFamily
-from volery.simulation.autopilots.px4.copter import COPTER
+from volery.simulation.autopilots.px4.airframes import COPTER, ROVER
 from volery.simulation.autopilots.px4.firmware import ONBOARD, STATION
-from volery.simulation.autopilots.px4.rover import ROVER
 
 DEFAULT_LINKS = (DefaultLink("udp://127.0.0.1:14540", ONBOARD), DefaultLink("udp://127.0.0.1:14550", STATION))
 """Addresses of the firmware's own simulator: for onboard programs and for ground stations."""

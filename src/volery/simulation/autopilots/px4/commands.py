@@ -11,18 +11,19 @@ from typing import Any, Protocol, runtime_checkable
 
 from volery.base.frames import Vector
 from volery.simulation.autopilots.mavlink.channel import GROUND_STATION
-from volery.simulation.autopilots.mavlink.command import (
+from volery.simulation.autopilots.mavlink.firmware import MessageHandler
+from volery.simulation.autopilots.mavlink.messages import (
     ACCEPTED,
     DENIED,
+    FARTHEST,
     TEMPORARILY_REJECTED,
     UNSUPPORTED,
     Command,
     Handler,
+    all_within,
 )
-from volery.simulation.autopilots.mavlink.firmware import MessageHandler
-from volery.simulation.autopilots.mavlink.message_fields import FARTHEST, all_within
 from volery.simulation.autopilots.onboard_mission import GLOBAL_INT
-from volery.simulation.autopilots.px4 import event_interface, geofence, modes, offboard
+from volery.simulation.autopilots.px4 import event_interface, failsafes, modes, offboard
 from volery.simulation.autopilots.px4.flight_modes import Hold
 from volery.simulation.autopilots.px4.modes import (
     CRITICAL,
@@ -32,7 +33,7 @@ from volery.simulation.autopilots.px4.modes import (
     Commander,
     commander_of,
 )
-from volery.simulation.autopilots.px4.pilot_input import deflection, set_rc_channels
+from volery.simulation.autopilots.px4.offboard import deflection, set_rc_channels
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 RETURN, LAND, TAKEOFF, ORBIT = 20, 21, 22, 34
@@ -140,13 +141,13 @@ def on_reposition(vehicle: Vehicle, command: Command) -> int:
     if not flagged:
         holding = vehicle.manoeuvre
         loiters = vehicle.mode.number == modes.LOITER and vehicle.armed
-        if loiters and isinstance(holding, Hold) and geofence.admits(vehicle, point):
+        if loiters and isinstance(holding, Hold) and failsafes.fence_admits(vehicle, point):
             _move_hold(holding, point, heading, command.param1)
         return UNSUPPORTED
     speed = vehicle.commanded.speed
     commander.restart_mode(modes.LOITER)
     holding = vehicle.manoeuvre
-    if isinstance(holding, Hold) and geofence.admits(vehicle, point):
+    if isinstance(holding, Hold) and failsafes.fence_admits(vehicle, point):
         vehicle.commanded.speed = speed
         _move_hold(holding, point, heading, command.param1)
     return ACCEPTED

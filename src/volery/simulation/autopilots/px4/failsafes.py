@@ -1,15 +1,26 @@
-"""Automatic actions of PX4's commander at each tick: ground detection, failsafes, disarming.
+"""Automatic actions of PX4's commander at each tick: ground detection, geofence, other failsafes, disarming.
 
 A failsafe replaces only one of lower rank. Most actions are preceded by a hold of COM_FAIL_ACT_T, in which
 the pilot may react.
+
+The geofence is distance and height from home, and uploaded polygons and circles; rally points are stored.
+Observed with GF_MAX_HOR_DIST and GF_ACTION 3: a DO_REPOSITION beyond the limit is acknowledged as accepted,
+AUTO.LOITER is entered, and the vehicle stays where it is; two texts and two events say why. What a breach in
+flight does follows the firmware's documentation.
 """
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from math import dist
 
+from volery.base.frames import Vector
 from volery.base.time import MS, Ns, from_seconds, to_seconds
-from volery.simulation.autopilots.px4 import event_interface, geofence, modes
+from volery.simulation.autopilots.mavlink.microservices import FENCE, MISSION_UNSUPPORTED, RALLY
+from volery.simulation.autopilots.onboard_mission import MissionItem
+from volery.simulation.autopilots.px4 import event_interface, modes
 from volery.simulation.autopilots.px4.modes import (
     BATTERY_CRITICAL,
     BATTERY_EMERGENCY,
@@ -25,6 +36,93 @@ from volery.simulation.autopilots.px4.modes import (
 )
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
+
+POLYGON_INSIDE, POLYGON_OUTSIDE, CIRCLE_INSIDE, CIRCLE_OUTSIDE, RALLY_POINT = 5001, 5002, 5003, 5004, 5100
+"""MAV_CMD of fence and rally points; the vehicle must stay inside or outside."""
+
+BREACHED = "Geofence violation\t"
+TOO_FAR, TOO_HIGH = "Maximum distance from home reached\t", "Maximum altitude above home reached\t"
+OUTSIDE = "Reposition is outside geofence\t"
+
+
+def fence_breach(vehicle: Vehicle, point: Vector) -> str:
+    """Return the text about a point that is outside the geofence, or an empty text.
+
+    Args:
+        vehicle: The vehicle; without a home position nothing is outside.
+        point: North, east, down about the estimator's origin [m].
+    """
+    farthest, highest = vehicle.parameters["GF_MAX_HOR_DIST"], vehicle.parameters["GF_MAX_VER_DIST"]
+    if vehicle.home is None:
+        return ""
+    if farthest > 0.0 and dist(point[:2], vehicle.home.ned[:2]) > farthest:
+        return TOO_FAR
+    if highest > 0.0 and vehicle.home.ned[2] - point[2] > highest:
+        return TOO_HIGH
+    return "" if _within_points(vehicle, point) else BREACHED
+
+
+def stored_fence_point(kind: int, item: MissionItem) -> MissionItem | int:
+    """Return a point of the fence or a rally point as sent, or the MAV_MISSION_RESULT that refuses it."""
+    known = {FENCE: range(POLYGON_INSIDE, CIRCLE_OUTSIDE + 1), RALLY: (RALLY_POINT,)}
+    return item if item.command in known.get(kind, ()) else MISSION_UNSUPPORTED
+
+
+def _within_points(vehicle: Vehicle, point: Vector) -> bool:
+    """Return whether a point is in one area of the uploaded fence to stay in, and in none to avoid."""
+    kept_in: list[bool] = []
+    for command, corners, radius in _areas(vehicle):
+        if command in (CIRCLE_INSIDE, CIRCLE_OUTSIDE):
+            inside = dist(point[:2], corners[0][:2]) <= radius
+        else:
+            inside = _in_polygon(point, corners)
+        if command in (POLYGON_INSIDE, CIRCLE_INSIDE):
+            kept_in.append(inside)
+        elif inside:
+            return False
+    return any(kept_in) or not kept_in
+
+
+def _areas(vehicle: Vehicle) -> Iterator[tuple[int, Sequence[Vector], float]]:
+    """Yield command, corners or centre, and radius [m] of each area; corners follow each other."""
+    items = vehicle.points.get(FENCE, [])
+    place = 0
+    while place < len(items):
+        item = items[place]
+        circle = item.command in (CIRCLE_INSIDE, CIRCLE_OUTSIDE)
+        count = 1 if circle else max(1, round(item.param1))
+        corners = [
+            vehicle.point(one.frame, one.x / 1e7, one.y / 1e7, one.z) for one in items[place : place + count]
+        ]
+        yield item.command, corners, item.param1
+        place += count
+
+
+def _in_polygon(point: Vector, corners: Sequence[Vector]) -> bool:
+    """Return whether a point is in a polygon, by the number of edges north of it."""
+    inside = False
+    for (north, east, _), (to_north, to_east, _) in pairwise((*corners, corners[0])):
+        if (east > point[1]) != (to_east > point[1]):
+            crossing = north + (point[1] - east) / (to_east - east) * (to_north - north)
+            inside ^= point[0] < crossing
+    return inside
+
+
+def fence_admits(vehicle: Vehicle, point: Vector) -> bool:
+    """Return whether a reposition may go to that point, and report where it may not.
+
+    Without GF_ACTION there is no geofence.
+    """
+    said = fence_breach(vehicle, point) if vehicle.parameters["GF_ACTION"] else ""
+    if not said:
+        return True
+    vehicle.send_text(CRITICAL, said)
+    if said == TOO_FAR:
+        commander_of(vehicle).log.send(event_interface.FENCE_DISTANCE)
+    vehicle.send_text(CRITICAL, OUTSIDE)
+    commander_of(vehicle).log.send(event_interface.REPOSITION_OUTSIDE)
+    return False
+
 
 WARNING = 4
 """MAV_SEVERITY."""
@@ -172,7 +270,7 @@ def _forget_ended_cause(commander: Commander) -> None:
     causes = {
         STICKS_LOST: lambda: not commander.joystick.valid,
         LINK_LOST: lambda: _link_lost(commander),
-        OUTSIDE_FENCE: lambda: bool(geofence.breach(commander.vehicle, commander.vehicle.estimate.position)),
+        OUTSIDE_FENCE: lambda: bool(fence_breach(commander.vehicle, commander.vehicle.estimate.position)),
         BATTERY_CRITICAL: lambda: _battery_below(commander, CRITICALLY_LOW),
         BATTERY_EMERGENCY: lambda: _battery_below(commander, EMERGENCY),
     }
@@ -274,7 +372,7 @@ def _check_geofence(commander: Commander) -> None:
     """React to a vehicle outside of the geofence, as GF_ACTION states."""
     vehicle = commander.vehicle
     action = round(vehicle.parameters["GF_ACTION"])
-    said = geofence.breach(vehicle, vehicle.estimate.position) if action else ""
+    said = fence_breach(vehicle, vehicle.estimate.position) if action else ""
     if not said or _outranked(commander, OUTSIDE_FENCE):
         return
     _report_once(vehicle, CRITICAL, said)

@@ -11,7 +11,6 @@ from functools import partial
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.firmware import BootEvent, BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.flight_stack.flight import Flight
-from volery.simulation.autopilots.mavlink.command import DENIED, FAILED, Handler
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import (
     Builder,
@@ -24,7 +23,8 @@ from volery.simulation.autopilots.mavlink.firmware import (
     StatusTextPolicy,
     TelemetryPolicy,
 )
-from volery.simulation.autopilots.px4 import geofence, mission, telemetry
+from volery.simulation.autopilots.mavlink.messages import DENIED, FAILED, Handler
+from volery.simulation.autopilots.px4 import failsafes, mission, telemetry
 from volery.simulation.autopilots.px4.commands import DO_SET_MODE, MESSAGE_HANDLERS, set_mode
 from volery.simulation.autopilots.px4.modes import LOITER, READY_AFTER, Commander, commander_of
 from volery.simulation.autopilots.vehicle_state import (
@@ -220,7 +220,7 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
                 mission.request_message, received="", falls_back_to_int=True, keeps_old=True
             ),
             stored_item=mission.stored_item,
-            stored_point=geofence.stored_point,
+            stored_point=failsafes.stored_fence_point,
         ),
         parameters=PARAMETERS,
         texts=TEXTS,

@@ -12,7 +12,7 @@ from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
     point_height,
 )
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
-from volery.simulation.autopilots.mavlink.command import Command
+from volery.simulation.autopilots.mavlink.messages import Command
 from volery.simulation.autopilots.onboard_mission import (
     CHANGE_SPEED,
     DELAY,

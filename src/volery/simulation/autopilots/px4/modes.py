@@ -12,10 +12,9 @@ from dataclasses import replace
 
 from volery.base.frames import Vector
 from volery.base.time import MS, Ns
-from volery.simulation.autopilots.mavlink.command import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
 from volery.simulation.autopilots.px4 import event_interface
-from volery.simulation.autopilots.px4.offboard import SetpointStream
-from volery.simulation.autopilots.px4.pilot_input import Joystick
+from volery.simulation.autopilots.px4.offboard import Joystick, SetpointStream
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
 

@@ -9,8 +9,8 @@ from math import atan2, degrees, hypot, nan
 
 from volery.base.frames import euler_to_quaternion, quaternion_to_euler
 from volery.base.time import MS, US, Ns, S
-from volery.simulation.autopilots.mavlink import message_fields
-from volery.simulation.autopilots.mavlink.message_fields import (
+from volery.simulation.autopilots.mavlink import messages
+from volery.simulation.autopilots.mavlink.messages import (
     EPOCH_US,
     Fields,
     boot_ms,
@@ -40,12 +40,12 @@ def _aligned(vehicle: Vehicle) -> bool:
 
 def attitude(vehicle: Vehicle) -> Fields | None:
     """Return ATTITUDE once the estimator is aligned."""
-    return message_fields.attitude(vehicle) if _aligned(vehicle) else None
+    return messages.attitude(vehicle) if _aligned(vehicle) else None
 
 
 def attitude_quaternion(vehicle: Vehicle) -> Fields | None:
     """Return ATTITUDE_QUATERNION once the estimator is aligned."""
-    return message_fields.attitude_quaternion(vehicle) if _aligned(vehicle) else None
+    return messages.attitude_quaternion(vehicle) if _aligned(vehicle) else None
 
 
 def global_position(vehicle: Vehicle) -> Fields | None:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from volery.links.paparazzi_aircraft import stock_aircraft
-from volery.simulation.autopilots.paparazzi.basic_plan import PLAN
+from volery.simulation.autopilots.paparazzi.firmware import PLAN
 
 Make = Callable[..., Any]
 

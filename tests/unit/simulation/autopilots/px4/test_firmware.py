@@ -21,8 +21,14 @@ from volery.simulation.autopilots.px4 import FIRMWARE
 from volery.simulation.autopilots.px4.event_interface import ArmingChecks, arming_report
 from volery.simulation.autopilots.px4.flight_modes import apply_expo, interpolated
 from volery.simulation.autopilots.px4.modes import custom_mode, main_and_sub
-from volery.simulation.autopilots.px4.offboard import OffboardTarget, SetpointStream, attitude_target
-from volery.simulation.autopilots.px4.pilot_input import Joystick, StickDeflection, deflection
+from volery.simulation.autopilots.px4.offboard import (
+    Joystick,
+    OffboardTarget,
+    SetpointStream,
+    StickDeflection,
+    attitude_target,
+    deflection,
+)
 from volery.simulation.world.body_specs import Multirotor, Rover
 
 
