@@ -1,10 +1,20 @@
 """The flying API: vehicles with blocking operations, and what a driver of an autopilot is."""
 
-from volery.vehicles.driver import Capability, Driver, DriverFactory, drivers
+from volery.vehicles.driver import (
+    Capability,
+    ChangeSpeed,
+    Driver,
+    DriverFactory,
+    Land,
+    MissionItem,
+    ReturnHome,
+    TakeOff,
+    Waypoint,
+    drivers,
+)
 from volery.vehicles.drone import Drone
 from volery.vehicles.fleet import Fleet
 from volery.vehicles.limits import Fence, Limits, Zone
-from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.rover import Rover
 from volery.vehicles.telemetry import Attitude, Battery, StatusText, Velocity
 from volery.vehicles.vehicle import Vehicle

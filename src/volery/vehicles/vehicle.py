@@ -41,10 +41,20 @@ from volery.base.time import MINUTE, MS, Ns, S, from_seconds, to_seconds
 from volery.kernel.api import Handle, Kernel
 from volery.kernel.task import ExecutionContext, Task
 from volery.trace.events import Operation, Text
-from volery.vehicles.driver import Capability, Driver, ManualControl, Step
+from volery.vehicles.driver import (
+    Capability,
+    Driver,
+    Land,
+    ManualControl,
+    MissionItem,
+    ReturnHome,
+    Step,
+    TakeOff,
+    Waypoint,
+    item_problem,
+)
 from volery.vehicles.executor import LINK_TIMEOUT, StepExecutor, describe_state
 from volery.vehicles.limits import Bounds, BoundsMonitor, Fence, Limits, Path, low_battery, states_amsl
-from volery.vehicles.mission import Land, MissionItem, ReturnHome, TakeOff, Waypoint, item_problem
 from volery.vehicles.operation import (
     FLY_MISSION,
     LAST_RESORT,

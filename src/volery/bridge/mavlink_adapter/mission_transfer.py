@@ -26,7 +26,7 @@ from volery.bridge.mavlink_adapter.command_handler import (
 )
 from volery.bridge.mavlink_adapter.drone_commands import global_position
 from volery.links.mavlink_messages import constant, entry_name
-from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
+from volery.vehicles.driver import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 
 Fields = dict[str, Any]
 Send = Callable[[str, Fields], None]

@@ -14,8 +14,7 @@ from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant
 from volery.ros.graph import Node
 from volery.ros.messages import new
-from volery.vehicles.drivers.ardupilot.link_loss import LINK_LOSS_PARAMETERS
-from volery.vehicles.drivers.ardupilot.modes import NUMBERS, RESTING, mode_name
+from volery.vehicles.drivers.ardupilot.modes import LINK_LOSS_PARAMETERS, NUMBERS, RESTING, mode_name
 from volery.vehicles.drivers.mavlink.backend import (
     INT_FRAMES,
     POSITION_ONLY,

@@ -16,7 +16,7 @@ from volery.base.position import Position
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import Action, Kernel
 from volery.ros.messages.dji_constants import GUIDES, HEADERS, HEALTHY_GPS, DisplayMode, Source
-from volery.vehicles.driver import Capability, ManualControl, Step
+from volery.vehicles.driver import Capability, ManualControl, MissionItem, Step
 from volery.vehicles.drivers.dji.backend import QUIET, DjiBackend
 from volery.vehicles.drivers.dji.decoder import MOST_VOLTS, SETTLED, STALE, TAKEN_OVER_FOR
 from volery.vehicles.drivers.dji.missions import MissionRunner, above_home, check_amsl
@@ -42,7 +42,6 @@ from volery.vehicles.drivers.steps import (
     heading_reached,
     immediate_step,
 )
-from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 LOW_THROTTLE = 0.3

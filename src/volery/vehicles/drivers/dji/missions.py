@@ -11,12 +11,11 @@ from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import Ns, S
 from volery.ros.messages import message_class
 from volery.ros.messages.dji_constants import MISSION_SPEEDS, DisplayMode
-from volery.vehicles.driver import Step
+from volery.vehicles.driver import ChangeSpeed, Land, MissionItem, ReturnHome, Step, TakeOff, Waypoint
 from volery.vehicles.drivers.dji.backend import Ack
 from volery.vehicles.drivers.dji.node_interfaces import START_MISSION
 from volery.vehicles.drivers.dji.sequences import LANDING_MODES, RESEND_PERIOD, SDK, WAITS, DjiSteps, DjiTasks
 from volery.vehicles.drivers.steps import ANSWERED_WITHIN, arrived_at, send_nothing
-from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.telemetry import Telemetry
 
 FEWEST, MOST = 2, 99

@@ -14,7 +14,7 @@ from volery.kernel.api import Action, Kernel
 from volery.links.link import Link
 from volery.ros.graph import Node
 from volery.vehicles.address import MAVLINK_OPTIONS, check_options
-from volery.vehicles.driver import Capability, Repeat, Step
+from volery.vehicles.driver import Capability, MissionItem, Repeat, Step
 from volery.vehicles.drivers.mavlink.backend import Ack, Backend, Item
 from volery.vehicles.drivers.mavlink.mavros_backend import namespace_and_geoid
 from volery.vehicles.drivers.steps import (
@@ -29,7 +29,6 @@ from volery.vehicles.drivers.steps import (
     ready_step,
     send_nothing,
 )
-from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Telemetry
 
 ARMING_CHECKS_PERIOD: Ns = 5 * S

@@ -1,7 +1,7 @@
 """Paparazzi rotorcraft: one driver, over pprzlink or over pprzros topics.
 
 It follows the public definitions of the protocol and what version 6.2 did in its own simulator;
-``modes.ASSUMED`` lists the assumptions.
+``decoder.ASSUMED`` lists the assumptions.
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ from volery.links.pprzlink_codec import PPRZLINK
 from volery.ros.graph import Node
 from volery.vehicles.address import check_options
 from volery.vehicles.driver import DriverFactory
-from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
+from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend, PprzrosLink
+from volery.vehicles.drivers.paparazzi.decoder import LAND_BLOCK, START_BLOCK, TAKEOFF_BLOCK
 from volery.vehicles.drivers.paparazzi.driver import Paparazzi
-from volery.vehicles.drivers.paparazzi.modes import LAND_BLOCK, START_BLOCK, TAKEOFF_BLOCK
-from volery.vehicles.drivers.paparazzi.pprzros_link import PprzrosLink
 from volery.vehicles.drivers.paparazzi.sequences import Blocks
 
 __all__ = ["DRIVER", "Paparazzi", "open_driver", "open_pprzros"]

@@ -1,6 +1,6 @@
 """Driver of Paparazzi rotorcraft: the steps of each operation.
 
-Facts from public definitions and sources; see ``modes.ASSUMED``. Nothing is acknowledged. Motors start and
+Facts from public definitions and sources; see ``decoder.ASSUMED``. Nothing is acknowledged. Motors start and
 stop by a setting or by a block of the flight plan. Blocks take off and land; in between the aircraft follows
 set-points in GUIDED, which last until the next one. Telemetry is late: a position by 0.25 s, a change of mode
 by up to 1.2 s, a block by up to 1.6 s. A position without a fix counts for nothing: in GUIDED the aircraft
@@ -20,9 +20,9 @@ from volery.base.errors import CapabilityError, LinkError, NotArrived, Refused
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.vehicles.driver import Capability, ManualControl, Step
+from volery.vehicles.driver import Capability, ManualControl, MissionItem, Step
 from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
-from volery.vehicles.drivers.paparazzi.modes import ATTITUDE_MODE, FAILSAFE, GUIDED, HEIGHT_MODE
+from volery.vehicles.drivers.paparazzi.decoder import ATTITUDE_MODE, FAILSAFE, GUIDED, HEIGHT_MODE
 from volery.vehicles.drivers.paparazzi.sequences import LIFTED_M, Blocks, PaparazziSteps, TakeoffAndLanding
 from volery.vehicles.drivers.steps import (
     DRONE_KIND,
@@ -35,7 +35,6 @@ from volery.vehicles.drivers.steps import (
     immediate_step,
     ready_step,
 )
-from volery.vehicles.mission import MissionItem
 from volery.vehicles.telemetry import Velocity
 
 CAPABILITIES = frozenset(

@@ -24,7 +24,7 @@ from volery.vehicles.drivers.paparazzi.backend import (
     PaparazziSetpoints,
     Setpoint,
 )
-from volery.vehicles.drivers.paparazzi.modes import (
+from volery.vehicles.drivers.paparazzi.decoder import (
     CHANGE,
     FAILSAFE,
     GUIDED,

@@ -31,8 +31,7 @@ from volery.vehicles.drivers.mavlink.backend import (
 from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
 from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend, to_ros_yaw_rate
 from volery.vehicles.drivers.px4.decoder import PX4Decoder
-from volery.vehicles.drivers.px4.link_loss import LINK_LOSS_PARAMETERS
-from volery.vehicles.drivers.px4.modes import HOLD, MODES
+from volery.vehicles.drivers.px4.modes import HOLD, LINK_LOSS_PARAMETERS, MODES
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Velocity
 

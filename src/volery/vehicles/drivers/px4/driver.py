@@ -28,7 +28,17 @@ from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Positio
 from volery.base.time import MINUTE, MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant
-from volery.vehicles.driver import ManualControl, Repeat, Step
+from volery.vehicles.driver import (
+    ChangeSpeed,
+    Land,
+    ManualControl,
+    MissionItem,
+    Repeat,
+    ReturnHome,
+    Step,
+    TakeOff,
+    Waypoint,
+)
 from volery.vehicles.drivers.mavlink.backend import (
     GROUND_SPEED,
     OWN_SPEED,
@@ -40,8 +50,7 @@ from volery.vehicles.drivers.mavlink.backend import (
 from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
 from volery.vehicles.drivers.px4 import modes
 from volery.vehicles.drivers.px4.backend import PX4Backend, Setpoint
-from volery.vehicles.drivers.px4.link_loss import on_link_loss
-from volery.vehicles.drivers.px4.modes import HOLD, OFFBOARD
+from volery.vehicles.drivers.px4.modes import HOLD, OFFBOARD, on_link_loss
 from volery.vehicles.drivers.px4.setpoints import (
     SETPOINT_PERIOD,
     STILL,
@@ -63,7 +72,6 @@ from volery.vehicles.drivers.steps import (
     immediate_step,
     send_nothing,
 )
-from volery.vehicles.mission import ChangeSpeed, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 TAKEOFF_SHORT_M = 1.5

@@ -14,7 +14,7 @@ from volery.kernel.waiting import sleep
 from volery.links.in_process_link import in_process_pair
 from volery.vehicles import Rover
 from volery.vehicles.drivers.ardupilot import open_driver
-from volery.vehicles.drivers.ardupilot.link_loss import on_link_loss
+from volery.vehicles.drivers.ardupilot.modes import on_link_loss
 from volery.vehicles.drivers.mavlink.client import parameter_value
 
 Make = Callable[..., Any]

@@ -21,7 +21,7 @@ from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.links.pprzlink_messages import entry_value
 from volery.vehicles.drivers.paparazzi import open_driver
-from volery.vehicles.drivers.paparazzi.modes import NUMBERS
+from volery.vehicles.drivers.paparazzi.decoder import NUMBERS
 
 ORIGIN = (43.4622222, 1.2733333)  # degrees
 AMSL_M, GEOID_M = 185.0, 48.5

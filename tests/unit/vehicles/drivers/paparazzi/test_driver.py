@@ -25,7 +25,7 @@ from volery.base.time import S
 from volery.kernel.waiting import sleep
 from volery.trace.events import Operation, Text
 from volery.vehicles import Capability
-from volery.vehicles.mission import Waypoint
+from volery.vehicles.driver import Waypoint
 
 Make = Callable[..., Any]
 LATITUDE, LONGITUDE, AMSL_M = 43.4622222, 1.2733333, 185.0

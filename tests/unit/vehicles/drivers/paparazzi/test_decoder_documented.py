@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from volery.vehicles.drivers.paparazzi.modes import ASSUMED
+from volery.vehicles.drivers.paparazzi.decoder import ASSUMED
 
 PAGE = Path(__file__).parents[5] / "docs" / "paparazzi.md"
 
