@@ -7,8 +7,8 @@ from typing import Any
 
 from rigs.missions import carried_out
 from volery.base.frames import LocalFrame
+from volery.base.installed import Registry
 from volery.base.position import AMSL, AboveHome, Position
-from volery.base.registry import Registry
 from volery.base.seeds import stream
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel

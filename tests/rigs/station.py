@@ -12,8 +12,7 @@ from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.simulation.autopilots.autopilot import Autopilot
-from volery.simulation.autopilots.firmware import FirmwareFamily
+from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor, Rover
 

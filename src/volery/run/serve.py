@@ -13,7 +13,7 @@ from volery.run.assembly.ros_graphs import open_graph
 from volery.run.assembly.simulated_fleet import SimulatedFleet, fleet_of
 from volery.run.assembly.simulated_vehicles import SimulatedVehicle
 from volery.run.assembly.vehicle_nodes import graph_access
-from volery.simulation.autopilots.firmware import firmwares
+from volery.simulation.autopilots.autopilot import firmwares
 from volery.trace.events import Event, LinkState
 from volery.vehicles.address import SIGNING, Address, listen, parse_listen
 

@@ -42,7 +42,7 @@ from volery.model.faults import (
 )
 from volery.run.assembly.computers import LOAD_PERIOD, LOAD_PRIORITY, load_name
 from volery.run.assembly.simulated_fleet import SimulatedFleet, wind_of
-from volery.simulation.autopilots.firmware import firmwares
+from volery.simulation.autopilots.autopilot import firmwares
 from volery.trace.events import Text
 
 WARNING = 4
@@ -219,7 +219,7 @@ def _slow_computer(fault: ComputerSlowed, affected: Affected, active: bool) -> N
                 LOAD_PERIOD,
                 partial(
                     processor.load,
-                    ExecutionContext(load_name(processor.name), processor, LOAD_PRIORITY),
+                    ExecutionContext(load_name(processor.name), processor, LOAD_PRIORITY, deadline=0),
                     piece,
                 ),
             )

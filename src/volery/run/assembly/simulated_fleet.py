@@ -23,10 +23,8 @@ from volery.model.environment import Battery as BatteryModel
 from volery.model.environment import Vehicle as VehicleModel
 from volery.model.environment import Wind as WindModel
 from volery.run.assembly.simulated_vehicles import LINK_DELAY, SimulatedVehicle
-from volery.run.progress import VehicleProgress
-from volery.run.result import SAMPLING_PERIOD
-from volery.simulation.autopilots.autopilot import Autopilot
-from volery.simulation.autopilots.firmware import FirmwareFamily, firmwares
+from volery.run.result import SAMPLING_PERIOD, VehicleProgress
+from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily, firmwares
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
 from volery.simulation.world.body_specs import Battery, BodySpec, Multirotor, Rover
 from volery.simulation.world.environment_models import Wind

@@ -14,8 +14,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.simulation.autopilots.ardupilot import FIRMWARE
-from volery.simulation.autopilots.autopilot import Autopilot
-from volery.simulation.autopilots.firmware import firmwares
+from volery.simulation.autopilots.autopilot import Autopilot, firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor, Rover
 

@@ -3,8 +3,7 @@
 from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
-from volery.simulation.autopilots.autopilot import Autopilot
-from volery.simulation.autopilots.firmware import firmwares
+from volery.simulation.autopilots.autopilot import Autopilot, firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.state_groups import NEVER, GroundState
 from volery.simulation.world.body_specs import Multirotor

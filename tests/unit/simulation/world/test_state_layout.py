@@ -38,14 +38,12 @@ def test_fields_cover_every_column_once(module, layout):
 
 @pytest.mark.parametrize(("module", "layout"), LAYOUTS)
 def test_constants_and_declarations_are_the_same(module, layout):
-    before = (
-        None if module is state_layout else state_layout
-    )  # names imported from the layout that it continues
+    imported = vars(state_layout) if module is flight_state else {}
     declared = {field.name: field.column for field in layout.fields}
     constants = {
         name: value
         for name, value in vars(module).items()
-        if name.startswith(PREFIXES) and isinstance(value, int) and getattr(before, name, None) is None
+        if name.startswith(PREFIXES) and isinstance(value, int) and name not in imported
     }
     assert constants == declared
 

@@ -11,7 +11,7 @@ from functools import partial
 
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.modes import INFO, update_prearm_state
-from volery.simulation.autopilots.firmware import BootEvent
+from volery.simulation.autopilots.autopilot import BootEvent
 from volery.simulation.autopilots.mavlink.firmware import BootBytes
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
 

@@ -40,8 +40,8 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
     Z_CONTROL,
     Health,
 )
+from volery.simulation.autopilots.autopilot import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
-from volery.simulation.autopilots.firmware import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, GuidedAttitude
 from volery.simulation.autopilots.manoeuvres.manual_flight import (
     Acro,

@@ -2,7 +2,7 @@
 
 Parameters set triggers and actions. The fence includes the upload of its points and of rally points, and the
 refusal of points beyond it: a recorded copter sent "Fence Breached" and began the return; a guided point
-beyond the fence is ignored without a text. Avoidance, which slows a vehicle down at the fence, is not modelled.
+beyond the fence is ignored without a text. Avoidance (slowing down at the fence) is not modelled.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
     change_mode,
     disarm,
 )
-from volery.simulation.autopilots.firmware import Failsafe
+from volery.simulation.autopilots.autopilot import Failsafe
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, finite
 from volery.simulation.autopilots.onboard_mission import (

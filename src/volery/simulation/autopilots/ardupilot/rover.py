@@ -43,8 +43,8 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
     Health,
     nav_controller,
 )
+from volery.simulation.autopilots.autopilot import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
-from volery.simulation.autopilots.firmware import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.manoeuvres.manual_flight import (
     HoldPlace,
     ReturnAlongTrack,

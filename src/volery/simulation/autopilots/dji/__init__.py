@@ -4,8 +4,8 @@ The protocol follows public definitions. All other behaviour is assumed: see ``f
 ``parameters``.
 """
 
+from volery.simulation.autopilots.autopilot import FirmwareFamily
 from volery.simulation.autopilots.dji.firmware import COPTER
-from volery.simulation.autopilots.firmware import FirmwareFamily
 
 FIRMWARE = FirmwareFamily("dji", {"multirotor": COPTER}, codec=None)
 """Entry point of the firmware. There is no codec: the aircraft is reached over a ROS graph."""

@@ -16,6 +16,7 @@ from volery.ros.messages.dji_constants import (
     DisplayMode,
     Source,
 )
+from volery.simulation.autopilots.autopilot import BootEvent, BootSequence, Failsafe, Firmware, PeriodicWork
 from volery.simulation.autopilots.dji.endpoint import DjiEndpoint
 from volery.simulation.autopilots.dji.flight_controller import (
     CONFIRM_BELOW_M,
@@ -50,7 +51,6 @@ from volery.simulation.autopilots.dji.sdk_setpoints import (
     LIFT_OFF_PERCENT,
     SdkControl,
 )
-from volery.simulation.autopilots.firmware import BootEvent, BootSequence, Failsafe, Firmware, PeriodicWork
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, Loiter
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (

@@ -21,7 +21,11 @@ from numpy.typing import NDArray
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.base.time import Ns
-from volery.simulation.autopilots.flight_stack.attitude_control import detect_landing, run_attitude_loops
+from volery.simulation.autopilots.flight_stack.control_loops import (
+    detect_landing,
+    guide_rover,
+    run_attitude_loops,
+)
 from volery.simulation.autopilots.flight_stack.estimator import initialise_estimate, update_estimate
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_AIDED,
@@ -41,7 +45,6 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     GpsFix,
 )
 from volery.simulation.autopilots.flight_stack.guidance import GUIDE_EVERY, guide_multirotor
-from volery.simulation.autopilots.flight_stack.rover_guidance import guide_rover
 from volery.simulation.world.body_specs import BodySpec, Multirotor
 from volery.simulation.world.body_step import digest_of, start_body, step_body, world_sources
 from volery.simulation.world.environment_models import Terrain, Wind

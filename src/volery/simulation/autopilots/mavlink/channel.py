@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
 from volery.links.link import ByteLink, Frame, Link
-from volery.links.mavlink_conventions import MessageStreams
+from volery.links.mavlink_messages import MessageStreams
 from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
 from volery.simulation.autopilots.state_groups import NEVER
 

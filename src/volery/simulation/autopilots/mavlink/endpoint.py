@@ -15,7 +15,7 @@ from typing import Any
 from volery.base.time import S
 from volery.kernel.api import Action, Handle
 from volery.links.link import Frame, Link
-from volery.links.mavlink_conventions import MessageStreams, status_text_chunks
+from volery.links.mavlink_messages import MessageStreams, status_text_chunks
 from volery.simulation.autopilots.mavlink.channel import AUTOPILOT, MavlinkChannel, Peer, StatusTextQueue
 from volery.simulation.autopilots.mavlink.firmware import MavlinkFirmware
 from volery.simulation.autopilots.mavlink.microservices import (

@@ -14,8 +14,7 @@ from zlib import crc32
 
 from volery.base.time import MS, US, Ns, S
 from volery.kernel.api import Handle
-from volery.links.mavlink_conventions import from_bytewise, to_bytewise
-from volery.links.mavlink_messages import message_type_of
+from volery.links.mavlink_messages import from_bytewise, message_type_of, to_bytewise
 from volery.simulation.autopilots.autopilot_parameters import Parameter
 from volery.simulation.autopilots.mavlink.channel import MavlinkChannel, Peer
 from volery.simulation.autopilots.mavlink.firmware import MavlinkFirmware, ParameterPolicy

@@ -4,7 +4,7 @@ Protocol and rules follow public definitions; nothing was compared with a flight
 """
 
 from volery.links.pprzlink_codec import PPRZLINK
-from volery.simulation.autopilots.firmware import DefaultLink, FirmwareFamily
+from volery.simulation.autopilots.autopilot import DefaultLink, FirmwareFamily
 from volery.simulation.autopilots.paparazzi.firmware import ROTORCRAFT
 
 GROUND_SEGMENT = DefaultLink("udp://127.0.0.1:4242?from=4243")

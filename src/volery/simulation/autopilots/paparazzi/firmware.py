@@ -15,7 +15,7 @@ from functools import partial
 from volery.base.frames import Vector
 from volery.base.time import MS, Ns, S
 from volery.links.paparazzi_aircraft import stock_aircraft
-from volery.simulation.autopilots.firmware import BootEvent, BootSequence, Firmware, PeriodicWork
+from volery.simulation.autopilots.autopilot import BootEvent, BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold
 from volery.simulation.autopilots.paparazzi import parameters
 from volery.simulation.autopilots.paparazzi.endpoint import PaparazziEndpoint

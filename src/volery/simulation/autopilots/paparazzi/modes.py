@@ -11,7 +11,7 @@ the mode is entered while the cause persists.
 from __future__ import annotations
 
 from volery.base.time import MS, Ns, S, from_seconds
-from volery.simulation.autopilots.firmware import Failsafe
+from volery.simulation.autopilots.autopilot import Failsafe
 from volery.simulation.autopilots.paparazzi import rotorcraft_state
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import RADIO_OK, RADIO_REALLY_LOST, state_of
 from volery.simulation.autopilots.vehicle_state import Vehicle

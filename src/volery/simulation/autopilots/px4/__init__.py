@@ -3,7 +3,7 @@
 The multirotor follows recordings of the firmware's own simulator.
 """
 
-from volery.simulation.autopilots.firmware import DefaultLink, FirmwareFamily
+from volery.simulation.autopilots.autopilot import DefaultLink, FirmwareFamily
 from volery.simulation.autopilots.px4.airframes import COPTER, ROVER
 from volery.simulation.autopilots.px4.firmware import ONBOARD, STATION
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from volery.base.time import MS, Ns, S
-from volery.simulation.autopilots.firmware import BootEvent, BootSequence, Firmware, PeriodicWork
+from volery.simulation.autopilots.autopilot import BootEvent, BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import (

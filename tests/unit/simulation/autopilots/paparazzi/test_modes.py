@@ -10,8 +10,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.kernel.virtual import VirtualKernel
-from volery.simulation.autopilots.autopilot import Autopilot
-from volery.simulation.autopilots.firmware import firmwares
+from volery.simulation.autopilots.autopilot import Autopilot, firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.paparazzi import FIRMWARE
 from volery.simulation.world.body_specs import Rover

@@ -12,7 +12,7 @@ from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.links.mavlink_conventions import from_bytewise, status_text_chunks, to_bytewise
+from volery.links.mavlink_messages import from_bytewise, status_text_chunks, to_bytewise
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.mavlink.channel import StatusTextQueue

@@ -1,0 +1,97 @@
+"""Checks of a model against this installation, before a run: the names it may use, and its components.
+
+Every Python file is loaded as a run loads it: its imports and its top level are executed, its classes are
+compared with the ports, parameters and operations of the model. Nothing is constructed and no time passes.
+C++ components are compiled when a run starts and are not checked here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from volery.base.errors import ModelError, VoleryError
+from volery.components.loader import Loader
+from volery.components.programs import ScriptProgram
+from volery.components.virtual_stdlib import virtual_modules
+from volery.cost import load_catalogue
+from volery.kernel.virtual import VirtualKernel
+from volery.model.instances import Instance
+from volery.model.reading import ProcessorKind, Vocabulary
+from volery.model.system import System
+from volery.model.text import CollectedModelError
+from volery.requirements.observables import OBSERVABLES
+from volery.ros.client_libraries.importable_modules import importable_modules
+from volery.ros.graph import EmbeddedGraph
+from volery.ros.messages import define_imported
+from volery.run.assembly.component_builder import PYTHON_ROS, provided_operations, python_program
+from volery.run.assembly.cpp import is_cpp
+from volery.run.ending import Ending
+from volery.simulation.autopilots.autopilot import firmwares
+
+LANGUAGES = frozenset({"c++", "python", "rclpy", "roscpp", "rospy"})
+"""Languages of components that can run."""
+
+
+def vocabulary() -> Vocabulary:
+    """Return the names that a model is checked against."""
+    autopilots = frozenset(firmwares.names())
+    return Vocabulary(_kinds(), LANGUAGES, autopilots, OBSERVABLES, _kinds)
+
+
+def _kinds(*more: Path) -> dict[str, ProcessorKind]:
+    return {
+        name: ProcessorKind(
+            entry.cores,
+            entry.least_mhz * 1e6,
+            entry.greatest_mhz * 1e6,
+            tuple(one * 1e6 for one in entry.set_to()),
+        )
+        for name, entry in load_catalogue(*more).processors.items()
+    }
+
+
+def check_components(system: System, languages: Iterable[str]) -> None:
+    """Load the components of *system* and compare them with the model.
+
+    Args:
+        system: The model.
+        languages: Languages that run; components in others are left out.
+
+    Raises:
+        ModelError: A file cannot be loaded or does not fit; all of them at once (``CollectedModelError``).
+    """
+    known = frozenset(languages)
+    found = {str(error): error for error in _faults(system, known)}
+    if len(found) == 1:
+        raise next(iter(found.values()))
+    if found:
+        raise CollectedModelError(found.values())
+
+
+def _faults(system: System, languages: frozenset[str]) -> Iterator[ModelError]:
+    kernel = VirtualKernel()
+    farewell = Ending(kernel).farewell
+    modules = importable_modules(EmbeddedGraph(kernel), {}, {}, farewell)
+    loader = Loader({**virtual_modules(kernel, seed=0), **modules})
+    for instance in system.instances:
+        component = instance.component
+        if not component.path or is_cpp(component) or component.language not in languages:
+            continue
+        try:
+            _check_instance(system, instance, loader)
+        except ModelError as error:
+            yield error
+        except VoleryError as error:
+            yield ModelError(str(error), f"components.{component.name}", component.where)
+
+
+def _check_instance(system: System, instance: Instance, loader: Loader) -> None:
+    if instance.component.language in PYTHON_ROS:
+        define_imported(system.file_of(instance.component))
+    program = python_program(system, instance, loader)
+    given = {one.port for one in instance.connections.values() if one.targets}
+    if not isinstance(program, ScriptProgram):  # a script reads its parameters from ROS
+        given |= set(instance.parameters)
+    operations = provided_operations(system, instance)
+    program.check(sorted(given), operations, instance.activity is not None)
