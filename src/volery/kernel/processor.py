@@ -6,6 +6,8 @@ Schedulers:
 SCHED_FIFO).
 * ``round-robin``: without priorities; a job that has run for a `quantum` goes to the end if others wait.
 * ``fifo``: without priorities; first come, first served, without preemption.
+* ``edf``: the earliest absolute deadline runs, preemptively (Linux's SCHED_DEADLINE without reservations);
+jobs without a deadline run after all others, by priority.
 
 A job keeps its core while it runs, and takes the free core of lowest number when it starts or continues.
 Placing a job on a core that served another owner last takes `context_switch` of that core first, which the
@@ -21,7 +23,7 @@ from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns
-from volery.kernel.task import ExecutionContext, Task
+from volery.kernel.task import NO_DEADLINE, ExecutionContext, Task
 from volery.kernel.virtual import FOREVER, NEVER, VirtualKernel
 from volery.trace.events import Preemption, Slice
 
@@ -47,13 +49,14 @@ class Job:
     arrival: int
     remaining: Ns
     core: int = NO_CORE
+    deadline: Ns = NO_DEADLINE  # absolute
     started: Ns = 0
     turn_ends: Ns = 0
     timer: Handle | None = None
     done: bool = False
 
 
-Order = tuple[int, int]
+Order = tuple[int, ...]
 
 
 def _by_priority(job: Job) -> Order:
@@ -64,10 +67,15 @@ def _by_arrival(job: Job) -> Order:
     return 0, job.arrival
 
 
+def _by_deadline(job: Job) -> Order:
+    return job.deadline, -job.priority, job.arrival
+
+
 SCHEDULERS: dict[str, Callable[[Job], Order]] = {
     "fixed-priority": _by_priority,
     "round-robin": _by_arrival,
     "fifo": _by_arrival,
+    "edf": _by_deadline,
 }
 
 
@@ -135,7 +143,7 @@ class Processor:
                 self._busy += total
                 self._kernel.record(Slice(start, start + total, self.name, 0, task.name, component))
                 return
-        job = Job(task, task.name, component, task.priority, 0, amount)
+        job = Job(task, task.name, component, task.priority, 0, amount, deadline=task.deadline)
         self._admit(job)
         try:
             while not job.done:
@@ -151,7 +159,9 @@ class Processor:
         job = self._background.get(context)
         if job is None:
             name = f"{context.component} (background)"
-            job = Job(context, name, context.component, context.priority or 0, 0, amount)
+            relative = context.deadline
+            due = NO_DEADLINE if relative is None else self._kernel.now() + relative
+            job = Job(context, name, context.component, context.priority or 0, 0, amount, deadline=due)
             self._background[context] = job
             self._admit(job)
         else:

@@ -16,6 +16,9 @@ from volery.trace.events import NONE, Activation
 MAX_SWALLOWED_CANCELLATIONS = 10
 """A task that has caught more cancellations than this without ending is left blocked and never runs again."""
 
+NO_DEADLINE: Ns = 2**63 - 1
+"""The absolute deadline of an activation without one."""
+
 
 class Cancelled(BaseException):
     """Ends a task at its next interaction point. Not an ``Exception``, which components may catch."""
@@ -131,6 +134,12 @@ class Task:
             if context.priority is not None:
                 return context.priority
         return 0
+
+    @property
+    def deadline(self) -> Ns:
+        """Absolute deadline of the activation in progress, ns; ``NO_DEADLINE`` without one."""
+        relative = self.contexts[0].deadline
+        return NO_DEADLINE if relative is None or self.released is None else self.released + relative
 
     def charge(self, amount: Ns) -> None:
         """Add `amount` ns of execution time, which is spent at the next interaction point."""

@@ -43,7 +43,7 @@ from volery.model.instances import Instance
 from volery.model.reading import NOTE_PREFIX, Observable, Reading
 from volery.model.text import Node, Path
 
-SCHEDULERS = ("fixed-priority", "round-robin", "fifo")
+SCHEDULERS = ("fixed-priority", "round-robin", "fifo", "edf")
 """Fixed-priority is preemptive: a greater number is more urgent, equals go in order of arrival."""
 
 MAINS = "mains"

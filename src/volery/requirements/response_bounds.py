@@ -44,6 +44,10 @@ MOST_ACTIVATIONS = 64
 """The search ends without a bound after so many activations in one busy window."""
 
 
+JITTERED_ROW = 64
+"""Releases with jitter whose spans are exact; in longer rows the jitter counts again every so many."""
+
+
 @dataclass(frozen=True)
 class Demand:
     """The demand of a task.
@@ -61,9 +65,11 @@ class Demand:
     least_priority: int
 
     @classmethod
-    def periodic(cls, name: str, priority: int, cost: Ns, period: Ns) -> Demand:
-        """Return the demand of activations that execute *cost* each, released at least *period* apart."""
-        return cls(name, priority, (cost,), (period,), priority)
+    def periodic(cls, name: str, priority: int, cost: Ns, period: Ns, jitter: Ns = 0) -> Demand:
+        """Return the demand of activations of *cost*, due a *period* apart, each up to *jitter* late."""
+        rows = JITTERED_ROW + jitter // period if jitter else 1
+        spans = tuple(max(0, number * period - jitter) for number in range(1, rows + 1))
+        return cls(name, priority, (cost,), spans, priority)
 
     def cost(self, activations: int) -> Ns:
         """Return the most that *activations* in a row execute."""

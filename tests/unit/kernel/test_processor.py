@@ -13,7 +13,7 @@ from volery.kernel.network import Network
 from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.kernel.waiting import executing_in
+from volery.kernel.waiting import current_task, executing_in
 from volery.trace.events import Event, Preemption
 
 Slices = Callable[[], list[tuple[float, float, str, str]]]
@@ -115,6 +115,33 @@ def test_round_robin_continues_a_job_for_which_no_other_waits(virtual: VirtualKe
     compute(virtual, core, "b", at=10, ms=1)
     virtual.run(S)
     assert slices() == [(0, 12, "cpu.0", "a"), (12, 13, "cpu.0", "b"), (13, 21, "cpu.0", "a")]
+
+
+def test_the_earliest_deadline_runs_first(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu", scheduler="edf")
+
+    def spawn(name: str, at: int, ms: int, deadline: int | None) -> None:
+        context = ExecutionContext(name, core, 9, deadline=None if deadline is None else deadline * MS)
+
+        def body() -> None:
+            virtual.sleep_until(at * MS)
+            current_task(virtual).release(at * MS)
+            virtual.consume(ms * MS)
+
+        virtual.spawn(body, name, context)
+
+    spawn("late", 0, 6, 20)
+    spawn("soon", 2, 3, 10)
+    spawn("later", 3, 2, 40)
+    spawn("none", 0, 1, None)
+    virtual.run(S)
+    assert slices() == [
+        (0, 2, "cpu.0", "late"),
+        (2, 5, "cpu.0", "soon"),
+        (5, 9, "cpu.0", "late"),
+        (9, 11, "cpu.0", "later"),
+        (11, 12, "cpu.0", "none"),
+    ]
 
 
 def test_two_cores_run_the_two_most_urgent(virtual: VirtualKernel, slices: Slices) -> None:

@@ -56,7 +56,7 @@ def start_background_load(kernel: Kernel, processor: Processor, model: Processor
     if model.load <= 0.0:
         return
     for core in range(model.cores):
-        context = ExecutionContext(load_name(model.name), processor, LOAD_PRIORITY)
+        context = ExecutionContext(load_name(model.name), processor, LOAD_PRIORITY, deadline=0)
         load = _CoreLoad(kernel, processor, context, model.load, seed, core)
         kernel.call_at(kernel.now() + LOAD_PERIOD * core // model.cores, load.begin)
 
