@@ -28,10 +28,8 @@ from volery.base.errors import UsageError, choices, did_you_mean
 from volery.kernel.api import Kernel
 from volery.links.coded_link import CodedLink
 from volery.links.link import Codec
-from volery.links.mavlink_codec import MAVLINK
-from volery.links.mavlink_signing import SignedMavlink, read_key
-from volery.links.serial_link import SerialLink
-from volery.links.tcp_link import TcpClient, TcpServer
+from volery.links.mavlink_codec import MAVLINK, SignedMavlink, read_key
+from volery.links.stream_links import SerialLink, TcpClient, TcpServer
 from volery.links.udp_link import UdpLink, UdpServer
 
 TRANSPORTS = ("graph", "ros1", "ros2", "serial", "sim", "tcp", "udp")

@@ -13,14 +13,7 @@ from enum import Enum
 from math import isfinite, nan
 from typing import Any, NamedTuple, Protocol
 
-from volery.base.errors import (
-    CapabilityError,
-    LinkError,
-    LinkGarbled,
-    LinkSilent,
-    NotArrived,
-    VehicleError,
-)
+from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent, NotArrived, VehicleError
 from volery.base.installed import Registry
 from volery.base.position import Position
 from volery.base.time import Ns

@@ -9,14 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from volery.base.errors import (
-    Failsafe,
-    LinkLost,
-    NotArrived,
-    Overridden,
-    Refused,
-    VehicleError,
-)
+from volery.base.errors import Failsafe, LinkLost, NotArrived, Overridden, Refused, VehicleError
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.api import Action, Handle, Kernel
 from volery.kernel.waiting import sleep

@@ -14,8 +14,7 @@ from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSile
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.links.link import Frame, Link
-from volery.links.mavlink_conventions import from_bytewise
-from volery.links.mavlink_messages import constant, entry_name, message_type
+from volery.links.mavlink_messages import constant, entry_name, from_bytewise, message_type
 from volery.trace.events import LinkState
 from volery.vehicles.address import rate_option, records_texts, system_option
 from volery.vehicles.driver import link_error

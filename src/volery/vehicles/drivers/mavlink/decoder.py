@@ -11,8 +11,7 @@ from volery.base.errors import UsageError
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
-from volery.links.mavlink_conventions import StatusTextAssembler
-from volery.links.mavlink_messages import constant, entry_name
+from volery.links.mavlink_messages import StatusTextAssembler, constant, entry_name
 from volery.trace.events import Text
 from volery.vehicles.drivers.mavlink.backend import ACTIVE, ARMED, FAILSAFE, ON_GROUND, UNDEFINED
 from volery.vehicles.drivers.steps import DRONE_KIND, ROVER_KIND

@@ -19,7 +19,7 @@ from volery.vehicles.driver import DriverFactory
 from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend, PprzrosLink
 from volery.vehicles.drivers.paparazzi.decoder import LAND_BLOCK, START_BLOCK, TAKEOFF_BLOCK
 from volery.vehicles.drivers.paparazzi.driver import Paparazzi
-from volery.vehicles.drivers.paparazzi.sequences import Blocks
+from volery.vehicles.drivers.paparazzi.takeoff_and_landing import Blocks
 
 __all__ = ["DRIVER", "Paparazzi", "open_driver", "open_pprzros"]
 

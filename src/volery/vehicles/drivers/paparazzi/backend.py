@@ -9,18 +9,24 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
-from math import hypot, radians
 from typing import Any, NamedTuple
 
 from volery.base.errors import CapabilityError, LinkError, LinkSilent, UsageError
-from volery.base.time import MS, Ns, S
+from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
 from volery.links.link import Frame, Link, Receiver
 from volery.links.paparazzi_aircraft import PaparazziAircraft, Setting
-from volery.links.pprzlink_codec import TO_GROUND, quantised
+from volery.links.pprzlink_codec import (
+    FROM_ROS,
+    PPRZROS_TYPE,
+    TO_GROUND,
+    TO_ROS,
+    quantised,
+    to_frame,
+    to_message,
+)
 from volery.links.pprzlink_messages import TELEMETRY, entry_value, message_type
-from volery.links.pprzros_messages import FROM_ROS, TO_ROS, TYPE, to_frame, to_message
 from volery.ros.graph import Node, Work
 from volery.trace.events import LinkState
 from volery.vehicles.address import records_texts, system_option
@@ -28,15 +34,13 @@ from volery.vehicles.driver import ManualControl, link_error
 from volery.vehicles.drivers.paparazzi.decoder import (
     AUTO2,
     CHANGE,
-    GUIDED,
     KILL_THROTTLE,
     MODE,
     NUMBERS,
     STATUS,
     PaparazziDecoder,
 )
-from volery.vehicles.drivers.steps import SetpointRepeater, at_rest
-from volery.vehicles.telemetry import Answer, Telemetry, Velocity
+from volery.vehicles.telemetry import Answer, Telemetry
 
 KEPT = 1000
 """Messages that may wait for the task in each direction; older ones are dropped."""
@@ -63,9 +67,9 @@ class PprzrosLink:
         self._received = False
         self._wrong = ""
         self._closed = False
-        self._publisher = node.advertise(f"{stem}/{FROM_ROS}", TYPE)
+        self._publisher = node.advertise(f"{stem}/{FROM_ROS}", PPRZROS_TYPE)
         self._spinner = node.group()
-        node.subscribe(f"{stem}/{TO_ROS}", TYPE, self._handle, group=node.group(self._take))
+        node.subscribe(f"{stem}/{TO_ROS}", PPRZROS_TYPE, self._handle, group=node.group(self._take))
         place = replace(node.context, deadline=None, on_release=None, meter=None)
         kernel.spawn(self._run, f"pprzros link of {node.name}", place, kernel.root.child(self.name))
 
@@ -136,8 +140,6 @@ PING_PERIOD: Ns = S
 SILENT_AFTER: Ns = 3 * S
 WRONG_ANSWERS = 5
 """Number of times that a setting may differ from the telemetry, which is 0.25 to 2 s late."""
-CONTROL_PERIOD: Ns = 100 * MS
-VELOCITY_PERIOD: Ns = 250 * MS
 
 RELATIVE, BODY, RELATIVE_Z, RELATIVE_YAW = 0x01, 0x02, 0x04, 0x08
 VELOCITY, VELOCITY_Z, YAW_RATE = 0x20, 0x40, 0x80
@@ -150,10 +152,6 @@ SWITCHES = (FULL, FULL, 0, 0, 0, 0, 0)
 """Channels of RC_UP behind the sticks: mode switch in its third position, kill switch off, others centred."""
 REFUSALS = 2
 """Answers with another mode that are a refusal: one may have been sent before the command arrived."""
-STOPS = 4
-"""Least number of velocities of zero at the end of a velocity: 1 s."""
-SLOWED, NOISE_M_S, TURNED_DEG = 0.5, 0.1, 2.0
-"""Share of a slow velocity, error of the estimate, and turn within 1 s, at which it has stopped."""
 STOP = entry_value("EMERGENCY_CMD", "cmd", "KILL")
 COME_DOWN = entry_value("EMERGENCY_CMD", "cmd", "LAND")
 
@@ -170,9 +168,6 @@ class Setpoint(NamedTuple):
     down: float
     yaw: float
     flags: int = 0
-
-
-STILL = Setpoint(0.0, 0.0, 0.0, 0.0, BY_VELOCITY)
 
 
 class PaparazziBackend:
@@ -384,58 +379,3 @@ class PaparazziBackend:
         """Stop the pings and close the link."""
         self._ping.cancel()
         self._link.close()
-
-
-class PaparazziSetpoints(SetpointRepeater):
-    """Repeats velocities in GUIDED, and manual control in the modes that this program commanded."""
-
-    def __init__(self, kernel: Kernel, backend: PaparazziBackend) -> None:
-        super().__init__(
-            kernel,
-            backend.telemetry,
-            GUIDED,
-            velocity_period=VELOCITY_PERIOD,
-            control_period=CONTROL_PERIOD,
-        )
-        self._backend = backend
-        self._speed = 0.0  # commanded last, m/s
-        self._headings: list[float] = []  # degrees, at each velocity of zero at the end of a velocity
-
-    def follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
-        """Repeat a velocity for *lasting*, then a velocity of zero until the vehicle is seen to stand."""
-        self._speed = hypot(*velocity)
-        self._headings = []
-        super().follow(velocity, yaw_rate, lasting)
-
-    def has_stopped(self) -> bool:
-        """Return whether a fresh position shows that it has stopped, and turns no more.
-
-        The last velocity has no end: a command that is lost must be sent again.
-        """
-        seen = self._backend.telemetry
-        self._headings.append(seen.attitude.heading)
-        if len(self._headings) <= STOPS or self._backend.decoder.lacks_position() or not at_rest(seen):
-            return False
-        turned = (self._headings[-1] - self._headings[-1 - STOPS] + 180.0) % 360.0 - 180.0
-        slow = self._speed == 0.0 or hypot(*seen.velocity) <= max(NOISE_M_S, SLOWED * self._speed)
-        return slow and abs(turned) <= TURNED_DEG
-
-    def send_stop(self) -> None:
-        """Send a velocity of zero once."""
-        self._backend.send_setpoint(STILL)
-
-    def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
-        """Send a velocity and a turn rate once; zero once its position does not count any more."""
-        if self._backend.decoder.lacks_position():
-            self.send_stop()
-            return
-        north, east, up = velocity
-        self._backend.send_setpoint(Setpoint(north, east, -up, radians(yaw_rate), BY_VELOCITY))
-
-    def is_commanded(self, mode: str) -> bool:
-        """Return whether *mode* is one of ours."""
-        return mode in self._backend.decoder.ours
-
-    def send_control(self, control: ManualControl) -> None:
-        """Send manual control like a transmitter."""
-        self._backend.send_manual_control(control)

@@ -23,7 +23,8 @@ from volery.kernel.api import Action, Kernel
 from volery.vehicles.driver import Capability, ManualControl, MissionItem, Step
 from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
 from volery.vehicles.drivers.paparazzi.decoder import ATTITUDE_MODE, FAILSAFE, GUIDED, HEIGHT_MODE
-from volery.vehicles.drivers.paparazzi.sequences import LIFTED_M, Blocks, PaparazziSteps, TakeoffAndLanding
+from volery.vehicles.drivers.paparazzi.sequences import PaparazziSteps
+from volery.vehicles.drivers.paparazzi.takeoff_and_landing import LIFTED_M, Blocks, TakeoffAndLanding
 from volery.vehicles.drivers.steps import (
     DRONE_KIND,
     READY_WITHIN,

@@ -51,12 +51,7 @@ from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
 from volery.vehicles.drivers.px4 import modes
 from volery.vehicles.drivers.px4.backend import PX4Backend, Setpoint
 from volery.vehicles.drivers.px4.modes import HOLD, OFFBOARD, on_link_loss
-from volery.vehicles.drivers.px4.setpoints import (
-    SETPOINT_PERIOD,
-    STILL,
-    ManualControlStream,
-    OffboardStream,
-)
+from volery.vehicles.drivers.px4.setpoints import SETPOINT_PERIOD, STILL, ManualControlStream, OffboardStream
 from volery.vehicles.drivers.steps import (
     DRONE_KIND,
     READY_WITHIN,

@@ -17,8 +17,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
-from volery.links.pprzlink_codec import PPRZLINK
-from volery.links.pprzros_messages import TYPE, to_message
+from volery.links.pprzlink_codec import PPRZLINK, PPRZROS_TYPE, to_message
 from volery.ros.graph import EmbeddedGraph
 from volery.ros.messages import new
 from volery.trace.events import Operation
@@ -111,10 +110,10 @@ def test_a_bridge_that_publishes_nonsense(peer: Any) -> None:
 
     def babble() -> None:
         node = at.graph.node("babbler")
-        publisher = node.advertise("/bee/pprzros/to_ros", TYPE)
+        publisher = node.advertise("/bee/pprzros/to_ros", PPRZROS_TYPE)
         for _ in range(20):
             sleep(at.kernel, S)
-            publisher.publish(new(TYPE, msg_name="NO_SUCH_MESSAGE", sender_id=7, data=[1, 2, 3]))
+            publisher.publish(new(PPRZROS_TYPE, msg_name="NO_SUCH_MESSAGE", sender_id=7, data=[1, 2, 3]))
 
     at.kernel.spawn(babble, "babbler", ExecutionContext("babbler"))
     with pytest.raises(LinkSilent, match="cannot be decoded: pprzlink has no message 'NO_SUCH_MESSAGE'"):
@@ -127,8 +126,8 @@ def test_the_root_is_where_pprzros_itself_is(peer: Any) -> None:
 
     def bridge() -> None:
         node = at.graph.node("pprzros")
-        publisher = node.advertise("/pprzros/to_ros", TYPE)
-        node.subscribe("/pprzros/from_ros", TYPE, received.append, group=(group := node.group()))
+        publisher = node.advertise("/pprzros/to_ros", PPRZROS_TYPE)
+        node.subscribe("/pprzros/from_ros", PPRZROS_TYPE, received.append, group=(group := node.group()))
         status = Frame("ROTORCRAFT_STATUS", {"ap_mode": 13}, 7, 0)
         while not received:
             sleep(at.kernel, S)
