@@ -26,7 +26,7 @@ from tempfile import TemporaryDirectory
 
 from volery.ros.transports.ros1 import Roscore
 from volery.ros.transports.ros1.master import environment
-from volery.ros.transports.ros1.package_export import write_package
+from volery.ros.transports.ros1.rospy_copy import write_package
 
 RATES_HZ = (10, 50)
 SETTLE_S = 2.0

@@ -24,7 +24,7 @@ from volery.links.in_process_link import in_process_pair
 from volery.links.link import Frame
 from volery.ros import messages
 from volery.ros.graph import EmbeddedGraph, free
-from volery.ros.messages.cdr import copied_to_cdr
+from volery.ros.messages.encodings import copied_to_cdr
 
 POSE = "geometry_msgs/msg/PoseStamped"
 

@@ -28,9 +28,8 @@ from typing import Any
 import numpy as np
 
 from native import ACTIVATIONS, JUDGING, KERNELS, costs_of, wanted
+from volery.calibration.core_measurement import core_law, isa, measure
 from volery.calibration.host_machine import this_machine
-from volery.calibration.processor.core_fit import core_law
-from volery.calibration.processor.microbenchmarks import isa, measure
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native.block_costs import blocks_of, static_costs
 from volery.cost.native.compilation import (

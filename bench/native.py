@@ -23,9 +23,8 @@ from pathlib import Path
 from statistics import mean, median
 from tempfile import TemporaryDirectory
 
+from volery.calibration.core_measurement import core_law, isa, measure
 from volery.calibration.host_machine import this_machine
-from volery.calibration.processor.core_fit import core_law
-from volery.calibration.processor.microbenchmarks import isa, measure
 from volery.cost import load_catalogue
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native.block_costs import BlockCosts, traced_costs

@@ -15,8 +15,8 @@ import sys
 from pathlib import Path
 from statistics import mean
 
-from volery.calibration.python.operation_costs import calibrate
-from volery.calibration.python.timed_code import Rounds, TimedCode, timed_program
+from volery.calibration.operation_costs import calibrate
+from volery.calibration.timed_code import Rounds, TimedCode, timed_program
 from volery.cost.instrumentation import StepCounter
 from volery.cost.python_operations import operation_table
 

@@ -26,22 +26,16 @@ from rich.console import Console
 
 from volery.base.errors import UsageError
 from volery.calibration.host_machine import put_law, this_machine
+from volery.calibration.node_comparison import NodeComparison, compare, estimate_nodes, prepare_nodes
+from volery.calibration.node_processes import MeasuredRun, measurement_session
 from volery.calibration.ros.call_costs import CallCost, Round, call_costs
-from volery.calibration.ros.campaign import Conditions, Plan
-from volery.calibration.ros.campaign_results import format_line, ros_law, write_entry
+from volery.calibration.ros.campaign import Conditions, Plan, format_line, ros_law, write_entry
 from volery.calibration.ros.probe_environment import Pace, check_client, own_master, probe_setup
-from volery.calibration.validation.node_comparison import (
-    NodeComparison,
-    compare,
-    estimate_nodes,
-    prepare_nodes,
-)
-from volery.calibration.validation.node_processes import MeasuredRun, measurement_session
-from volery.cli.commands.validate import comparison_tables
+from volery.cli.commands.cost import comparison_tables
 from volery.cost import load_catalogue
 from volery.model.system import System
 from volery.model.system_loader import load
-from volery.run.assembly.vocabulary import vocabulary
+from volery.run.assembly.model_checks import vocabulary
 
 NODES = Path(__file__).parent / "ros_nodes"
 PACE = Pace(block_ms=400.0, sleeps_ms=(10.0, 20.0, 50.0, 100.0, 200.0))

@@ -44,7 +44,11 @@ WORDS = (
 
 PROSE = {".py", ".md", ".h", ".hpp", ".cpp", ".c", ".toml", ".yaml", ".j2", ".js", ".sh"}
 WORDS_IN = ("src", "docs", "examples", "bench", "scripts", "README.md", "CONTRIBUTING.md", "SECURITY.md")
-NOT_PROSE = ("src/volery/calibration/python/programs/", "scripts/check_sources.py", "docs/design/glossary.md")
+NOT_PROSE = (
+    "src/volery/calibration/timed_programs.py",
+    "scripts/check_sources.py",
+    "docs/design/glossary.md",
+)
 ALLOWED = (re.compile(r"interfaces?|surfaces?|type\s*faces?|typefaces?", re.IGNORECASE),)
 
 VARIANTS = (
@@ -119,12 +123,7 @@ def file_names() -> Iterator[str]:
     for path in tracked("src"):
         place = path.relative_to(PACKAGE).parent
         variant = place.parts[:1] == ("cli",) or any(str(each) in VARIANTS for each in place.parents)
-        if (
-            path.suffix == ".py"
-            and path.name != "__init__.py"
-            and not variant
-            and "programs" not in path.parts
-        ):
+        if path.suffix == ".py" and path.name != "__init__.py" and not variant:
             named[path.name].append(str(path.relative_to(PACKAGE)))
     for name, paths in sorted(named.items()):
         if len(paths) > 1:

@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from volery.testing.driver_conformance import conformance
-from volery.testing.fault_trials import PHASES, try_fault
-from volery.testing.trial_faults import FAULTS
+from volery.testing.fault_trials import FAULTS, PHASES, try_fault
 
 AUTOPILOTS = ("ardupilot", "px4", "paparazzi", "dji")
 KEPT = Path(__file__).parent.parent / "docs" / "reference" / "trials.json"

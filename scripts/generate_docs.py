@@ -24,12 +24,12 @@ from volery.model.faults import FAULTS, TRIAL_FAULTS, Fault
 from volery.model.fields import entries, summary
 from volery.requirements.observables import NOTED, OBSERVABLES
 from volery.simulation.autopilots.ardupilot import FIRMWARE as ARDUPILOT
-from volery.simulation.autopilots.firmware import FirmwareFamily
+from volery.simulation.autopilots.autopilot import FirmwareFamily
 from volery.simulation.autopilots.px4 import FIRMWARE as PX4
 from volery.testing.driver_checks import GROUPS
 from volery.testing.driver_conformance import chosen
+from volery.testing.fault_trials import FAULTS as TRIALS
 from volery.testing.fault_trials import PHASES
-from volery.testing.trial_faults import FAULTS as TRIALS
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "docs" / "reference"

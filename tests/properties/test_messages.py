@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from volery.base.errors import UsageError
 from volery.ros import messages
-from volery.ros.messages.stamp import TimeValue
+from volery.ros.messages.message import TimeValue
 
 FLOATS = st.floats(allow_nan=False, width=64)
 TEXTS = st.text(st.characters(exclude_characters="\x00", exclude_categories=["Cs"]), max_size=40)

@@ -7,11 +7,15 @@ know worlds, simulated autopilots or any one driver.
 """
 
 from volery.bridge.mavlink_adapter import MavlinkAdapter
-from volery.bridge.mavros_names import MAVROS
+from volery.bridge.naming_schemes import MAVROS, ROSCOPTER
 from volery.bridge.node_interface import NamingScheme
-from volery.bridge.pprzros_node import PprzrosNode, serve_pprzros
-from volery.bridge.roscopter_names import ROSCOPTER
-from volery.bridge.vehicle_node import VehicleNode, VehicleNodeOptions, serve_vehicle
+from volery.bridge.vehicle_node import (
+    PprzrosNode,
+    VehicleNode,
+    VehicleNodeOptions,
+    serve_pprzros,
+    serve_vehicle,
+)
 
 __all__ = [
     "MAVROS",

@@ -12,7 +12,7 @@ from math import nan
 from typing import Any, NamedTuple
 
 from volery.base.time import Ns
-from volery.bridge.mode_names import AutopilotType, mode_name
+from volery.bridge.autopilot_link import AutopilotType, mode_name
 from volery.bridge.node_interface import (
     BODY,
     LATCHED_STATE,
@@ -22,8 +22,7 @@ from volery.bridge.node_interface import (
     Translator,
     stamped,
 )
-from volery.links.mavlink_conventions import StatusTextAssembler
-from volery.links.mavlink_messages import entry_name
+from volery.links.mavlink_messages import StatusTextAssembler, entry_name
 from volery.ros.messages import message_class, new
 
 _UNKNOWN_U16 = 65535

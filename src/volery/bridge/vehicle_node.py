@@ -1,12 +1,16 @@
-"""The vehicle node: one vehicle on the graph under MAVROS's or roscopter's names.
+"""The vehicle node: one vehicle on the graph under MAVROS's or roscopter's names, or as pprzros serves it.
 
 A loop publishes telemetry. With a period (10 Hz by default) it publishes each HEARTBEAT, text, parameter and
 reached waypoint as received, and of all other messages the latest; without a period it publishes what arrives
 as it arrives. Set-points are forwarded by a task of their own. Each service request has a task of its own, so
 that a command that waits for its acknowledgement does not delay others. All work is charged to the node's
-context as calls into ROS; decoding MAVLink is not charged.
+context as calls into ROS; decoding MAVLink or pprzlink is not charged. Topics and services for whose types
+the graph has no definition are omitted with a warning.
 
-Topics and services for whose types the graph has no definition are omitted with a warning.
+The pprzros node carries the messages of a Paparazzi aircraft's link on two topics, unchanged: those of the
+aircraft on ``pprzros/to_ros`` (10 Hz, as pprzros does); messages on ``pprzros/from_ros`` are sent as they
+arrive. Differences from pprzros: ``comp_id``, ``receiver_id`` and ``checksum`` are filled in; a message that
+cannot be sent is dropped with a warning.
 """
 
 from __future__ import annotations
@@ -20,12 +24,18 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.geoid import EGM96, Geoid
 from volery.base.time import MS, Ns, S
-from volery.bridge.autopilot_link import AutopilotLink, ReceivedFrame, StreamRequests
-from volery.bridge.mavros_names import MAVROS
-from volery.bridge.mode_names import AUTOPILOT_NAMES, mode_name
+from volery.bridge.autopilot_link import (
+    AUTOPILOT_NAMES,
+    AutopilotLink,
+    ReceivedFrame,
+    StreamRequests,
+    mode_name,
+)
+from volery.bridge.naming_schemes import MAVROS
 from volery.bridge.node_interface import InterfaceContext, NamingScheme, NodeInterface, Subscription
 from volery.kernel.task import ExecutionContext, Scope, Task
-from volery.links.link import Link
+from volery.links.link import Frame, Link
+from volery.links.pprzlink_codec import FROM_ROS, PPRZROS_TYPE, TO_ROS, to_frame, to_message
 from volery.ros.graph import Node, Publisher, RosGraph, Work
 from volery.trace.events import Text
 
@@ -251,5 +261,74 @@ def serve_vehicle(
 ) -> VehicleNode:
     """Serve the autopilot behind *link* under ``/name`` until the end of the run, executing in *context*."""
     served = VehicleNode(graph, link, f"/{name}", options)
+    served.start(context, graph.kernel.root)
+    return served
+
+
+PPRZROS_PERIOD: Ns = 100 * MS
+MAX_WAITING = 200
+"""Frames that wait for the loop; the queues of pprzros are shorter."""
+
+
+class PprzrosNode:
+    """Serves the aircraft behind *link* under *namespace* (``/drone_1/pprzros/to_ros``), from ``start`` on.
+
+    pprzros itself uses the root namespace ``/``.
+    """
+
+    def __init__(self, graph: RosGraph, link: Link, namespace: str) -> None:
+        self._graph, self._kernel = graph, graph.kernel
+        self._link = link
+        self.namespace = namespace
+        self._unpublished: list[tuple[Frame, Ns]] = []
+        self._component = ""
+        self._aircraft: set[int] = set()
+        link.receive(self._on_frame)
+
+    def start(self, context: ExecutionContext, scope: Scope) -> Task:
+        """Spawn the task of the node, which executes in *context* and ends with *scope*."""
+        self._component = context.component
+        return self._kernel.spawn(lambda: self._run(context, scope), context.component, context, scope)
+
+    @property
+    def summary(self) -> str:
+        """Ids of the aircraft that have sent frames; empty if there are none."""
+        return f"aircraft {', '.join(map(str, sorted(self._aircraft)))}" if self._aircraft else ""
+
+    def _on_frame(self, frame: Frame) -> None:
+        """Queue a frame. Framework callback."""
+        self._aircraft.add(frame.system)
+        if len(self._unpublished) < MAX_WAITING:
+            self._unpublished.append((frame, self._kernel.now()))
+
+    def _run(self, context: ExecutionContext, scope: Scope) -> None:
+        node = self._graph.node("pprzros", self.namespace, context=context)
+        publisher = node.advertise(TO_ROS, PPRZROS_TYPE)
+        group = node.group()
+        node.subscribe(FROM_ROS, PPRZROS_TYPE, self._send, group=group)
+        helper = replace(context, deadline=None, period=None, on_release=None)
+        self._kernel.spawn(group.spin, f"{context.component} (datalink)", helper, scope)
+        rate = node.rate(PPRZROS_PERIOD)
+        while not node.closed:
+            with self._kernel:
+                received, self._unpublished = self._unpublished, []
+            for frame, at in received:
+                publisher.publish(to_message(frame, self._graph.epoch + at))
+            rate.sleep()
+
+    def _send(self, message: Any) -> None:
+        try:
+            frame = to_frame(message)
+            with self._kernel:
+                self._link.send(frame)
+        except UsageError as error:
+            with self._kernel as kernel:
+                text = f"{FROM_ROS}: message dropped: {error}"
+                kernel.record(Text(kernel.now(), self._component, WARNING, text))
+
+
+def serve_pprzros(graph: RosGraph, link: Link, name: str, context: ExecutionContext) -> PprzrosNode:
+    """Serve the aircraft behind *link* under ``/name`` until the end of the run, executing in *context*."""
+    served = PprzrosNode(graph, link, f"/{name}")
     served.start(context, graph.kernel.root)
     return served

@@ -1,7 +1,7 @@
 """How a command is declared, called and ended.
 
-A file in ``volery.cli.commands`` declares its commands with a ``Commands`` object called ``commands``.
-``volery.cli.main`` finds every such file, so a new command is one new file and nothing else. These files
+A file in ``volery.cli.commands`` declares its commands with a ``Commands`` object, and one more for each
+group such as ``volery bag``. ``volery.cli.main`` finds all of them, so a new command changes one file. They
 import the library inside their functions: ``volery --help`` imports all of them and must stay quick.
 
 A command is a function of an ``Output`` and of its options, and returns its exit status. The options that
@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 import typer
 
 from volery.base.errors import CapabilityError, EstimateError, ModelError, UsageError, VoleryError
-from volery.base.extras import missing_extra
+from volery.base.installed import missing_extra
 from volery.cli.console import Output
 from volery.cli.options import Debug, Json, Quiet
 
@@ -43,7 +43,7 @@ Command = TypeVar("Command", bound=Callable[..., int])
 
 
 class Commands:
-    """The commands of one file, at the top level or in a *group* such as ``volery bag``."""
+    """Commands of one file, at the top level or in a *group* such as ``volery bag``."""
 
     def __init__(self, section: str, *, group: str = "", summary: str = "") -> None:
         self.section, self.group, self.summary = section, group, summary

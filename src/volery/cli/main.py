@@ -38,8 +38,8 @@ def _application() -> typer.Typer:
         rich_markup_mode="markdown",
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    names = [f"{commands.__name__}.{one.name}" for one in iter_modules(commands.__path__)]
-    found: list[Commands] = [import_module(name).commands for name in names]
+    modules = [import_module(f"{commands.__name__}.{one.name}") for one in iter_modules(commands.__path__)]
+    found = [one for module in modules for one in vars(module).values() if isinstance(one, Commands)]
     for one in sorted(found, key=lambda one: SECTIONS.index(one.section)):
         one.add_to(app)
     return app

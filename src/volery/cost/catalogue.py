@@ -9,8 +9,8 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from volery.base.errors import EstimateError, ModelError, choices, did_you_mean
-from volery.base.extras import require_extra
 from volery.base.files import read_text
+from volery.base.installed import require_extra
 from volery.cost.code_laws import CodeLaw, CoreLaw, check_range
 from volery.cost.figures import PowerLaw, WithProvenance
 from volery.cost.ros_law import RosLaw

@@ -21,7 +21,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from volery.base.extras import require_extra
+from volery.base.installed import require_extra
 from volery.cost.figures import WithProvenance
 
 Operations = Iterator[tuple[str, int]]

@@ -2,7 +2,7 @@
 
 One class per kind declares its arguments with their units, ranges, defaults and descriptions. From it follow
 the model's parser, its JSON Schema and the generated page of faults. The effect of each kind on a simulated
-run is in ``volery.run.assembly.fault_effects``; fault trials (``volery.testing.trial_faults``) use the
+run is in ``volery.run.assembly.fault_effects``; fault trials (``volery.testing.fault_trials``) use the
 same classes.
 
 A new kind of fault: a class here with ``@fault``, its effect there.

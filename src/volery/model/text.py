@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from volery.base.errors import Location, ModelError, choices, did_you_mean
-from volery.base.extras import require_extra
+from volery.base.installed import require_extra
 
 try:
     from ruamel.yaml import YAML

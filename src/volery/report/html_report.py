@@ -19,8 +19,8 @@ from typing import Any, NamedTuple, get_args
 from rich.console import RenderableType
 
 from volery.base.errors import UsageError
-from volery.base.extras import require_extra
 from volery.base.files import write_text
+from volery.base.installed import require_extra
 from volery.report.comparison import all_comparisons
 from volery.report.digest import Digest, Json
 from volery.report.grids import (

@@ -20,9 +20,8 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.run.assembly.vehicles import ObservedVehicles, OpenedVehicles, VehicleSettings, open_vehicles
 from volery.run.ending import Ending
-from volery.run.progress import LostLinkReporter, ProgressReporter, Tell
 from volery.run.recording import Recording
-from volery.run.result import DEFAULT_OPTIONS, Options, Run
+from volery.run.result import DEFAULT_OPTIONS, LostLinkReporter, Options, ProgressReporter, Run, Tell
 from volery.trace.attachments import (
     WORLD_ATTACHMENT,
     Origin,

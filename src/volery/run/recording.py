@@ -14,9 +14,8 @@ from pathlib import Path
 from time import perf_counter
 
 from volery.base.errors import UsageError
-from volery.base.extras import MissingExtraError
 from volery.base.files import create_file
-from volery.base.registry import Registry
+from volery.base.installed import MissingExtraError, Registry
 from volery.base.time import Ns
 from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RUN_FILE, RunRecord, Status, write_record

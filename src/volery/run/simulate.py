@@ -18,15 +18,13 @@ from volery.run.assembly.component_builder import Builder, BuiltComponents
 from volery.run.assembly.computers import Platform, PowerFeed
 from volery.run.assembly.cpp import compile_all, has_cpp
 from volery.run.assembly.fault_effects import Affected, FleetLinks, inject, with_faulty_links
+from volery.run.assembly.model_checks import vocabulary
 from volery.run.assembly.simulated_fleet import SimulatedFleet
-from volery.run.assembly.vocabulary import vocabulary
 from volery.run.distributed import DistributedRun, GraphSettings, HostPlatform, unallocated, without_computers
 from volery.run.ending import Ending
-from volery.run.progress import ProgressReporter
 from volery.run.recording import Recording
-from volery.run.recovery import recover_run
-from volery.run.result import DEFAULT_OPTIONS, Options, Run
-from volery.run.supervision import Supervision, run_supervised
+from volery.run.result import DEFAULT_OPTIONS, Options, ProgressReporter, Run
+from volery.run.supervision import Supervision, recover_run, run_supervised
 from volery.run.trace_setup import attachments_of, setup_of
 from volery.trace.attachments import RunSetup
 from volery.trace.events import Text

@@ -23,8 +23,7 @@ from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
 from volery.base.time import to_seconds
 from volery.testing.checks import CHECKS, Check, CheckFailedError, NotPossibleError
 from volery.testing.driver_checks import GROUPS
-from volery.testing.simulated_stage import SimulatedStage
-from volery.testing.stage import RealStage, Stage, kind_of
+from volery.testing.stage import RealStage, SimulatedStage, Stage, kind_of
 from volery.vehicles.address import Address, parse
 
 

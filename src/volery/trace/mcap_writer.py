@@ -23,11 +23,11 @@ from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 
+from volery.base.files import Output
 from volery.base.time import Ns, S
 from volery.trace.attachments import SETUP_ATTACHMENT, RunSetup, setup_to_json
 from volery.trace.encoding import LITTLE_ENDIAN_CDR, OWN_EVENTS, Codec, type_name
 from volery.trace.events import NONE, Event, Message, Published, Record, VehicleState
-from volery.trace.output import Output
 
 MAGIC = b"\x89MCAP0\r\n"
 TRACE_SCHEMA = "volery-trace/1"

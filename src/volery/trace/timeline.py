@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from volery.base.files import Output
 from volery.base.time import Ns
 from volery.trace.events import (
     Activation,
@@ -30,7 +31,6 @@ from volery.trace.events import (
     Slice,
     Verdict,
 )
-from volery.trace.output import Output
 
 _quote = json.JSONEncoder(ensure_ascii=False).encode
 

@@ -94,9 +94,9 @@ class Telemetry:
     def __init__(self, kernel: Kernel, name: str) -> None:
         self.name = name
         self._kernel = kernel
-        self._last_message_ns: Ns = -1
-        self._refreshed_ns: Ns = 0  # from then on the state is not older than it seems
-        self._position: Position | None = None
+        self.last_message_ns: Ns = -1
+        self.fresh_from: Ns = 0
+        self.position: Position | None = None
         self._position_ns: Ns = -1
         self._position_period: Ns = 0
         self._fix = ""
@@ -133,16 +133,11 @@ class Telemetry:
 
     # -- age
 
-    @property
-    def last_message_ns(self) -> Ns:
-        """Time of the last message of the autopilot itself; -1 before the first."""
-        return self._last_message_ns
-
-    @last_message_ns.setter
-    def last_message_ns(self, now: Ns) -> None:
-        if self.detects_silence and 0 <= self._last_message_ns < now - STALE_AFTER:
-            self._refreshed_ns = now + REFRESHED_AFTER
-        self._last_message_ns = now
+    def note_message(self, now: Ns) -> None:
+        """Note that the autopilot itself has sent a message."""
+        if self.detects_silence and 0 <= self.last_message_ns < now - STALE_AFTER:
+            self.fresh_from = now + REFRESHED_AFTER
+        self.last_message_ns = now
 
     @property
     def stale(self) -> bool:
@@ -152,26 +147,21 @@ class Telemetry:
         as old as the silence.
         """
         now = self._kernel.now()
-        silent = self.detects_silence and now - self._last_message_ns > STALE_AFTER
-        return self._last_message_ns < 0 or silent or now < self._refreshed_ns
+        silent = self.detects_silence and now - self.last_message_ns > STALE_AFTER
+        return self.last_message_ns < 0 or silent or now < self.fresh_from
 
-    @property
-    def position(self) -> Position | None:
-        """Position estimate with an AMSL altitude; ``None`` before the first."""
-        return self._position
-
-    @position.setter
-    def position(self, position: Position | None) -> None:
+    def update_position(self, position: Position) -> None:
+        """Store a position estimate that was received now; its altitude is AMSL."""
         now = self._kernel.now()
-        if self._position is not None:
+        if self.position is not None:
             self._position_period = now - self._position_ns
-        self._position, self._position_ns = position, now
+        self.position, self._position_ns = position, now
 
     @property
     def located(self) -> bool:
         """Whether the position is known, not old, and not an estimate that goes on without satellites."""
         return (
-            self._position is not None and not self.stale and self.position_lost_for(self._kernel.now()) == 0
+            self.position is not None and not self.stale and self.position_lost_for(self._kernel.now()) == 0
         )
 
     def position_lost_for(self, now: Ns) -> Ns:
@@ -179,7 +169,7 @@ class Telemetry:
 
         It is 0 before the first position, and for a vehicle that never had satellites.
         """
-        if self._position is None:
+        if self.position is None:
             return 0
         allowed = max(POSITION_STALE_AFTER, PERIODS_MISSED * self._position_period)
         age = now - self._position_ns

@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 
 from volery.testing import conformance
-from volery.testing.fault_trials import PHASES, try_fault
-from volery.testing.trial_faults import FAULTS
+from volery.testing.fault_trials import FAULTS, PHASES, try_fault
 
 AUTOPILOTS = ("ardupilot", "px4", "paparazzi", "dji")
 REFERENCE = Path(__file__).parents[3] / "docs" / "reference" / "trials.json"

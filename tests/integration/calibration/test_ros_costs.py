@@ -15,16 +15,15 @@ from typer.testing import CliRunner
 
 from volery.base.time import S
 from volery.calibration.host_machine import Machine
+from volery.calibration.node_comparison import prepare_nodes
+from volery.calibration.node_processes import measurement_session
 from volery.calibration.ros.call_costs import CallCost, call_costs
-from volery.calibration.ros.campaign import Conditions
-from volery.calibration.ros.campaign_results import ros_law, write_entry
+from volery.calibration.ros.campaign import Conditions, ros_law, write_entry
 from volery.calibration.ros.probe_environment import Pace, own_master, probe_setup
-from volery.calibration.validation.node_comparison import prepare_nodes
-from volery.calibration.validation.node_processes import measurement_session
 from volery.cli.main import app
 from volery.cost import load_catalogue
 from volery.model.system_loader import load
-from volery.run.assembly.vocabulary import vocabulary
+from volery.run.assembly.model_checks import vocabulary
 
 pytestmark = pytest.mark.integration
 

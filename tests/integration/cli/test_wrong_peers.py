@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 from pymavlink.dialects.v10 import ardupilotmega as mavlink_1
 
-from volery.cli.commands.demo import example
+from volery.cli.commands.first_steps import example
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

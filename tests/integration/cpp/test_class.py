@@ -9,7 +9,7 @@ from volery.calibration.component_profile import profile_components
 from volery.calibration.host_machine import Machine, put_law
 from volery.cost import load_catalogue
 from volery.model.system_loader import load
-from volery.run.assembly.vocabulary import vocabulary
+from volery.run.assembly.model_checks import vocabulary
 from volery.run.result import Options
 from volery.trace.events import Charge, Milestone, Text
 

@@ -7,14 +7,13 @@ from typing import Any
 
 import pytest
 
-from volery.components.cpp.bindings import operations
-from volery.components.cpp.build import ClientLibrary, CppComponent, compile_component
+from volery.components.cpp.build import ClientLibrary, CppComponent, compile_component, operations
 from volery.components.cpp.cpp_program import CppObject, CppProgram
 from volery.kernel.virtual import VirtualKernel
 from volery.model.components import Argument, Interface, Signature
 from volery.ros import messages
 from volery.ros.client_libraries import roscpp
-from volery.ros.messages.ros1 import FieldLayout, ros1_layout
+from volery.ros.messages.encodings import FieldLayout, ros1_layout
 
 pytestmark = pytest.mark.integration
 

@@ -6,7 +6,7 @@ import pytest
 
 from rigs.sockets import HERE, PACE, flown, served
 from volery.kernel.wall import WallKernel
-from volery.links.tcp_link import TcpServer
+from volery.links.stream_links import TcpServer
 from volery.links.udp_link import UdpLink
 from volery.vehicles.address import open_link, parse
 

@@ -14,7 +14,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
 from volery.links.coded_link import CodedLink
 from volery.links.pprzlink_codec import PPRZLINK
-from volery.links.serial_link import SerialLink
+from volery.links.stream_links import SerialLink
 from volery.links.udp_link import UdpLink
 from volery.vehicles import Drone
 from volery.vehicles.address import open_link, parse

@@ -19,8 +19,7 @@ from volery.kernel.wall import WallKernel
 from volery.links.coded_link import CodedLink
 from volery.links.link import Frame
 from volery.links.mavlink_codec import encode
-from volery.links.serial_link import SerialLink
-from volery.links.tcp_link import TcpClient, TcpServer
+from volery.links.stream_links import SerialLink, TcpClient, TcpServer
 from volery.links.udp_link import UdpLink, UdpServer
 from volery.trace.events import LinkState
 from volery.vehicles.address import listen, open_link, parse, parse_listen

@@ -17,7 +17,7 @@ import pytest
 from volery.links.coded_link import MAX_UNHANDLED, ReaderThread
 from volery.links.link import Frame
 from volery.links.mavlink_codec import MAVLINK, encode
-from volery.links.tcp_link import MAX_CLIENTS
+from volery.links.stream_links import MAX_CLIENTS
 
 pytestmark = pytest.mark.integration
 

@@ -24,7 +24,7 @@ import volery
 from volery.links.link import Frame
 from volery.links.mavlink_codec import MAVLINK, encode
 from volery.ros.transports.ros1 import Roscore
-from volery.ros.transports.ros1.package_export import write_package
+from volery.ros.transports.ros1.rospy_copy import write_package
 
 from .conftest import LIMIT_S, Run
 from .test_dji_on_ros1 import COMMAND

@@ -22,6 +22,6 @@ def carries(name: str) -> bool:
 
 
 @pytest.mark.parametrize("check", CHECKS)
-def test_ros1(check: str, ours: Ours) -> None:
+def test_encodings_ros1(check: str, ours: Ours) -> None:
     with Site(ours.graph, check, replace(ROS1, carries=carries)) as site:
         CHECKS[check](site)

@@ -14,8 +14,7 @@ import pytest
 
 from volery.base.time import MS, S
 from volery.ros.messages import message_class, new
-from volery.ros.messages.bag_writer import create_bag
-from volery.ros.messages.bags import open_bag
+from volery.ros.messages.bags import create_bag, open_bag
 
 from .conftest import HERE, Ours, Run, Start
 

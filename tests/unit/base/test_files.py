@@ -9,11 +9,10 @@ import pytest
 
 from volery.base import files
 from volery.base.errors import ModelError, UsageError
-from volery.base.files import create_file, read_text, write_text
+from volery.base.files import Output, create_file, read_text, write_text
 from volery.model.assembly import Selection, assemble
 from volery.run.assembly.fences import read_fence
 from volery.run.recording import make_folder
-from volery.trace.output import Output
 
 
 def test_text_is_written_over_what_was_there_and_read_back(tmp_path: Path) -> None:

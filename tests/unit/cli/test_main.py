@@ -18,11 +18,10 @@ from volery.base.errors import (
     UsageError,
 )
 from volery.cli.command import BAD_INPUT, FAILED, OK, exit_status
-from volery.cli.commands.demo import example
-from volery.cli.commands.doctor import PARTS, Part, doctor, module, program
+from volery.cli.commands.first_steps import PARTS, Part, doctor, example, module, program
 from volery.cli.console import Output
 from volery.cli.main import app
-from volery.cli.outcome import next_folder
+from volery.cli.run_display import next_folder
 
 
 def run(*arguments: str):
@@ -219,7 +218,7 @@ def test_doctor_finds_what_is_needed_and_says_how_to_get_the_rest(capsys):
 
 def test_doctor_fails_if_something_needed_is_missing(monkeypatch, capsys):
     lost = Part("gyro", lambda: "", "everything", "pip install gyro", needed=True)
-    monkeypatch.setattr("volery.cli.commands.doctor.PARTS", (lost,))
+    monkeypatch.setattr("volery.cli.commands.first_steps.PARTS", (lost,))
     assert doctor(Output()) == FAILED
     said = capsys.readouterr().out
     assert "pip install gyro" in said

@@ -13,7 +13,7 @@ import typer
 
 from volery.cli.main import app
 from volery.model.system_loader import load
-from volery.run.assembly.vocabulary import vocabulary
+from volery.run.assembly.model_checks import vocabulary
 
 ROOT = Path(__file__).parents[3]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from volery import AMSL, Drone, Position
-from volery.cli.commands.demo import example
+from volery.cli.commands.first_steps import example
 from volery.run.fly import fly
 from volery.run.result import Options
 from volery.run.simulate import simulate

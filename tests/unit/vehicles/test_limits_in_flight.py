@@ -68,9 +68,9 @@ def test_who_is_outside_may_come_back_but_not_leave_again() -> None:
     seen = telemetry(place(0, 80))
     watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED), 0.0)
     for north in (70, 60, 10):
-        seen.position = place(0, north)
+        seen.update_position(place(0, north))
         assert watch.check("go", 0) is None
-    seen.position = place(0, 60)
+    seen.update_position(place(0, 60))
     error = watch.check("go", 0)
     assert isinstance(error, OutOfBounds)
     assert "10 m outside the fence" in str(error)
@@ -81,9 +81,9 @@ def test_the_floor_is_crossed_on_the_way_up_and_may_be_excused() -> None:
         seen = telemetry(place(0, 0, 0))
         watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED), 0.0, excused)
         for up in (0.5, 20.0):
-            seen.position = place(0, 0, up)
+            seen.update_position(place(0, 0, up))
             assert watch.check("up", 0) is None
-        seen.position = place(0, 0, 1.0)
+        seen.update_position(place(0, 0, 1.0))
         assert (watch.check("down", 0) is not None) is expected
 
 

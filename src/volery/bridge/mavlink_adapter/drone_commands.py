@@ -10,9 +10,9 @@ from typing import Any, ClassVar, NamedTuple
 
 from volery.base.errors import CapabilityError, Refused, UsageError, choices
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
+from volery.bridge.autopilot_link import DJI_ID, PAPARAZZI_ID, AutopilotType, mode_name
 from volery.bridge.mavlink_adapter.command_handler import DroneOperation, Target
 from volery.bridge.mavlink_adapter.telemetry_encoder import CUSTOM_MODE_ENABLED, local_frame
-from volery.bridge.mode_names import DJI_ID, PAPARAZZI_ID, AutopilotType, mode_name
 from volery.links.mavlink_messages import constant, entry_name
 from volery.vehicles.driver import ManualControl
 from volery.vehicles.drone import Drone

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from volery.base.frames import LocalFrame, wrap
 from volery.base.position import Position
 from volery.base.time import MS, US
-from volery.bridge.mode_names import DJI_ID, GENERIC_ID, PAPARAZZI_ID, AutopilotType, mode_number
+from volery.bridge.autopilot_link import DJI_ID, GENERIC_ID, PAPARAZZI_ID, AutopilotType, mode_number
 from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant
 from volery.ros.messages.dji_constants import HEALTHY_GPS

@@ -168,13 +168,13 @@ def probe_setup(client: str, python: str = "") -> Iterator[ProbeSetup]:
     interpreter = python or sys.executable
     probe = (interpreter, str(PROBES / "python.py"), client)
     if client == "rclpy":
-        with _sinks((interpreter, str(PROBES / "rclpy_sinks.py")), _for_ros2()):
+        with _sinks((interpreter, str(PROBES / "sinks.py"), "rclpy"), _for_ros2()):
             yield ProbeSetup(client, probe, _for_ros2())
         return
     command = (str(_roscpp_probe()),) if client == "roscpp" else probe
     with own_master() as master:
         surroundings = environment(master)
-        with _sinks((sys.executable, "-m", "volery.calibration.ros.sinks"), surroundings):
+        with _sinks((sys.executable, str(PROBES / "sinks.py"), "rospy"), surroundings):
             yield ProbeSetup(client, command, surroundings)
 
 

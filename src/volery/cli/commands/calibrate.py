@@ -18,7 +18,7 @@ from volery.cli.console import Output, make_table, number_column
 from volery.cli.options import CATALOGUE, CatalogueFile, EntryName, Frequency
 
 if TYPE_CHECKING:
-    from volery.calibration.python.operation_costs import Calibration
+    from volery.calibration.operation_costs import Calibration
     from volery.calibration.ros.call_costs import CallCost
     from volery.cost import CoreLaw, OperationTable
 
@@ -73,11 +73,13 @@ def ros(
         CampaignLog,
         Conditions,
         Plan,
+        plot_svg,
+        ros_law,
         run_campaign,
         uncertain_costs,
+        write_entry,
     )
     from volery.calibration.ros.campaign import Progress as Rounds
-    from volery.calibration.ros.campaign_results import plot_svg, ros_law, write_entry
     from volery.calibration.ros.probe_environment import check_client, probe_setup
 
     check_client(client, python)  # before any file is made
@@ -133,7 +135,7 @@ def ros(
 
 
 def _call_table(found: Mapping[str, CallCost], title: str) -> Table:
-    from volery.calibration.ros.campaign_results import format_line
+    from volery.calibration.ros.campaign import format_line
 
     shown = make_table(title=title)
     for heading in ("call", "process µs", "caller µs", "certain to", "quartiles", "residual"):
@@ -176,8 +178,8 @@ def python(
     required, 2 for bad input, 1 otherwise.
     """
     from volery.calibration.host_machine import at_frequency, put_law, this_machine
-    from volery.calibration.python.operation_costs import calibrate
-    from volery.calibration.python.timed_code import Rounds
+    from volery.calibration.operation_costs import calibrate
+    from volery.calibration.timed_code import Rounds
 
     limits = Rounds(*rounds, within / 100.0)
     machine = this_machine(name)
@@ -260,9 +262,8 @@ def processor(output: Output, out: CatalogueFile = CATALOGUE, name: EntryName = 
     measurements; the same command continues from there. Exit status: 0 if every figure is certain, 2 for bad
     input, 1 otherwise.
     """
+    from volery.calibration.core_measurement import core_law, isa, measure, noisy_snippets
     from volery.calibration.host_machine import put_law, this_machine
-    from volery.calibration.processor.core_fit import core_law
-    from volery.calibration.processor.microbenchmarks import isa, measure, noisy_snippets
 
     machine, here = this_machine(name), isa()
     log = out.with_name(f"{out.name}.notes")

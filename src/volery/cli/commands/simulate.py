@@ -1,16 +1,23 @@
-"""``volery simulate`` and ``volery report``: runs of a model and their reports."""
+"""``volery simulate``, ``report`` and ``runs``: runs of a model; ``volery model``: a model without a run."""
 
 from __future__ import annotations
 
+import json
 import os
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, replace
+from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.table import Table
+from rich.text import Text
 
-from volery.base.extras import require_extra
+from volery.base.errors import UsageError, choices
+from volery.base.installed import require_extra
 from volery.cli.command import OK, Commands
-from volery.cli.console import Output
+from volery.cli.console import Output, make_table, number_column
 from volery.cli.options import (
     Allocation,
     Fidelity,
@@ -25,7 +32,201 @@ from volery.cli.options import (
     parse_speed,
 )
 
+if TYPE_CHECKING:
+    from volery.model.system import System
+
+model_commands = Commands("Simulate", group="model", summary="Check and draw a model without running it.")
+
+FIDELITIES = ("times", "code")
+
+
+@model_commands.add("quiet", "json", "debug")
+def check(output: Output, model: Model, overrides: Overrides = None) -> int:
+    """Check a model with each of its allocations and scenarios, and load its Python components."""
+    from volery.model.system_loader import check as check_model
+    from volery.model.system_loader import gaps
+    from volery.run.assembly.model_checks import check_components, vocabulary
+
+    words = vocabulary()
+    system = check_model(model, words, overrides or ())
+    check_components(system, words.languages)
+    missing = {fidelity: [str(gap) for gap in gaps(system, fidelity, words)] for fidelity in FIDELITIES}
+    warnings = [Text(f"⚠ {warning}", style="yellow") for warning in system.warnings]
+    output.show(_summary(system), _instances(system), *_readiness(missing), *warnings)
+    output.give(
+        {
+            "name": system.name,
+            "allocations": list(system.allocations),
+            "scenarios": list(system.scenarios),
+            "instances": {one.name: one.component.name for one in system.instances},
+            "requirements": [one.name for one in system.requirements],
+            "missing": missing,
+            "warnings": list(system.warnings),
+        }
+    )
+    return OK
+
+
+def _summary(system: System) -> Text:
+    line = Text(system.name, style="bold")
+    line.append("  is a valid model", style="green")
+    allocations = choices(system.allocations).replace(" or ", " and ")
+    scenarios = choices(system.scenarios).replace(" or ", " and ")
+    line.append(f"  allocations: {allocations}  scenarios: {scenarios}", style="dim")
+    return line
+
+
+def _instances(system: System) -> Table:
+    place = f"runs on ({system.allocation or 'nowhere'})"
+    listed = make_table("instance", "component", "language", place, "connected to")
+    for one in system.instances:
+        targets = [str(target) for connection in one.connections.values() for target in connection.targets]
+        where = one.processor or "environment"
+        listed.add_row(one.name, one.component.name, one.component.language, where, ", ".join(targets))
+    for vehicle in system.vehicles:
+        node = f"node on {vehicle.processor}" if vehicle.processor else "no node on a computer"
+        listed.add_row(vehicle.name, vehicle.kind, vehicle.autopilot, node, vehicle.at.name)
+    return listed
+
+
+def _readiness(missing: dict[str, list[str]]) -> Iterable[Text]:
+    for fidelity, found in missing.items():
+        if not found:
+            yield Text(f"✓ ready for fidelity {fidelity}", style="green")
+            continue
+        yield Text(f"· not ready for fidelity {fidelity}:", style="yellow")
+        for gap in found:
+            yield Text(f"    {gap}", style="dim")
+
+
+@model_commands.add("debug")
+def show(
+    output: Output,
+    model: Model,
+    allocation: Allocation = None,
+    scenario: Scenario = None,
+    overrides: Overrides = None,
+) -> int:
+    """Draw one variant of a model in text: allocation and connections."""
+    from volery.model.diagram import diagram
+    from volery.model.system_loader import load
+    from volery.run.assembly.model_checks import vocabulary
+
+    system = load(model, vocabulary(), scenario, allocation, overrides or ())
+    output.show(Text(diagram(system), end=""))
+    return OK
+
+
+@model_commands.add()
+def schema(output: Output) -> int:
+    """Print the JSON Schema of models, for an editor that completes and checks YAML."""
+    from volery.model.document import schema as model_schema
+
+    replace(output, json=True).give(model_schema())
+    return OK
+
+
+@model_commands.add("json")
+def observables(output: Output) -> int:
+    """List the observables that a requirement may bound."""
+    from volery.requirements.observables import NOTED, OBSERVABLES
+
+    listed = make_table("observe", "unit", "meaning")
+    for one in (*OBSERVABLES, NOTED):
+        subject = one.subject if one.subject in ("application", NOTED.subject) else f"<{one.subject}>"
+        listed.add_row(f"{subject}.{one.quantity}", one.unit or "-", one.description)
+    output.show(listed)
+    output.give([asdict(one) for one in (*OBSERVABLES, NOTED)])
+    return OK
+
+
 commands = Commands("Simulate")
+
+RUN_FILE, TRACE_FILE = "run.json", "trace.mcap"
+UNFINISHED = "unfinished; `volery report` recovers it"
+EMPTY = "empty"
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A run folder. ``met`` is None if no requirement was judged, ``simulated_s`` if the run has no end."""
+
+    folder: str
+    written: str
+    system: str = ""
+    allocation: str = ""
+    scenario: str = ""
+    fidelity: str = ""
+    outcome: str = ""
+    met: bool | None = None
+    simulated_s: float | None = None
+
+
+@commands.add("json", "debug")
+def runs(
+    output: Output,
+    folder: Annotated[Path, typer.Argument(help="Folder that contains run folders, at any depth.")] = Path(
+        "runs"
+    ),
+) -> int:
+    """List run folders with what was run and how it ended, the newest last."""
+    if not folder.is_dir():
+        raise UsageError(f"there is no folder {folder}; `volery simulate` and `volery fly` make ./runs")
+    found = sorted(_found(folder), key=lambda one: (one.written, one.folder))
+    listed = make_table("folder", "written", "run", "outcome", "requirements", number_column("time"))
+    for one in found:
+        run = " · ".join(filter(None, (one.system, one.allocation, one.scenario, one.fidelity)))
+        met = {None: "-", True: "met", False: "not met"}[one.met]
+        seconds = "-" if one.simulated_s is None else f"{one.simulated_s:.1f} s"
+        listed.add_row(one.folder, one.written, run or "-", one.outcome, met, seconds)
+    output.show(listed if found else f"no run folder in {folder}")
+    output.give([asdict(one) for one in found])
+    return OK
+
+
+def _found(folder: Path) -> Iterator[Listed]:
+    for name, below, files in os.walk(folder):
+        here = Path(name)
+        if RUN_FILE in files or TRACE_FILE in files:
+            yield _listed(here, folder)
+        elif here != folder and not below and not files:
+            yield Listed(_name(here, folder), _written(here), outcome=EMPTY)
+
+
+def _listed(here: Path, folder: Path) -> Listed:
+    record = _record(here / RUN_FILE)
+    if record is None:
+        return Listed(_name(here, folder), _written(here), outcome=UNFINISHED)
+    outcome = record["outcome"]
+    return Listed(
+        _name(here, folder),
+        _written(here / RUN_FILE),
+        record["system"],
+        record["allocation"],
+        record["scenario"],
+        record["fidelity"],
+        outcome["status"],
+        outcome["requirements_met"],
+        record["sim_s"],
+    )
+
+
+def _record(file: Path) -> dict[str, Any] | None:
+    """Return the content of a ``run.json``, None if it is missing or is something else."""
+    try:
+        record = json.loads(file.read_bytes())
+        keys = ("outcome", "system", "allocation", "scenario", "fidelity", "sim_s")
+        return record if all(key in record for key in keys) else None
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def _name(here: Path, folder: Path) -> str:
+    return str(here.relative_to(folder)) if here != folder else str(here)
+
+
+def _written(path: Path) -> str:
+    return datetime.fromtimestamp(path.stat().st_mtime).isoformat(" ", "seconds")
 
 
 @commands.add("quiet", "json", "debug")
@@ -53,10 +254,9 @@ def simulate(
     Exit status: 0 if the run completed and met every requirement, 2 for bad input, 1 otherwise.
     """
     require_extra("simulation", "simulated runs")
-    from volery.cli.outcome import read_log_options, run_folder, show_outcome
-    from volery.cli.progress import run_progress
+    from volery.cli.run_display import read_log_options, run_folder, run_progress, show_outcome
     from volery.model.system_loader import load
-    from volery.run.assembly.vocabulary import vocabulary
+    from volery.run.assembly.model_checks import vocabulary
     from volery.run.result import Options
     from volery.run.simulate import simulate as run_simulation
 

@@ -1,18 +1,223 @@
-"""From a component's sources to its library: generated headers and glue, object files, one shared object."""
+"""From a component's sources to its library: generated headers and glue, object files, one shared object.
+
+``interfaces.h`` has the model's interfaces as abstract classes; a component's file includes it. The glue
+connects the user's class to the framework ABI: it constructs the class from its required ports, in the order
+of the model, and calls its operations. Values of the model's types (``bool``, ``int``, ``float``, ``str``,
+``bytes``, ``Position`` and ``T[]``) are encoded as ``abi_codec`` says.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
+from typing import Any, NamedTuple
 
-from volery.base.errors import Location, ModelError
-from volery.components.cpp import bindings
-from volery.components.cpp.bindings import CppOperation, RequiredPort
+from volery.base.errors import Location, ModelError, choices
+from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
 from volery.components.cpp.compiler import CppToolchain, ReportProgress, Sources, cache_folder, find_sources
-from volery.model.components import Interface
+from volery.model.components import Interface, Signature
 from volery.ros import client_libraries
+from volery.ros.client_libraries.abi_codec import Reader, Writer
+
+HEADER = "volery/interfaces.h"
+DRONE = "Drone"
+"""The interface of a vehicle that C++ components may require; its C++ class is ``I_RosDron``."""
+
+_ALTITUDES = (AMSL, Ellipsoidal, AboveHome, AboveGround)
+"""In the order of ``volery::Reference``."""
+
+_PASSED_BY_VALUE = ("bool", "std::int64_t", "double")
+
+
+class CppType(NamedTuple):
+    """A type: its name in C++, and the functions that encode and decode a value."""
+
+    cpp: str
+    write: Callable[[Writer, Any], object]
+    read: Callable[[Reader], Any]
+
+    @property
+    def as_argument(self) -> str:
+        """The parameter type in C++: small types by value, others by reference."""
+        return self.cpp if self.cpp in _PASSED_BY_VALUE else f"const {self.cpp}&"
+
+
+def _write_position(writer: Writer, value: Position) -> None:
+    writer.real(value.latitude).real(value.longitude).real(value.altitude.metres)
+    writer.integer(_ALTITUDES.index(type(value.altitude)))
+
+
+def _read_position(reader: Reader) -> Position:
+    latitude, longitude, metres = reader.real(), reader.real(), reader.real()
+    return Position(latitude, longitude, _ALTITUDES[reader.integer()](metres))
+
+
+_TYPES: Mapping[str, CppType] = {
+    "": CppType("void", lambda writer, value: None, lambda reader: None),
+    "bool": CppType("bool", Writer.flag, Reader.flag),
+    "int": CppType("std::int64_t", Writer.integer, Reader.integer),
+    "float": CppType("double", Writer.real, Reader.real),
+    "str": CppType("std::string", Writer.text, Reader.text),
+    "bytes": CppType("std::vector<std::uint8_t>", Writer.raw, Reader.raw),
+    "Position": CppType("volery::Position", _write_position, _read_position),
+}
+
+
+def cpp_type(written: str, where: str) -> CppType:
+    """Return the C++ type for a type as the model writes it.
+
+    Raises:
+        ModelError: C++ has no such type; the error names ``where``.
+    """
+    name = written.strip()
+    if name.endswith("[]"):
+        return _vector_of(cpp_type(name.removesuffix("[]"), where))
+    if name not in _TYPES:
+        known = choices([one for one in _TYPES if one])
+        raise ModelError(f"C++ components know no {name!r}, but {known}, and lists of them", where)
+    return _TYPES[name]
+
+
+def _vector_of(element: CppType) -> CppType:
+    def write(writer: Writer, values: Any) -> None:
+        writer.integer(len(values))
+        for value in values:
+            element.write(writer, value)
+
+    def read(reader: Reader) -> list[Any]:
+        return [element.read(reader) for _ in range(reader.integer())]
+
+    return CppType(f"std::vector<{element.cpp}>", write, read)
+
+
+@dataclass(frozen=True)
+class CppOperation:
+    """An operation of an interface with the C++ types of its arguments and result."""
+
+    name: str
+    arguments: tuple[tuple[str, CppType], ...]
+    returns: CppType
+
+    @property
+    def declaration(self) -> str:
+        """The operation as a member function."""
+        parameters = ", ".join(f"{kind.as_argument} {name}" for name, kind in self.arguments)
+        return f"{self.returns.cpp} {self.name}({parameters})"
+
+
+def operation(interface: str, signature: Signature) -> CppOperation:
+    """Return an operation with its C++ types.
+
+    Raises:
+        ModelError: C++ has no counterpart of a type.
+    """
+    where = f"interfaces.{interface}.{signature.name}"
+    arguments = tuple(
+        (one.name, cpp_type(one.type, f"{where}.args.{one.name}")) for one in signature.arguments
+    )
+    return CppOperation(signature.name, arguments, cpp_type(signature.returns, f"{where}.returns"))
+
+
+def operations(interface: Interface) -> tuple[CppOperation, ...]:
+    """Return all operations of an interface, in the order of the model."""
+    return tuple(operation(interface.name, one) for one in interface.operations.values())
+
+
+@dataclass(frozen=True)
+class RequiredPort:
+    """A required port: its name, its interface, and whether it may be connected to several components."""
+
+    port: str
+    interface: str
+    many: bool = False
+
+    @property
+    def cpp_class(self) -> str:
+        """Class of the objects at the port."""
+        return "I_RosDron" if self.interface == DRONE else self.interface
+
+    @property
+    def parameter(self) -> str:
+        """Parameter type of the component's constructor."""
+        return f"const std::vector<{self.cpp_class}*>&" if self.many else f"{self.cpp_class}&"
+
+
+def interfaces_header(interfaces: Iterable[Interface]) -> str:
+    """Return the text of ``interfaces.h``."""
+    lines = ["// Generated from the model: its interfaces.", "#pragma once", '#include "volery/types.h"', ""]
+    for one in interfaces:
+        lines.append(f"class {one.name} {{")
+        lines.append("public:")
+        lines.append(f"    virtual ~{one.name}() = default;")
+        lines += [f"    virtual {found.declaration} = 0;" for found in operations(one)]
+        lines += ["};", ""]
+    return "\n".join(lines)
+
+
+def glue(
+    class_name: str,
+    file: Path,
+    requires: Sequence[RequiredPort],
+    provided: Sequence[CppOperation],
+    interfaces: Mapping[str, Interface],
+) -> str:
+    """Return the text that makes ``class_name``, defined in ``file``, a component."""
+    used = dict.fromkeys(one.interface for one in requires if one.interface != DRONE)
+    lines = ["// Generated: connects the component's class to the framework ABI.", f'#include "{file}"', ""]
+    lines += ['#include "volery/glue.h"', f'#include "{HEADER}"', "", "namespace {"]
+    for name in used:
+        lines += _port_class(interfaces[name])
+    lines += [f"volery::Component<{class_name}> component;", ""]
+    lines += ["bool const registered = [] {"]
+    lines += [f"    {line}" for line in _construction(class_name, requires)]
+    for number, one in enumerate(provided):
+        lines += [f"    {line}" for line in _operation_callable(number, one)]
+    lines += ["    return true;", "}();", "}  // namespace", ""]
+    return "\n".join(lines)
+
+
+def _port_class(interface: Interface) -> list[str]:
+    """Return the class behind a required port: each member function is a request."""
+    name = interface.name
+    lines = [f"class {name}_port final : public {name}, public volery::Port {{", "public:"]
+    lines.append("    using volery::Port::Port;")
+    for one in operations(interface):
+        names = "".join(f", {name}" for name, _ in one.arguments)
+        lines.append(f"    {one.declaration} override {{")
+        lines.append(f'        return call<{one.returns.cpp}>("{one.name}"{names});')
+        lines.append("    }")
+    return [*lines, "};", ""]
+
+
+def _construction(class_name: str, requires: Sequence[RequiredPort]) -> list[str]:
+    ports = []
+    for one in requires:
+        implementation = one.cpp_class if one.interface == DRONE else f"{one.interface}_port"
+        template = "many" if one.many else "one"
+        ports.append(f'volery::{template}<{one.cpp_class}, {implementation}>("{one.port}")')
+    parameters = "".join(f", {one.parameter}" for one in requires)
+    return [
+        "volery::register_callable_as(volery::MAKE, [](volery::Reader, volery::Writer&) {",
+        f"    volery::check_constructor<{class_name}{parameters}>();",
+        f"    component.make({', '.join(ports)});",
+        "});",
+        "volery::register_callable_as(volery::RUN, "
+        "[](volery::Reader, volery::Writer&) { component.run(); });",
+    ]
+
+
+def _operation_callable(number: int, one: CppOperation) -> list[str]:
+    lines = [
+        f"volery::register_callable_as(volery::OPERATIONS + {number}, "
+        "[]([[maybe_unused]] volery::Reader in, [[maybe_unused]] volery::Writer& out) {"
+    ]
+    lines += [f"    auto const {name} = volery::get<{kind.cpp}>(in);" for name, kind in one.arguments]
+    called = f"component->{one.name}({', '.join(name for name, _ in one.arguments)})"
+    lines.append(f"    {called};" if one.returns.cpp == "void" else f"    volery::put(out, {called});")
+    return [*lines, "});"]
+
 
 RUNTIME = Path(__file__).parent / "runtime"
 INCLUDE = (RUNTIME / "include", Path(str(client_libraries.__file__)).parent / "include")
@@ -124,7 +329,7 @@ def _generated_headers(component: CppComponent, client_library: ClientLibrary, s
         for one in (component.interfaces or {}).values()
         if one.name in required or provided & one.operations.keys()
     ]
-    texts = {bindings.HEADER: bindings.interfaces_header(used)}
+    texts = {HEADER: interfaces_header(used)}
     texts.update(client_library.generate(sources.includes(), component.path))
     return _write_generated(texts)
 
@@ -137,11 +342,11 @@ def _translation_units(component: CppComponent, sources: Sources) -> list[Path]:
     if file is None:
         what = f"no class {component.class_name!r} in {', '.join(one.name for one in sources.own)}"
         raise ModelError(what, component.name, component.where)
-    text = bindings.glue(
+    text = glue(
         component.class_name, file, component.requires, component.provided, component.interfaces or {}
     )
-    glue = _write_generated({"glue.cpp": text}) / "glue.cpp"
-    return [glue, *(one for one in sources.compiled if one != file)]
+    glue_file = _write_generated({"glue.cpp": text}) / "glue.cpp"
+    return [glue_file, *(one for one in sources.compiled if one != file)]
 
 
 def _write_generated(texts: Mapping[str, str]) -> Path:

@@ -1,15 +1,21 @@
-"""A C++ component as a ``Program``: loaded, constructed and run."""
+"""A C++ component as a ``Program``: loaded, constructed and run.
+
+It also answers the requests that any C++ component may make: time, sleep, charges, log, its parameters, its
+required ports.
+"""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from volery.base.errors import ComponentError, ModelError
-from volery.components.cpp.bindings import CppOperation, operations
-from volery.components.cpp.build import CompiledComponent
+from volery.base.errors import ComponentError, ModelError, UsageError, choices, did_you_mean
+from volery.base.position import AMSL, Position
+from volery.components import component_api
+from volery.components.cpp.build import CompiledComponent, CppOperation, operations
 from volery.components.cpp.framework import (
     CppError,
     FiberPool,
@@ -19,12 +25,171 @@ from volery.components.cpp.framework import (
     ToSteps,
     framework_runtime,
 )
-from volery.components.cpp.framework_calls import ConnectedPort, request_handlers
 from volery.components.ports import PortList
+from volery.components.virtual_stdlib import EPOCH
 from volery.components.virtual_stdlib.process_environment import INFO
+from volery.kernel import waiting
 from volery.kernel.api import Kernel
-from volery.ros.client_libraries.abi_codec import Reader, RequestHandlers, Writer
+from volery.ros.client_libraries.abi_codec import CppFiber, Reader, RequestHandler, RequestHandlers, Writer
 from volery.trace.events import Text
+from volery.vehicles import Drone
+
+STICK_FULL_SCALE = 1000
+"""Full deflection of a stick in the calls of ``I_RosDron``."""
+
+
+@dataclass(frozen=True)
+class ConnectedPort:
+    """A required port: its operations by name, empty for drones, and what it is connected to."""
+
+    operations: Mapping[str, CppOperation]
+    targets: Sequence[Any]
+
+
+def request_handlers(
+    kernel: Kernel, name: str, parameters: Mapping[str, Any], ports: Mapping[str, ConnectedPort]
+) -> dict[str, RequestHandler]:
+    """Return the handlers of the component ``name`` by request.
+
+    Args:
+        kernel: The run's kernel.
+        name: Name of the instance, for error messages.
+        parameters: Parameters of the instance.
+        ports: Required ports by name; entries may be added until the first request.
+    """
+    return {
+        **_service_handlers(kernel),
+        **_port_handlers(name, ports),
+        "parameter": _ParameterHandler(name, parameters),
+    }
+
+
+def _service_handlers(kernel: Kernel) -> dict[str, RequestHandler]:
+    def now(fiber: CppFiber, arguments: Reader) -> bytes:
+        return Writer().real(component_api.now()).done()
+
+    def monotonic(fiber: CppFiber, arguments: Reader) -> bytes:
+        return Writer().integer(waiting.read_clock(kernel)).done()
+
+    def time_of_day(fiber: CppFiber, arguments: Reader) -> bytes:
+        return Writer().integer(EPOCH + waiting.read_clock(kernel)).done()
+
+    def sleep(fiber: CppFiber, arguments: Reader) -> bytes:
+        component_api.sleep(arguments.real())
+        return b""
+
+    def sleep_ns(fiber: CppFiber, arguments: Reader) -> bytes:
+        waiting.sleep(kernel, arguments.integer())
+        return b""
+
+    def add_time(fiber: CppFiber, arguments: Reader) -> bytes:
+        seconds, at_mhz, joules = arguments.real(), arguments.real(), arguments.real()
+        component_api.add_time(seconds, at_mhz or None, joules)
+        return b""
+
+    def log(fiber: CppFiber, arguments: Reader) -> bytes:
+        component_api.log(arguments.text(), arguments.text())
+        return b""
+
+    def note(fiber: CppFiber, arguments: Reader) -> bytes:
+        component_api.note(arguments.text(), arguments.text(), arguments.text(), arguments.text())
+        return b""
+
+    def exit_process(fiber: CppFiber, arguments: Reader) -> bytes:
+        raise ProcessExit(arguments.integer())
+
+    return {
+        "now": now,
+        "monotonic": monotonic,
+        "time_of_day": time_of_day,
+        "sleep": sleep,
+        "sleep_ns": sleep_ns,
+        "add_time": add_time,
+        "log": log,
+        "note": note,
+        "exit": exit_process,
+    }
+
+
+class _ParameterHandler:
+    """Handler of ``volery::parameter<T>(name)``."""
+
+    def __init__(self, component: str, values: Mapping[str, Any]) -> None:
+        self._component, self._values = component, values
+
+    def __call__(self, fiber: CppFiber, arguments: Reader) -> bytes:
+        name, kind = arguments.text(), arguments.text()
+        if name not in self._values:
+            hint = did_you_mean(name, self._values)
+            raise UsageError(f"{self._component} has no parameter {name!r}{hint}: {choices(self._values)}")
+        value = self._values[name]
+        if kind == "float" and type(value) in (int, float):
+            return Writer().real(value).done()
+        if kind in ("int", "bool") and type(value).__name__ == kind:
+            return Writer().integer(value).done()
+        if kind == "str" and isinstance(value, str):
+            return Writer().text(value).done()
+        raise UsageError(f"{self._component}: parameter {name!r} is {value!r}, which is no {kind}")
+
+
+def _port_handlers(name: str, ports: Mapping[str, ConnectedPort]) -> dict[str, RequestHandler]:
+    def connected(fiber: CppFiber, arguments: Reader) -> bytes:
+        return Writer().integer(len(ports[arguments.text()].targets)).done()
+
+    def call(fiber: CppFiber, arguments: Reader) -> bytes:
+        port = ports[arguments.text()]
+        target, operation = port.targets[arguments.integer()], port.operations[arguments.text()]
+        values = [kind.read(arguments) for _, kind in operation.arguments]
+        result = getattr(target, operation.name)(*values)
+        reply = Writer()
+        operation.returns.write(reply, result)
+        return reply.done()
+
+    def drone(fiber: CppFiber, arguments: Reader) -> bytes:
+        commanded = _drone(name, ports, arguments.text(), arguments.integer())
+        _DRONE_OPERATIONS[arguments.text()](commanded, Reader(arguments.raw()))
+        return b""
+
+    return {"connected": connected, "port": call, "drone": drone}
+
+
+def _drone(name: str, ports: Mapping[str, ConnectedPort], port: str, index: int) -> Drone:
+    """Return the drone at a port; with an empty ``port``, the only drone of the component."""
+    drones = [one for one in ports.values() if not one.operations]
+    if port:
+        found = ports[port].targets[index]
+    elif len(drones) == 1 and len(drones[0].targets) == 1:
+        found = drones[0].targets[0]
+    else:
+        count = sum(len(one.targets) for one in drones)
+        raise UsageError(
+            f"{name}: uc_drone_...() is for a component that commands one drone, but it is connected to "
+            f"{count}: require one port of the interface Drone, or take I_RosDron& in the constructor"
+        )
+    assert isinstance(found, Drone)
+    return found
+
+
+def _go(drone: Drone, arguments: Reader) -> None:
+    latitude, longitude, altitude = arguments.real(), arguments.real(), arguments.real()
+    drone.goto(Position(latitude, longitude, AMSL(altitude)))
+
+
+def _joystick(drone: Drone, arguments: Reader) -> None:
+    pitch, roll, throttle, yaw = (arguments.integer() / STICK_FULL_SCALE for _ in range(4))
+    drone.manual_control(pitch, roll, throttle, yaw)
+
+
+_DRONE_OPERATIONS: Mapping[str, Callable[[Drone, Reader], None]] = {
+    "gps_fly": lambda drone, arguments: drone.takeoff(arguments.real()),
+    "gps_go": _go,
+    "return_ground": lambda drone, arguments: drone.return_home(),
+    "joystick": _joystick,
+    "stabilize_fly": lambda drone, arguments: drone.stabilize(),
+    "alt_hold_fly": lambda drone, arguments: drone.altitude_hold(),
+    "land_ground": lambda drone, arguments: drone.land(),
+}
+
 
 MAKE, RUN, OPERATIONS = range(3)
 """Numbers of a library's first callables, as in ``<volery/abi.h>``."""

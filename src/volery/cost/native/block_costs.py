@@ -2,6 +2,10 @@
 
 Costs that were taken from a trace are kept in the user's cache under the key of the program, which stands
 for the code and the core.
+
+The trace has cache misses by the number of the access among those of its basic block in the intermediate
+code. The machine code of the block has as many loads and stores, or fewer (two at once) or more (spilled
+registers): a load is assigned to the load at the same share of the way through the block, a store likewise.
 """
 
 from __future__ import annotations
@@ -9,6 +13,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +21,6 @@ import numpy as np
 
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native import core_model
-from volery.cost.native.cache_misses import cache_misses
 from volery.cost.native.compilation import Program, compile_program
 from volery.cost.native.instruction_tables import InstructionTables, instruction_tables
 from volery.cost.native.instrumented_run import BlockTrace
@@ -24,6 +28,51 @@ from volery.cost.native.llvm_ir import access_counts
 from volery.cost.native.machine_code import End
 from volery.cost.native.path_reconstruction import ExecutedPath, MachineCode, reconstruct_path
 from volery.cost.pricing import STEPS_PER_CYCLE
+
+Row = tuple[int, int]
+"""(step of the path, row of the table of instructions)."""
+
+
+def cache_misses(path: ExecutedPath, tables: InstructionTables, access_counts: Sequence[int]) -> Array:
+    """Return the misses as rows (step, row of the table of instructions, level, fetched ahead), in order.
+
+    Args:
+        path: What ran.
+        tables: The program's instructions.
+        access_counts: Accesses of each basic block in the intermediate code.
+    """
+    found: list[tuple[int, int, int, int]] = []
+    steps = sorted(
+        (step for step, position in enumerate(path.positions) if position in path.accesses),
+        key=lambda step: (path.positions[step], step),
+    )
+    for position, steps_here in groupby(steps, key=lambda step: path.positions[step]):
+        own = list(steps_here)
+        rows = [
+            (step, row)
+            for step in own
+            for row in range(tables.first[path.blocks[step]], tables.first[path.blocks[step] + 1])
+        ]
+        loads = _rows_with(rows, tables, core_model.LOAD)
+        stores = _rows_with(rows, tables, core_model.STORE)
+        count = max(1, access_counts[path.owners[own[0]]])
+        for access in path.accesses[position]:
+            candidates = stores if access.store else loads
+            if candidates:
+                step, row = candidates[min(access.number * len(candidates) // count, len(candidates) - 1)]
+                found.append((step, row, access.level, int(access.ahead)))
+    return np.array(sorted(found), dtype=np.int64).reshape(-1, 4)
+
+
+def _rows_with(rows: Sequence[Row], tables: InstructionTables, column: int) -> list[Row]:
+    """Return the rows of ordinary instructions that load, or that store."""
+    table = tables.table
+    return [
+        (step, row)
+        for step, row in rows
+        if table[row, column] >= 0 and table[row, core_model.KIND] == core_model.PLAIN
+    ]
+
 
 Array = np.ndarray[Any, np.dtype[Any]]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native import core_model, isa_aarch64, isa_x86_64
-from volery.cost.native.branch_prediction import history_lengths
+from volery.cost.native.core_model import history_lengths
 from volery.cost.native.machine_code import OPERATION_CLASSES, Effect, End, Instruction, MachineBlock
 
 Array = np.ndarray[Any, np.dtype[Any]]

@@ -4,8 +4,8 @@ Depends on the kernel and on messages. Prices of calls and routes of messages ar
 caller.
 """
 
-from volery.ros.graph.embedded_graph import EmbeddedGraph
-from volery.ros.graph.embedded_node import EmbeddedNode
+from volery.ros.graph.embedded_graph import EmbeddedGraph, EmbeddedNode
+from volery.ros.graph.endpoints import CallFailedError, ServiceError
 from volery.ros.graph.interface import (
     AS_OFFERED,
     BEST_AVAILABLE,
@@ -38,7 +38,6 @@ from volery.ros.graph.interface import (
     Work,
     free,
 )
-from volery.ros.graph.services import CallFailedError, ServiceError
 
 __all__ = [
     "AS_OFFERED",

@@ -10,8 +10,7 @@ from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns, S, from_seconds
 from volery.ros.graph.interface import AS_OFFERED, CLOCK, LATCHED, Node, Publisher, QoS, RosGraph
 from volery.ros.messages import Message, new
-from volery.ros.messages.bag_writer import BagWriter
-from volery.ros.messages.bags import Bag
+from volery.ros.messages.bags import Bag, BagWriter
 
 _DISCOVERY_PERIOD: Ns = 500 * MS
 _QUEUED: QoS = QoS(1000, AS_OFFERED.reliability, AS_OFFERED.durability)

@@ -4,10 +4,19 @@ Within one process a message is a value of the class that this package makes for
 definitions of ROS 2 Humble; packages that rosbags lacks are in ``definitions/``. Depends on ``base`` only.
 """
 
-from volery.ros.messages.cdr import cdr_size, from_cdr, to_cdr
+from volery.ros.messages.encodings import (
+    Ros1Service,
+    Ros1Type,
+    cdr_size,
+    from_cdr,
+    from_ros1,
+    ros1_service,
+    ros1_type,
+    to_cdr,
+    to_ros1,
+)
 from volery.ros.messages.message import Message
 from volery.ros.messages.packages import define_imported, define_packages, modules
-from volery.ros.messages.ros1 import Ros1Service, Ros1Type, from_ros1, ros1_service, ros1_type, to_ros1
 from volery.ros.messages.store import (
     ServiceType,
     define,

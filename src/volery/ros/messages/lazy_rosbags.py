@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from volery.base.extras import require_extra
+from volery.base.installed import require_extra
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Msgdef, Nodetype

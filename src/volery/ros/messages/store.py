@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.ros.messages import lazy_rosbags as rosbags
-from volery.ros.messages.message import Field, Header, Message, Nothing, make_class
-from volery.ros.messages.stamp import DurationValue, TimeValue
+from volery.ros.messages.message import DurationValue, Field, Header, Message, Nothing, TimeValue, make_class
 
 _ID = "unique_identifier_msgs/UUID goal_id\n"
 

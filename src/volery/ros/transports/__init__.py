@@ -4,5 +4,5 @@ A transport's graph makes nodes that behave as those of the embedded graph, so c
 ``volery.ros.graph.Node`` run on all three. Both transports share ``transport_node`` and ``transport_graph``;
 ``client_library`` states what they need of a ROS client library. The libraries have threads of their own:
 messages that arrive there are posted to the kernel (``Kernel.post``), and calls that may block are executed
-in threads (``blocking_calls``).
+in threads (``run_in_thread``).
 """

@@ -18,6 +18,7 @@ from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
 from volery.ros.graph.embedded_graph import record_all
+from volery.ros.graph.endpoints import WARNING
 from volery.ros.graph.graph_context import GraphContext, Records
 from volery.ros.graph.interface import (
     BEST_AVAILABLE,
@@ -31,10 +32,8 @@ from volery.ros.graph.interface import (
     free,
     no_route,
 )
-from volery.ros.graph.topics import WARNING
 from volery.ros.messages import new, to_cdr
-from volery.ros.transports.blocking_calls import run_in_thread
-from volery.ros.transports.client_library import ClientLibrary, LibraryNode, ReceivedMessage
+from volery.ros.transports.client_library import ClientLibrary, LibraryNode, ReceivedMessage, run_in_thread
 from volery.ros.transports.transport_node import TransportNode
 from volery.trace.events import Text
 

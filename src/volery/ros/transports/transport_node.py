@@ -17,16 +17,23 @@ from volery.base.errors import UsageError
 from volery.base.time import Ns, to_seconds
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
-from volery.ros.graph import names
 from volery.ros.graph.callbacks import CallbackGroup
-from volery.ros.graph.embedded_node import LocalNode
+from volery.ros.graph.embedded_graph import LocalNode
+from volery.ros.graph.endpoints import WARNING, CallFailedError, ServiceError, failure_text
 from volery.ros.graph.graph_context import GraphContext, NodeContext
-from volery.ros.graph.interface import AS_OFFERED, DEFAULT, Callback, Group, Handler, Node, QoS, Work
-from volery.ros.graph.services import CallFailedError, ServiceError, failure_text
-from volery.ros.graph.topics import WARNING
+from volery.ros.graph.interface import (
+    AS_OFFERED,
+    DEFAULT,
+    Callback,
+    Group,
+    Handler,
+    Node,
+    QoS,
+    Work,
+    full_node_name,
+)
 from volery.ros.messages import Message, ServiceType, message_class, service
-from volery.ros.messages.cdr import copied_to_cdr
-from volery.ros.transports.blocking_calls import poll_in_thread, run_in_thread
+from volery.ros.messages.encodings import copied_to_cdr
 from volery.ros.transports.client_library import (
     LibraryClient,
     LibraryNode,
@@ -35,6 +42,8 @@ from volery.ros.transports.client_library import (
     LibrarySubscription,
     OnResponse,
     ReceivedMessage,
+    poll_in_thread,
+    run_in_thread,
 )
 from volery.trace.events import Call, Published, Text
 from volery.trace.events import Message as MessageEvent
@@ -315,7 +324,7 @@ class TransportNode(LocalNode):
         remaps: Mapping[str, str],
         context: ExecutionContext,
     ) -> None:
-        self._transport = TransportNodeContext(graph, names.node_name(name, namespace), context)
+        self._transport = TransportNodeContext(graph, full_node_name(name, namespace), context)
         super().__init__(self._transport, namespace, remaps)
 
     def join(self, library: LibraryNode) -> None:

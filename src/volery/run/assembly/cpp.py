@@ -19,13 +19,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from volery.base.errors import ModelError
-from volery.components.cpp.bindings import DRONE, RequiredPort, operations
 from volery.components.cpp.build import (
+    DRONE,
     ClientLibrary,
     CompiledComponent,
     CppComponent,
+    RequiredPort,
     compile_component,
     compile_each,
+    operations,
 )
 from volery.components.cpp.compiler import (
     COMPILER_HINT,

@@ -11,19 +11,18 @@ from math import nan, radians
 from typing import TYPE_CHECKING
 
 from volery.base.errors import CapabilityError, UsageError, VoleryError, choices
-from volery.base.extras import require_extra
 from volery.base.frames import LocalFrame, Quaternion, attitude_ned_to_enu, euler_to_quaternion
+from volery.base.installed import require_extra
 from volery.base.position import Position
 from volery.base.time import Ns
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
+from volery.links.in_process_link import SharedLink
 from volery.links.link import Link
-from volery.links.shared_link import SharedLink
 from volery.run.assembly.ros_graphs import GRAPHS, open_graph
-from volery.run.progress import VehicleProgress
-from volery.run.result import SAMPLING_PERIOD
+from volery.run.result import SAMPLING_PERIOD, VehicleProgress
 from volery.trace.events import VehicleState
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import Address, open_link, parse

@@ -11,7 +11,7 @@ from volery.components.instance import Allocation
 from volery.cost import FREE, Pricing
 from volery.model.instances import Instance
 from volery.model.system import Bound, System
-from volery.ros.graph import names
+from volery.ros.graph.interface import full_node_name
 from volery.run.assembly.computers import Platform
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def node_label(instance: Instance) -> str:
 
 def service_name(callee: Instance, operation: str) -> str:
     """Return the name of the service for *operation* of *callee*."""
-    return f"{names.node_name(node_label(callee), callee.namespace)}/{operation}"
+    return f"{full_node_name(node_label(callee), callee.namespace)}/{operation}"
 
 
 def operations(system: System, instance: Instance) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Signal
 from volery.model.system import System
 from volery.ros.graph.interface import CLOCK_PERIOD
-from volery.ros.transports.blocking_calls import pending_calls
+from volery.ros.transports.client_library import pending_calls
 from volery.run.assembly.component_builder import Builder, BuiltComponents, ProcessPart, Truth
 from volery.run.assembly.computers import Platform
 from volery.run.assembly.ros_graphs import open_graph

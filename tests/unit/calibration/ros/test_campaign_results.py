@@ -6,8 +6,7 @@ import pytest
 from volery.base.errors import EstimateError, ModelError
 from volery.calibration.host_machine import Machine
 from volery.calibration.ros.call_costs import call_costs
-from volery.calibration.ros.campaign import Conditions
-from volery.calibration.ros.campaign_results import format_line, plot_svg, ros_law, write_entry
+from volery.calibration.ros.campaign import Conditions, format_line, plot_svg, ros_law, write_entry
 from volery.cost import RosLaw, load_catalogue
 
 from .ros_rounds import AGAIN, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, SLEEP, Probe

@@ -11,17 +11,9 @@ import pytest
 from volery.base.errors import ModelError
 from volery.base.position import AboveHome, Position
 from volery.components.cpp import build, compiler
-from volery.components.cpp.bindings import (
-    RequiredPort,
-    cpp_type,
-    glue,
-    interfaces_header,
-    operation,
-    operations,
-)
+from volery.components.cpp.build import RequiredPort, cpp_type, glue, interfaces_header, operation, operations
 from volery.components.cpp.compiler import find_sources
-from volery.components.cpp.crash import Crash, read_crash
-from volery.components.cpp.framework import StepMeter
+from volery.components.cpp.framework import Crash, StepMeter, read_crash
 from volery.model.components import Argument, Interface, Signature
 from volery.ros.client_libraries.abi_codec import Reader, Writer
 

@@ -13,7 +13,7 @@ from volery.kernel.task import ExecutionContext
 from volery.ros.client_libraries import roscpp
 from volery.ros.client_libraries.abi_codec import CppFiber, Reader, Writer
 from volery.ros.client_libraries.library_base import Launch
-from volery.ros.client_libraries.roscpp import node_requests
+from volery.ros.client_libraries.roscpp import requests
 from volery.ros.messages import new, to_cdr
 from volery.trace.events import Text
 
@@ -58,9 +58,9 @@ def test_what_ros_has_and_is_not_offered_says_so():
 @pytest.mark.parametrize("value", [True, -3, 2.5, "text", [1, 2.5, ["x"]], {"a": {"b": 1}, "c": []}])
 def test_parameters_cross_the_border_unchanged(value):
     out = Writer()
-    node_requests.write_parameter(out, value)
-    assert node_requests.read_parameter(Reader(out.done())) == value
-    assert type(node_requests.read_parameter(Reader(out.done()))) is type(value)
+    requests.write_parameter(out, value)
+    assert requests.read_parameter(Reader(out.done())) == value
+    assert type(requests.read_parameter(Reader(out.done()))) is type(value)
 
 
 class Code:
@@ -134,7 +134,7 @@ def test_names_and_parameters(stage):
         assert code.ask("resolve", Writer().text("/robot").text("scan")).text() == "/laser"
         found = code.ask("param_get", Writer().text("/robot/node/rate"))
         assert found.flag()
-        assert node_requests.read_parameter(found) == 5
+        assert requests.read_parameter(found) == 5
         assert not code.ask("param_get", Writer().text("/nothing")).flag()
         code.ask("log", Writer().integer(2).text("careful"))
 

@@ -11,8 +11,7 @@ from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.ros import messages
 from volery.ros.graph.rosbag import PlayOptions, Recorder, play
-from volery.ros.messages.bag_writer import create_bag
-from volery.ros.messages.bags import Bag, open_bag
+from volery.ros.messages.bags import Bag, create_bag, open_bag
 
 from .conftest import Rig
 

@@ -9,8 +9,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import MS
 from volery.ros import messages
-from volery.ros.messages.bag_writer import create_bag
-from volery.ros.messages.bags import BagTopic, open_bag
+from volery.ros.messages.bags import BagTopic, create_bag, open_bag
 
 WORDS, FIXES = "/words", "/drone_1/fix"
 KINDS = pytest.mark.parametrize("name", ["flight.bag", "flight"])

@@ -10,7 +10,7 @@ import pytest
 from volery.base.errors import CapabilityError
 from volery.model.system import System
 from volery.model.system_loader import load
-from volery.run.assembly.vocabulary import vocabulary
+from volery.run.assembly.model_checks import vocabulary
 from volery.run.distributed import plan
 
 DELIVERY = Path(__file__).parents[4] / "examples" / "delivery"

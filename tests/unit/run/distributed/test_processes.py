@@ -11,7 +11,7 @@ import pytest
 from volery.base.errors import LinkSilent
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.ros.transports.blocking_calls import pending_calls, run_in_thread
+from volery.ros.transports.client_library import pending_calls, run_in_thread
 from volery.run.distributed import processes
 from volery.run.distributed.processes import DistributedRun, GraphSettings
 

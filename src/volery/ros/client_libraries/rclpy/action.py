@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from volery.kernel.waiting import Signal
+from volery.ros.client_libraries.rclpy.entities import qos_profile_action_status_default
 from volery.ros.client_libraries.rclpy.executors import CallbackGroup, Future
 from volery.ros.client_libraries.rclpy.node import Node
-from volery.ros.client_libraries.rclpy.qos import qos_profile_action_status_default
 from volery.ros.messages import message_class, new
 
 _CANCEL = "action_msgs/srv/CancelGoal"

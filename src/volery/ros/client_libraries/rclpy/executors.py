@@ -17,8 +17,7 @@ from typing import Any, ClassVar, Protocol, Self
 
 from volery.base.time import Ns, from_seconds
 from volery.kernel.waiting import Signal, current_task, end_activation
-from volery.ros.client_libraries.rclpy.context import Context, Contexts
-from volery.ros.client_libraries.rclpy.exceptions import ExternalShutdownException
+from volery.ros.client_libraries.rclpy.context import Context, Contexts, ExternalShutdownException
 from volery.ros.graph import Group, Work
 
 Run = Callable[[], None]

@@ -12,15 +12,24 @@ from volery.ros.client_libraries.library_base import AtEnd, Launch, ignore_end, 
 from volery.ros.client_libraries.rclpy import (
     action,
     entities,
-    exceptions,
     executors,
     lifecycle,
-    logging,
     node_parameters,
-    qos,
     ros_time,
 )
-from volery.ros.client_libraries.rclpy.context import Context, Contexts
+from volery.ros.client_libraries.rclpy.context import (
+    EXCEPTIONS,
+    Context,
+    Contexts,
+    ExternalShutdownException,
+    Logger,
+    LoggingSeverity,
+    NotInitializedException,
+    ShutdownException,
+    TimeoutException,
+    logging_functions,
+)
+from volery.ros.client_libraries.rclpy.entities import QOS
 from volery.ros.client_libraries.rclpy.executors import Executor, Future
 from volery.ros.client_libraries.rclpy.node import Node
 from volery.ros.graph import Node as GraphNode
@@ -51,7 +60,7 @@ def _bound_classes(contexts: Contexts) -> dict[str, Any]:
     kinds: tuple[type, ...] = (
         executors.MultiThreadedExecutor,
         executors.SingleThreadedExecutor,
-        logging.Logger,
+        Logger,
         ros_time.Clock,
         ros_time.ROSClock,
     )
@@ -83,25 +92,25 @@ def _submodules(bound: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         "clock": {"ClockType": ros_time.ClockType, "Clock": bound["Clock"], "ROSClock": bound["ROSClock"]},
         "context": {"Context": Context},
         "duration": duration,
-        "exceptions": exceptions.EXCEPTIONS,
+        "exceptions": EXCEPTIONS,
         "executors": {
             "Executor": Executor,
-            "ExternalShutdownException": exceptions.ExternalShutdownException,
+            "ExternalShutdownException": ExternalShutdownException,
             "MultiThreadedExecutor": bound["MultiThreadedExecutor"],
-            "ShutdownException": exceptions.ShutdownException,
+            "ShutdownException": ShutdownException,
             "SingleThreadedExecutor": bound["SingleThreadedExecutor"],
-            "TimeoutException": exceptions.TimeoutException,
+            "TimeoutException": TimeoutException,
         },
         "lifecycle": {
             **lifecycle.LIFECYCLE,
             "LifecycleNode": bound["LifecycleNode"],
             "Node": bound["LifecycleNode"],
         },
-        "logging": {"LoggingSeverity": logging.LoggingSeverity, **logging.functions(bound["Logger"])},
+        "logging": {"LoggingSeverity": LoggingSeverity, **logging_functions(bound["Logger"])},
         "node": {"Node": bound["Node"]},
         "parameter": {"Parameter": node_parameters.Parameter},
         "publisher": {"Publisher": entities.Publisher},
-        "qos": {**qos.QOS, **duration},
+        "qos": {**QOS, **duration},
         "service": {"Service": entities.Service},
         "subscription": {"Subscription": entities.Subscription},
         "task": {"Future": executors.Future, "Task": executors.Task},
@@ -117,7 +126,7 @@ def _functions(contexts: Contexts, bound: Mapping[str, Any]) -> dict[str, Callab
         context = contexts.current()
         if context.executor is None:
             if not context.running:
-                raise exceptions.NotInitializedException()
+                raise NotInitializedException()
             context.executor = bound["SingleThreadedExecutor"]()
         used: Executor = context.executor
         return used

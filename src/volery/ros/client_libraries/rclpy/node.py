@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from volery.base.time import S
 from volery.ros.client_libraries.library_base import Rosout
-from volery.ros.client_libraries.rclpy.context import Context, Contexts
+from volery.ros.client_libraries.rclpy.context import Context, Contexts, Logger
 from volery.ros.client_libraries.rclpy.entities import (
     Client,
     Publisher,
@@ -24,7 +24,6 @@ from volery.ros.client_libraries.rclpy.executors import (
     MutuallyExclusiveCallbackGroup,
     Task,
 )
-from volery.ros.client_libraries.rclpy.logging import Logger
 from volery.ros.client_libraries.rclpy.node_parameters import (
     DeclaredParameters,
     NodeParameters,

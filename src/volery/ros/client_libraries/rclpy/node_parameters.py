@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from volery.ros.client_libraries.rclpy.exceptions import (
+from volery.ros.client_libraries.rclpy.context import (
     InvalidParameterException,
     InvalidParameterTypeException,
     InvalidParameterValueException,

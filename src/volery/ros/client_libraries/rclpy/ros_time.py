@@ -7,10 +7,14 @@ from functools import total_ordering
 from typing import Any, ClassVar
 
 from volery.base.time import Ns, S, from_seconds
-from volery.ros.client_libraries.rclpy.context import Context, Contexts
-from volery.ros.client_libraries.rclpy.exceptions import NotInitializedException, ROSInterruptException
+from volery.ros.client_libraries.rclpy.context import (
+    Context,
+    Contexts,
+    NotInitializedException,
+    ROSInterruptException,
+)
 from volery.ros.messages import new
-from volery.ros.messages.stamp import nanoseconds
+from volery.ros.messages.message import nanoseconds
 
 
 class ClockType(IntEnum):

@@ -15,7 +15,7 @@ connecting takes no time; ``Header.seq`` is not transmitted; custom callback que
 from pathlib import Path
 
 from volery.ros.client_libraries.roscpp.message_headers import INCLUDE, generate_headers
-from volery.ros.client_libraries.roscpp.node_requests import request_handlers
+from volery.ros.client_libraries.roscpp.requests import request_handlers
 from volery.ros.client_libraries.roscpp.session import Session
 
 FALLBACK = Path(__file__).parent / "fallback"

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from volery.base.errors import UsageError
 from volery.ros import messages
+from volery.ros.messages.encodings import Constant, FieldLayout, Layout, ros1_layout
 from volery.ros.messages.packages import ROS1_SPELLING
-from volery.ros.messages.ros1 import Constant, FieldLayout, Layout, ros1_layout
 
 INCLUDE = Path(__file__).parent / "include"
 _HEADER = re.compile(r"^(\w+)/(\w+)\.h$")

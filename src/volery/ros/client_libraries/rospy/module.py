@@ -1,6 +1,7 @@
 """The modules of ``rospy`` for one run, rospy's functions, and the message packages.
 
-The functions of parameters work before ``init_node``, as in rospy.
+The functions of parameters work before ``init_node``, as in rospy. A logged line is recorded in the trace
+under the name of the component.
 """
 
 from __future__ import annotations
@@ -11,12 +12,97 @@ from types import ModuleType
 from typing import Any
 
 from volery.base.errors import UsageError
+from volery.base.time import Ns, S, from_seconds
 from volery.ros import messages
-from volery.ros.client_libraries.library_base import AtEnd, Launch, ignore_end, library_module
-from volery.ros.client_libraries.rospy import entities, ros_time
-from volery.ros.client_libraries.rospy.logging import LEVELS, loggers
-from volery.ros.client_libraries.rospy.session import EXCEPTIONS, Sessions
+from volery.ros.client_libraries.library_base import AtEnd, Caller, Launch, caller, ignore_end, library_module
+from volery.ros.client_libraries.rospy import entities
+from volery.ros.client_libraries.rospy.session import (
+    EXCEPTIONS,
+    Duration,
+    Rate,
+    Sessions,
+    Time,
+    Timer,
+    TimerEvent,
+    as_ns,
+    sleep_on_ros_time,
+)
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
+from volery.trace.events import Text
+
+LEVELS = {"DEBUG": 1, "INFO": 2, "WARN": 4, "ERROR": 8, "FATAL": 16}
+_FUNCTIONS = {
+    "debug": (1, 7),
+    "info": (2, 6),
+    "warn": (4, 4),
+    "err": (8, 3),
+    "error": (8, 3),
+    "fatal": (16, 2),
+}
+"""Level in ROS 1 and severity in syslog by the name of the function."""
+
+
+class _Log:
+    """The log functions of one severity."""
+
+    def __init__(self, sessions: Sessions, level: int, severity: int) -> None:
+        self._sessions, self._level, self._severity = sessions, level, severity
+        self._last: dict[tuple[str, str], Ns] = {}
+
+    def log(self, msg: Any, *args: Any, **options: Any) -> None:
+        """Log ``msg % args``."""
+        self._log(msg, args, caller(1))
+
+    def _log(self, msg: Any, args: tuple[Any, ...], where: Caller) -> None:
+        text = str(msg) % args if args else str(msg)
+        with self._sessions.kernel as kernel:
+            kernel.record(Text(kernel.now(), self._sessions.component, self._severity, text))
+        session = self._sessions.find()
+        if session is None or self._level < LEVELS["INFO"]:
+            return
+        node = session.node
+
+        def fill(message: Any) -> None:
+            now = node.now()
+            message.header.stamp.sec, message.header.stamp.nanosec = divmod(now, S)
+            message.level, message.name, message.msg = self._level, node.name, text
+            message.file, message.function, message.line = where
+
+        session.rosout.publish(fill)
+
+    def throttle(self, period: float, msg: Any, *args: Any) -> None:
+        """Log the same *msg* at most once each *period* seconds."""
+        with self._sessions.kernel as kernel:
+            key = (self._sessions.component, str(msg))
+            last = self._last.get(key)
+            if last is not None and kernel.now() - last < from_seconds(period):
+                return
+            self._last[key] = kernel.now()
+        self._log(msg, args, caller(1))
+
+    def once(self, msg: Any, *args: Any) -> None:
+        """Log the same *msg* once."""
+        key = (self._sessions.component, str(msg))
+        if key not in self._last:
+            self._last[key] = 0
+            self._log(msg, args, caller(1))
+
+    def throttle_identical(self, period: float, msg: Any, *args: Any) -> None:
+        """Log the same text at most once each *period* seconds."""
+        self.throttle(period, str(msg) % args if args else msg)
+
+
+def loggers(sessions: Sessions) -> dict[str, Callable[..., None]]:
+    """Return ``loginfo``, ``logwarn_throttle`` and so on by name."""
+    found: dict[str, Callable[..., None]] = {}
+    for name, (level, severity) in _FUNCTIONS.items():
+        log = _Log(sessions, level, severity)
+        found[f"log{name}"] = log.log
+        found[f"log{name}_throttle"] = log.throttle
+        found[f"log{name}_throttle_identical"] = log.throttle_identical
+        found[f"log{name}_once"] = log.once
+    return found
+
 
 _NO_DEFAULT = object()
 
@@ -94,9 +180,9 @@ _BOUND = (
     entities.Subscriber,
     entities.Service,
     entities.ServiceProxy,
-    ros_time.Rate,
-    ros_time.Timer,
-    ros_time.Time,
+    Rate,
+    Timer,
+    Time,
 )
 
 
@@ -118,8 +204,8 @@ def modules(
     names: dict[str, Any] = {**EXCEPTIONS, **LEVELS, **loggers(sessions), **_functions(sessions)}
     for kind in _BOUND:
         names[kind.__name__] = type(kind.__name__, (kind,), {"__slots__": (), "sessions": sessions})
-    names["Duration"] = ros_time.Duration
-    names["TimerEvent"] = ros_time.TimerEvent
+    names["Duration"] = Duration
+    names["TimerEvent"] = TimerEvent
     names["Header"] = messages.message_class("std_msgs/msg/Header")
     names["Message"] = messages.Message
     names["AnyMsg"] = entities.AnyMsg
@@ -186,11 +272,11 @@ def spin(sessions: Sessions) -> None:
 
 def sleep(sessions: Sessions, duration: Any) -> None:
     """Block for a number of seconds or a ``Duration``."""
-    ros_time.sleep(sessions.initialised(), duration)
+    sleep_on_ros_time(sessions.initialised(), duration)
 
 
 def _within(timeout: Any) -> int | None:
-    return None if timeout is None else ros_time.as_ns(timeout)
+    return None if timeout is None else as_ns(timeout)
 
 
 def wait_for_message(sessions: Sessions, topic: str, topic_type: Any, timeout: Any = None) -> Any:
@@ -218,9 +304,9 @@ def get_time(sessions: Sessions) -> float:
     return float(get_rostime(sessions).to_sec())
 
 
-def get_rostime(sessions: Sessions) -> ros_time.Time:
+def get_rostime(sessions: Sessions) -> Time:
     """Return ROS time."""
-    return ros_time.Time(0, sessions.now())
+    return Time(0, sessions.now())
 
 
 def resolve_name(sessions: Sessions, name: str) -> str:

@@ -15,8 +15,8 @@ from volery.base.frames import multiply
 from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
+from volery.ros.client_libraries.rclpy.entities import DurabilityPolicy, QoSProfile
 from volery.ros.client_libraries.rclpy.executors import ReentrantCallbackGroup
-from volery.ros.client_libraries.rclpy.qos import DurabilityPolicy, QoSProfile
 from volery.ros.client_libraries.tf2.transform_tree import (
     InvalidArgumentException,
     RigidTransform,
@@ -27,7 +27,7 @@ from volery.ros.client_libraries.tf2.transform_tree import (
     write_transform,
 )
 from volery.ros.messages import message_class, new
-from volery.ros.messages.stamp import nanoseconds
+from volery.ros.messages.message import nanoseconds
 
 
 def _transform_point(point: Any, by: RigidTransform) -> None:

@@ -5,8 +5,8 @@ process may have as many nodes as on the embedded graph. Message classes are bui
 only rospy itself must be installed, no message packages.
 """
 
-from volery.ros.transports.ros1.graph import ros1_graph
 from volery.ros.transports.ros1.master import Roscore, master_answers
 from volery.ros.transports.ros1.rospy_copy import available
+from volery.ros.transports.ros1.rospy_node import ros1_graph
 
 __all__ = ["Roscore", "available", "master_answers", "ros1_graph"]

@@ -14,13 +14,11 @@ from typing import Any
 from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
-from volery.ros.graph import names
 from volery.ros.graph.embedded_graph import record_all
 from volery.ros.graph.graph_context import Records
-from volery.ros.graph.interface import QoS, ServiceState, TopicState
+from volery.ros.graph.interface import QoS, ServiceState, TopicState, full_node_name, join_names
 from volery.ros.messages import ServiceType
-from volery.ros.transports.blocking_calls import POLL_S
-from volery.ros.transports.client_library import OnMessage, OnRequest
+from volery.ros.transports.client_library import POLL_S, OnMessage, OnRequest
 from volery.ros.transports.ros2.rclpy_endpoints import (
     NoAnswerError,
     OtherParameters,
@@ -58,7 +56,7 @@ class Ros2Node:
     """See ``volery.ros.transports.client_library.LibraryNode``."""
 
     def __init__(self, library: Ros2Library, name: str, namespace: str) -> None:
-        self.name = names.node_name(name, namespace)
+        self.name = full_node_name(name, namespace)
         self._library = library
         self._node = library.make(name, namespace)
 
@@ -183,7 +181,7 @@ class Ros2Library:
 
     def join(self, name: str, namespace: str, lost: Callable[[str], None]) -> Ros2Node:
         """Create a node; raise ``UsageError`` if its name is taken."""
-        full = names.node_name(name, namespace)
+        full = full_node_name(name, namespace)
         if self._is_taken(full):
             raise UsageError(
                 f"a node named {full} is there already; choose another name or namespace for this one"
@@ -207,7 +205,7 @@ class Ros2Library:
 
     def remove(self, node: Any) -> None:
         """Remove a node from the graph."""
-        self._left.add(names.join(node.get_namespace(), node.get_name()))
+        self._left.add(join_names(node.get_namespace(), node.get_name()))
         self._executor.remove_node(node)
         with suppress(Exception):  # rclpy's wait may still use it; the node is removed either way
             node.destroy_node()
@@ -222,7 +220,7 @@ class Ros2Library:
         """Return the discovered nodes, sorted."""
         self._wait_for_discovery()
         known = self._own.get_node_names_and_namespaces()
-        return sorted({names.join(space, name) for name, space in known if not name.startswith(HIDDEN)})
+        return sorted({join_names(space, name) for name, space in known if not name.startswith(HIDDEN)})
 
     def topics(self) -> list[TopicState]:
         """Return what has been discovered, by name."""
@@ -242,7 +240,7 @@ class Ros2Library:
         for name, space in self._own.get_node_names_and_namespaces():
             with suppress(Exception):  # a node that has just left
                 for service, kinds in self._own.get_service_names_and_types_by_node(name, space):
-                    servers[service] = (kinds[0], names.join(space, name))
+                    servers[service] = (kinds[0], join_names(space, name))
         return [ServiceState(name, kind, server) for name, (kind, server) in sorted(servers.items())]
 
     def announce_clock(self) -> None:
@@ -261,7 +259,7 @@ class Ros2Library:
 
 def _users(ends: list[Any]) -> tuple[str, ...]:
     users = {
-        names.join(one.node_namespace, one.node_name) for one in ends if not one.node_name.startswith(HIDDEN)
+        join_names(one.node_namespace, one.node_name) for one in ends if not one.node_name.startswith(HIDDEN)
     }
     return tuple(sorted(users))
 

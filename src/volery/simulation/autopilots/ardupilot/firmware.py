@@ -19,8 +19,8 @@ from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED
 from volery.simulation.autopilots.ardupilot.telemetry import Health
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.mavlink import messages
+from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.mavlink.firmware import (
-    Asker,
     Builder,
     CommandPolicy,
     LinkStart,
@@ -75,37 +75,37 @@ def _ftp_error(asked: list[int]) -> int | None:
     return FAIL if operation in READS | WRITES else UNKNOWN
 
 
-def on_file_transfer(_vehicle: Vehicle, fields: dict[str, Any], asker: Asker) -> None:
+def on_file_transfer(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
     """Handle FILE_TRANSFER_PROTOCOL: the directory is empty."""
     asked = [int(byte) for byte in fields["payload"]]
     asked += [0] * (FTP_SIZE - len(asked))
-    asker.answer("FILE_TRANSFER_PROTOCOL", target_network=0, payload=_ftp_reply(asked, _ftp_error(asked)))
+    sender.answer("FILE_TRANSFER_PROTOCOL", target_network=0, payload=_ftp_reply(asked, _ftp_error(asked)))
 
 
-def on_log_list(vehicle: Vehicle, _fields: dict[str, Any], asker: Asker) -> None:
+def on_log_list(vehicle: Vehicle, _fields: dict[str, Any], sender: Peer) -> None:
     """Handle LOG_REQUEST_LIST: one LOG_ENTRY says that there is none; an armed vehicle sends nothing."""
     if vehicle.armed:
         vehicle.send_text(WARNING, "Disarm for log download")
         return
-    asker.send("LOG_ENTRY", {"id": 0, "num_logs": 0, "last_log_num": 0, "time_utc": 0, "size": 0})
+    sender.send("LOG_ENTRY", {"id": 0, "num_logs": 0, "last_log_num": 0, "time_utc": 0, "size": 0})
 
 
-def on_terrain_check(_vehicle: Vehicle, fields: dict[str, Any], asker: Asker) -> None:
+def on_terrain_check(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
     """Handle TERRAIN_CHECK: there is no terrain data on board."""
-    asker.send("TERRAIN_REPORT", {"lat": fields["lat"], "lon": fields["lon"], "spacing": 0, "pending": 0})
+    sender.send("TERRAIN_REPORT", {"lat": fields["lat"], "lon": fields["lon"], "spacing": 0, "pending": 0})
 
 
-def on_fence_fetch(vehicle: Vehicle, fields: dict[str, Any], asker: Asker) -> None:
+def on_fence_fetch(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
     """Handle FENCE_FETCH_POINT, the deprecated form."""
     points, index = vehicle.points.get(FENCE, []), fields["idx"]
     if index >= len(points):
         vehicle.send_text(WARNING, f"Invalid fence point, index past end({index} >= {len(points)})")
         return
     place = {"lat": points[index].x / 1e7, "lng": points[index].y / 1e7}
-    asker.answer("FENCE_POINT", idx=index, count=len(points), **place)
+    sender.answer("FENCE_POINT", idx=index, count=len(points), **place)
 
 
-def on_rally_fetch(vehicle: Vehicle, fields: dict[str, Any], asker: Asker) -> None:
+def on_rally_fetch(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
     """Handle RALLY_FETCH_POINT, the deprecated form."""
     points, index = vehicle.points.get(RALLY, []), fields["idx"]
     if index >= len(points):
@@ -113,14 +113,14 @@ def on_rally_fetch(vehicle: Vehicle, fields: dict[str, Any], asker: Asker) -> No
         return
     point = points[index]
     place = {"lat": point.x, "lng": point.y, "alt": round(point.z), "break_alt": 0, "land_dir": 0, "flags": 0}
-    asker.answer("RALLY_POINT", idx=index, count=len(points), **place)
+    sender.answer("RALLY_POINT", idx=index, count=len(points), **place)
 
 
 def questions(version: Builder) -> dict[str, QuestionHandler]:
     """Return the handlers by message; *version* builds AUTOPILOT_VERSION."""
 
-    def on_version(vehicle: Vehicle, _fields: dict[str, Any], asker: Asker) -> None:
-        asker.send("AUTOPILOT_VERSION", version(vehicle) or {})
+    def on_version(vehicle: Vehicle, _fields: dict[str, Any], sender: Peer) -> None:
+        sender.send("AUTOPILOT_VERSION", version(vehicle) or {})
 
     return {
         "AUTOPILOT_VERSION_REQUEST": on_version,

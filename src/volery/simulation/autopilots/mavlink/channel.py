@@ -10,7 +10,6 @@ from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
 from volery.links.link import ByteLink, Frame, Link
 from volery.links.mavlink_messages import MessageStreams
-from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
 from volery.simulation.autopilots.state_groups import NEVER
 
 AUTOPILOT = 1
@@ -26,6 +25,17 @@ GROUND_STATION = 6
 """MAV_TYPE_GCS."""
 
 Chunks = list[dict[str, Any]]
+
+
+class StatusTextPolicy(NamedTuple):
+    """How texts become STATUSTEXT."""
+
+    numbered: bool = False
+    """Whether a text that fits into one message also has an id."""
+    to_stations: bool = False
+    """Whether texts wait, four at most, until a ground station is connected on the link."""
+    spacing: Ns = 0
+    """Shortest time between two texts on a link [ns]."""
 
 
 class StatusTextQueue:

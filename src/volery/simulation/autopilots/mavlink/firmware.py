@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from volery.base.time import MS, Ns, S
+from volery.simulation.autopilots.mavlink.channel import Peer, StatusTextPolicy
 from volery.simulation.autopilots.mavlink.messages import Handler
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction, do_nothing
@@ -27,17 +28,6 @@ def _ignore(*_event: object) -> None:
 
 def _plain_request(_number: int) -> str:
     return "MISSION_REQUEST"
-
-
-class StatusTextPolicy(NamedTuple):
-    """How texts become STATUSTEXT."""
-
-    numbered: bool = False
-    """Whether a text that fits into one message also has an id."""
-    to_stations: bool = False
-    """Whether texts wait, four at most, until a ground station is connected on the link."""
-    spacing: Ns = 0
-    """Shortest time between two texts on a link [ns]."""
 
 
 class ParameterPolicy(NamedTuple):
@@ -82,20 +72,8 @@ MessageHandler = Callable[[Vehicle, dict[str, Any], int], None]
 """Handles a message that needs no answer: vehicle, fields, system id of the sender."""
 
 
-class Asker(Protocol):
-    """Sender of a message that is answered with a message."""
-
-    def send(self, name: str, fields: dict[str, Any]) -> None:
-        """Send a message that has no target."""
-        ...
-
-    def answer(self, name: str, **fields: Any) -> None:
-        """Send a message with the asker as its target."""
-        ...
-
-
-QuestionHandler = Callable[[Vehicle, dict[str, Any], Asker], None]
-"""Answers a message: vehicle, fields, asker."""
+QuestionHandler = Callable[[Vehicle, dict[str, Any], Peer], None]
+"""Answers a message: vehicle, fields, sender."""
 
 
 class BootBytes(NamedTuple):

@@ -11,6 +11,7 @@ from functools import partial
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.autopilot import BootEvent, BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.simulation.autopilots.mavlink.channel import StatusTextPolicy
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import (
     Builder,
@@ -20,7 +21,6 @@ from volery.simulation.autopilots.mavlink.firmware import (
     MissionPolicy,
     MissionUploadPolicy,
     ParameterPolicy,
-    StatusTextPolicy,
     TelemetryPolicy,
 )
 from volery.simulation.autopilots.mavlink.messages import DENIED, FAILED, Handler

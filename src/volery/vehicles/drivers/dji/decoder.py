@@ -148,7 +148,7 @@ class DjiDecoder:
             self._motors = False  # they may turn for a while after the touch-down
         self._status = message.data
         if self.aircraft and (self._display != UNKNOWN or self.aircraft == M100):
-            self._telemetry.last_message_ns = self._kernel.now()
+            self._telemetry.note_message(self._kernel.now())
 
     def _display_mode(self, message: Any) -> None:
         now, shown = self._kernel.now(), message.data
@@ -329,7 +329,7 @@ class DjiDecoder:
             return
         if self.located_at > self._placed_at:
             self._placed_at = self.located_at
-            telemetry.position = self._at(self._altitude)
+            telemetry.update_position(self._at(self._altitude))
         if not isfinite(self._ground):
             telemetry.home = None
         elif not telemetry.armed or (telemetry.home is None and not telemetry.flying):

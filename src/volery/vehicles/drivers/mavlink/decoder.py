@@ -83,7 +83,7 @@ class TelemetryDecoder(ABC):
 
     def handle_message(self, name: str, fields: Fields) -> bool:
         """Decode a message; return whether it was used. Positions off the globe are discarded."""
-        self._telemetry.last_message_ns = self._kernel.now()
+        self._telemetry.note_message(self._kernel.now())
         handler = self._handlers.get(name)
         if handler is None:
             return False
@@ -138,7 +138,7 @@ class TelemetryDecoder(ABC):
         if latitude == 0 and longitude == 0:
             return
         telemetry = self._telemetry
-        telemetry.position = Position(latitude / 1e7, longitude / 1e7, AMSL(fields["alt"] / 1000.0))
+        telemetry.update_position(Position(latitude / 1e7, longitude / 1e7, AMSL(fields["alt"] / 1000.0)))
         telemetry.above_home = fields["relative_alt"] / 1000.0
         telemetry.velocity = Velocity(fields["vx"] / 100.0, fields["vy"] / 100.0, -fields["vz"] / 100.0)
         self._heading(fields["hdg"])

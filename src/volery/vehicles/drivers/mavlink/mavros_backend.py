@@ -109,7 +109,7 @@ class MavrosDecoder:
             telemetry.flying = self._landed_state != ON_GROUND
 
     def _note_message(self) -> None:
-        self._telemetry.last_message_ns = self._kernel.now()
+        self._telemetry.note_message(self._kernel.now())
         self._telemetry.changed.notify()
 
     def _state(self, message: Any) -> None:
@@ -133,7 +133,7 @@ class MavrosDecoder:
     def _global(self, message: Any) -> None:
         self._has_fix = message.status.status > NO_FIX
         if message.latitude != 0.0 or message.longitude != 0.0:
-            self._telemetry.position = self._to_position(message)
+            self._telemetry.update_position(self._to_position(message))
         self._update_ready()
         self._note_message()
 

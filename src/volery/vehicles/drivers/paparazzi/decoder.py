@@ -190,7 +190,7 @@ class PaparazziDecoder:
         if telemetry.last_message_ns < now - PAUSE:
             self._resumed_at = now
         if telemetry.kind:
-            telemetry.last_message_ns = now
+            telemetry.note_message(now)
         handler = self._handlers.get(name)
         if handler is not None:
             handler(fields)
@@ -314,7 +314,7 @@ class PaparazziDecoder:
         if self.origin is None:
             return
         self._flight_at = self._kernel.now()
-        telemetry.position = self.origin.position(_enu(fields, ""))
+        telemetry.update_position(self.origin.position(_enu(fields, "")))
         telemetry.above_home = telemetry.position.altitude.metres - self.origin.amsl
         if telemetry.mode == GUIDED:
             telemetry.target = self.origin.position(_enu(fields, "carrot_"))

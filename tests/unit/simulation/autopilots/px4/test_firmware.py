@@ -15,8 +15,7 @@ from volery.links.link import Frame
 from volery.links.mavlink_messages import from_bytewise, status_text_chunks, to_bytewise
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
-from volery.simulation.autopilots.mavlink.channel import StatusTextQueue
-from volery.simulation.autopilots.mavlink.firmware import StatusTextPolicy
+from volery.simulation.autopilots.mavlink.channel import StatusTextPolicy, StatusTextQueue
 from volery.simulation.autopilots.px4 import FIRMWARE
 from volery.simulation.autopilots.px4.event_interface import ArmingChecks, arming_report
 from volery.simulation.autopilots.px4.flight_modes import apply_expo, interpolated

@@ -1,0 +1,242 @@
+"""The naming schemes of MAVROS and of roscopter: their topics and services with the same types and units.
+
+Differences from MAVROS: publishers are reliable, as in ROS 1; the node sends with the system id of a ground
+station, which is the only one from which ArduPilot accepts manual control; the node requests the streams that
+it publishes, as roscopter does; topics that few nodes need are published only while they have a subscription.
+
+Differences from roscopter: the node waits for frames instead of polling a thousand times a second; ``rc`` is
+also published from RC_CHANNELS, and ``raw_imu`` from SCALED_IMU and HIGHRES_IMU, where the autopilot sends
+those instead; a refused arming is reported as a warning and on ``state``, because the type of the service has
+no field for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from volery.base.time import Ns
+from volery.bridge.autopilot_link import (
+    ALL,
+    EXTENDED_STATUS,
+    EXTRA1,
+    EXTRA2,
+    POSITION,
+    RAW_SENSORS,
+    RC,
+    AutopilotType,
+    mode_name,
+)
+from volery.bridge.commands import ARM_DISARM, TARGET_TOPICS, CommandServices, TargetPublisher, subscriptions
+from volery.bridge.motion_publishers import (
+    IMU_SOURCES,
+    IMU_TOPICS,
+    POSE_TOPICS,
+    TRANSFORM_TOPICS,
+    ImuPublisher,
+    PosePublisher,
+    TransformPublisher,
+    imu_source,
+)
+from volery.bridge.node_interface import (
+    Fields,
+    InterfaceContext,
+    NamingScheme,
+    NodeInterface,
+    OutgoingMessage,
+    Service,
+    Subscription,
+    Topic,
+    Translator,
+    merge_translators,
+    stamped,
+)
+from volery.bridge.protocol_services import (
+    MISSION_TOPICS,
+    PARAMETER_TOPICS,
+    MissionServices,
+    ParameterServices,
+)
+from volery.bridge.status_publishers import (
+    DIAGNOSTIC_TOPICS,
+    STATUS_TOPICS,
+    DiagnosticsPublisher,
+    StatusPublisher,
+)
+from volery.links.mavlink_messages import entry_name
+from volery.ros.messages import new, service
+
+MAVROS_STREAMS: Mapping[int, int] = {
+    RAW_SENSORS: 1,
+    EXTENDED_STATUS: 2,
+    RC: 1,
+    POSITION: 10,
+    EXTRA1: 4,
+    EXTRA2: 1,
+}
+
+MAVROS_TOPICS = (
+    *STATUS_TOPICS,
+    *POSE_TOPICS,
+    *IMU_TOPICS,
+    *TARGET_TOPICS,
+    *MISSION_TOPICS,
+    *PARAMETER_TOPICS,
+    *TRANSFORM_TOPICS,
+    *DIAGNOSTIC_TOPICS,
+)
+
+
+def mavros_interface(context: InterfaceContext) -> NodeInterface:
+    """Return the interface of a node under MAVROS's names."""
+    status, commands = StatusPublisher(context), CommandServices(context)
+    missions, parameters = MissionServices(context), ParameterServices(context)
+    poses, diagnostics = PosePublisher(context), DiagnosticsPublisher(context)
+    others = (ImuPublisher(context), TargetPublisher(context), TransformPublisher(context))
+    parts = (status, poses, *others, missions, parameters, diagnostics)
+
+    def disconnected(stamp: Ns) -> None:
+        status.disconnected(stamp)
+        diagnostics.disconnected(stamp)
+
+    return NodeInterface(
+        topics=MAVROS_TOPICS,
+        translators=merge_translators(*(part.translators() for part in parts)),
+        subscriptions=subscriptions(context.geoid),
+        services={**commands.services(), **missions.services(), **parameters.services()},
+        disconnected=disconnected,
+    )
+
+
+MAVROS = NamingScheme("mavros", mavros_interface, MAVROS_STREAMS, home=True)
+
+
+CHANNELS = 8
+MILLI = 1000.0
+FIX_3D = 3
+NO_FIX, FIX, GPS = -1, 0, 1
+"""sensor_msgs/NavSatStatus."""
+SAFETY_ARMED, GUIDED_ENABLED = 128, 8
+"""MAV_MODE_FLAG."""
+EMPTY = "std_srvs/srv/Empty"
+RC_TYPE = "roscopter/msg/RC"
+
+ROSCOPTER_TOPICS = (
+    Topic("gps", "sensor_msgs/msg/NavSatFix"),
+    Topic("rc", RC_TYPE),
+    Topic("state", "roscopter/msg/State"),
+    Topic("vfr_hud", "roscopter/msg/VFR_HUD"),
+    Topic("attitude", "roscopter/msg/Attitude"),
+    Topic("raw_imu", "roscopter/msg/Mavlink_RAW_IMU"),
+)
+_ANGLES = ("roll", "pitch", "yaw", "rollspeed", "pitchspeed", "yawspeed")
+_MEASURED = tuple(f"{axis}{kind}" for kind in ("acc", "gyro", "mag") for axis in "xyz")
+
+
+class RoscopterInterface:
+    """Translators and handlers under roscopter's names."""
+
+    def __init__(self, context: InterfaceContext) -> None:
+        self._link, self._publish, self._warn = context.link, context.publish, context.warn
+        self._commands = CommandServices(context)
+
+    def translators(self) -> Mapping[str, Translator]:
+        """Return the translators by message name."""
+        return {
+            "GPS_RAW_INT": self._gps,
+            "RC_CHANNELS": self._rc,
+            "RC_CHANNELS_RAW": self._rc_raw,
+            "HEARTBEAT": self._state,
+            "VFR_HUD": self._vfr_hud,
+            "ATTITUDE": self._attitude,
+            **{name: partial(self._raw_imu, name) for name in IMU_SOURCES},
+        }
+
+    def _gps(self, fields: Fields, at: Ns) -> None:
+        """Publish the fix with the AMSL altitude of the receiver."""
+        place = {
+            "latitude": fields["lat"] / 1e7,
+            "longitude": fields["lon"] / 1e7,
+            "altitude": fields["alt"] / 1e3,
+        }
+        message = new("sensor_msgs/msg/NavSatFix", header=stamped(at), **place)
+        message.status.status = FIX if fields["fix_type"] >= FIX_3D else NO_FIX
+        message.status.service = GPS
+        self._publish("gps", message)
+
+    def _rc(self, fields: Fields, at: Ns) -> None:
+        channels = [fields[f"chan{number}_raw"] for number in range(1, CHANNELS + 1)]
+        self._publish("rc", new(RC_TYPE, channel=channels))
+
+    def _rc_raw(self, fields: Fields, at: Ns) -> None:
+        if self._link.last("RC_CHANNELS") is None:
+            self._rc(fields, at)
+
+    def _state(self, fields: Fields, at: Ns) -> None:
+        base = fields["base_mode"]
+        mode = mode_name(AutopilotType(fields["autopilot"], fields["type"]), fields["custom_mode"])
+        armed, guided = bool(base & SAFETY_ARMED), bool(base & GUIDED_ENABLED)
+        self._publish("state", new("roscopter/msg/State", armed=armed, guided=guided, mode=mode))
+
+    def _vfr_hud(self, fields: Fields, at: Ns) -> None:
+        names = ("airspeed", "groundspeed", "heading", "throttle", "alt", "climb")
+        self._publish("vfr_hud", new("roscopter/msg/VFR_HUD", **{name: fields[name] for name in names}))
+
+    def _attitude(self, fields: Fields, at: Ns) -> None:
+        self._publish("attitude", new("roscopter/msg/Attitude", **{name: fields[name] for name in _ANGLES}))
+
+    def _raw_imu(self, name: str, fields: Fields, at: Ns) -> None:
+        """Publish the measurement in thousandths of g, of rad/s and of gauss."""
+        if imu_source(self._link) != name:
+            return
+        measured = {one: fields[one] for one in _MEASURED}
+        if name == "HIGHRES_IMU":
+            measured = _in_thousandths(measured)
+        time = fields["time_boot_ms"] * 1000 if name == "SCALED_IMU" else fields["time_usec"]
+        message = new("roscopter/msg/Mavlink_RAW_IMU", header=stamped(at), time_usec=time, **measured)
+        self._publish("raw_imu", message)
+
+    def services(self) -> Mapping[str, Service]:
+        """Return types and handlers by service name."""
+        return {"arm": (EMPTY, partial(self._arm, 1.0)), "disarm": (EMPTY, partial(self._arm, 0.0))}
+
+    def _arm(self, arm: float, request: Any) -> Any:
+        accepted, result = self._commands.send_command(ARM_DISARM, arm)
+        if not accepted:
+            what = "arm" if arm else "disarm"
+            self._warn(f"{what}: the autopilot answers {entry_name('MAV_RESULT', result)}")
+        return service(EMPTY).response()
+
+
+def _in_thousandths(measured: Mapping[str, float]) -> dict[str, int]:
+    """Convert the m/s^2, rad/s and gauss of HIGHRES_IMU to the units of RAW_IMU."""
+    return {name: round(value * _PER_UNIT[name[1:]]) for name, value in measured.items()}
+
+
+_PER_UNIT = {"acc": MILLI / 9.80665, "gyro": MILLI, "mag": MILLI}
+
+
+def send_rc(message: Any, now: Ns) -> OutgoingMessage:
+    """Translate ``send_rc``: microseconds; 0 returns a channel to the operator's remote control."""
+    channels = {f"chan{number}_raw": int(value) for number, value in enumerate(message.channel, start=1)}
+    return "RC_CHANNELS_OVERRIDE", channels
+
+
+def _ignore_disconnection(stamp: Ns) -> None:
+    """Publish nothing, because ``state`` cannot express that the autopilot has stopped sending."""
+
+
+def roscopter_interface(context: InterfaceContext) -> NodeInterface:
+    """Return the interface of a node under roscopter's names; it contains ``send_rc`` only with *control*."""
+    made = RoscopterInterface(context)
+    return NodeInterface(
+        topics=ROSCOPTER_TOPICS,
+        translators=merge_translators(made.translators()),
+        subscriptions=(Subscription("send_rc", RC_TYPE, send_rc),) if context.control else (),
+        services=made.services(),
+        disconnected=_ignore_disconnection,
+    )
+
+
+ROSCOPTER = NamingScheme("roscopter", roscopter_interface, {ALL: 10}, home=False)

@@ -1,1 +1,0 @@
-"""Figures of the core of this machine, for the cost of compiled code: times of single operations."""

@@ -1,1 +1,0 @@
-"""Times of Python's operations on the machine at hand: ``volery calibrate python``."""

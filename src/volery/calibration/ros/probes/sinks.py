@@ -1,0 +1,81 @@
+"""Peers of a probe: a program that runs during a campaign until its standard input ends.
+
+``sinks.py rospy`` or ``sinks.py rclpy``: eight nodes in one process. Topic ``calibration/to_N`` has N
+subscribers, ``calibration/quiet`` a publisher that never publishes, ``calibration/feed`` one that publishes
+twenty times a second. For rclpy it does not import volery: that runs in the Python that has rclpy.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+from importlib import import_module
+from typing import Any
+
+MOST = 8
+FEED_S = 0.05
+
+
+def _ignore(message: Any) -> None:
+    """Receive a message."""
+
+
+def _over() -> threading.Event:
+    """Report that the peers are ready; return an event that is set when standard input ends."""
+    over = threading.Event()
+
+    def wait() -> None:
+        sys.stdin.read()
+        over.set()
+
+    threading.Thread(target=wait, daemon=True).start()
+    sys.stdout.write("ready\n")
+    sys.stdout.flush()
+    return over
+
+
+def _rospy_node(number: int) -> Any:
+    rospy = import_module("volery.ros.transports.ros1.rospy_copy").rospy_copy()
+    rospy.init_node(f"calibration_sink_{number}", disable_signals=True)
+    for count in range(number, MOST + 1):
+        rospy.Subscriber(f"calibration/to_{count}", rospy.AnyMsg, _ignore)
+    return rospy
+
+
+def run_rospy() -> None:
+    """Run the peers of a ROS 1 probe, each on its own copy of rospy."""
+    message: Any = import_module("std_msgs.msg").Float64MultiArray
+    nodes = [_rospy_node(number) for number in range(1, MOST + 1)]
+    quiet = nodes[0].Publisher("calibration/quiet", message, queue_size=10)
+    feed = nodes[0].Publisher("calibration/feed", message, queue_size=10)
+    over = _over()
+    while not over.wait(FEED_S):
+        feed.publish(message(data=[0.0] * 4))
+    del quiet
+    for rospy in nodes:
+        rospy.signal_shutdown("the campaign is over")
+
+
+def run_rclpy() -> None:
+    """Run the peers of an rclpy probe."""
+    rclpy: Any = import_module("rclpy")
+    kind: Any = import_module("std_msgs.msg").Float64MultiArray
+    rclpy.init()
+    nodes = [rclpy.create_node(f"calibration_sink_{number}") for number in range(1, MOST + 1)]
+    executor = rclpy.executors.SingleThreadedExecutor()
+    for number, node in enumerate(nodes, 1):
+        executor.add_node(node)
+        for count in range(number, MOST + 1):
+            node.create_subscription(kind, f"calibration/to_{count}", _ignore, 10)
+    quiet = nodes[0].create_publisher(kind, "calibration/quiet", 10)
+    feed = nodes[0].create_publisher(kind, "calibration/feed", 10)
+    nodes[0].create_timer(FEED_S, lambda: feed.publish(kind(data=[0.0] * 4)))
+    over = _over()
+    while not over.is_set():
+        executor.spin_once(timeout_sec=0.5)
+    del quiet
+    rclpy.shutdown()
+
+
+if __name__ == "__main__":
+    {"rospy": run_rospy, "rclpy": run_rclpy}[sys.argv[1]]()

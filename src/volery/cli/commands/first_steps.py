@@ -1,0 +1,372 @@
+"""``volery demo`` and ``volery new``: the examples that come with volery; ``volery doctor``: installed parts.
+
+The demo runs the delivery service on two allocations at once, each in a process of its own. Ctrl-C reaches
+every process of the terminal, and SIGTERM is forwarded: each simulation ends in order and this process waits
+for them. If this process is killed they receive SIGTERM. ``doctor`` lists what each missing part would enable
+and how to install it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import os
+import platform
+import shutil
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.text import Text
+
+import volery
+from volery.base.errors import UsageError, VoleryError
+from volery.base.installed import install_command, require_extra
+from volery.cli.command import FAILED, OK, Commands
+from volery.cli.console import Output
+from volery.cli.options import Seed
+
+if TYPE_CHECKING:
+    from volery.cli.run_display import Drawings
+    from volery.requirements.record import RunRecord
+    from volery.run.result import Progress
+
+commands = Commands("First steps")
+
+DEMO_MODEL, STARTER_MODEL = "delivery", "starter"
+PR_SET_PDEATHSIG = 1
+
+POLL_PERIOD_S = 0.1
+"""Wall seconds between two reads of the progress that the processes send."""
+
+
+def example(name: str) -> Path:
+    """Return the path of an example of the package, or of the checkout that contains the package."""
+    package = Path(volery.__file__).parent
+    for folder in (package / "examples", package.parents[1] / "examples"):
+        if (folder / name).exists():
+            return folder / name
+    raise UsageError(f"this installation has no example {name!r}; install volery from a complete checkout")
+
+
+@commands.add("quiet", "json", "debug")
+def demo(
+    output: Output,
+    out: Annotated[Path, typer.Option(help="Folder for the run folders.")] = Path("runs/demo"),
+    seed: Seed = 7,
+) -> int:
+    """Deliver three parcels across a city with two allocations side by side, and write a report.
+
+    Exit status: 0 if both runs completed, even if a requirement was not met.
+    """
+    require_extra("simulation", "simulated runs")
+    from volery.cli.run_display import unmet
+    from volery.model.system_loader import load
+    from volery.report.html_report import write_comparison
+    from volery.report.terminal import short_comparison
+    from volery.run.assembly.model_checks import vocabulary
+    from volery.run.recording import make_folder
+
+    model = example(DEMO_MODEL)
+    names = load(model, vocabulary()).allocations[:2]
+    outcomes = run_all(output, {name: Job(model, name, seed, make_folder(out / name)) for name in names})
+    records = [outcome.record for outcome in outcomes.values()]
+    parcels = [
+        f"{name}: {parcel.state} at {parcel.history[-1].at_s:.0f} s {parcel.history[-1].detail}".rstrip()
+        for name, parcel in records[0].parcels.items()
+    ]
+    output.show(*parcels, short_comparison(records, list(outcomes)))
+    output.give(f"[{', '.join(record.model_dump_json(by_alias=True) for record in records)}]")
+    for name, outcome in outcomes.items():
+        for requirement, found in outcome.record.requirements.items():
+            if found.met is False:
+                output.note(f"{name}: {unmet(requirement, found)}")
+        for problem in outcome.problems:
+            output.complain(f"volery: {name}: {problem}")
+        output.note(f"report: {outcome.folder / 'report.html'}")
+    comparison = write_comparison([outcome.folder for outcome in outcomes.values()], out)
+    output.note(f"side by side: {comparison}")
+    return OK if all(outcome.completed for outcome in outcomes.values()) else FAILED
+
+
+@commands.add("quiet", "debug")
+def new(
+    output: Output, folder: Annotated[Path, typer.Argument(help="Folder to create; new or empty.")]
+) -> int:
+    """Create a small model that runs, to start from."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UsageError(f"{folder} exists and is not an empty folder; choose another name")
+    starter = example(STARTER_MODEL)
+    try:
+        shutil.copytree(starter, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+    except OSError as error:
+        raise UsageError(f"cannot write {folder}: {error.strerror or error}") from error
+    output.show(
+        f"made {folder}: a model, two components and a mission",
+        f"  volery model check {folder}",
+        f"  volery simulate {folder}",
+        f"  volery fly {folder / 'mission.py'} --on sim:ardupilot",
+    )
+    return OK
+
+
+# -- several simulations at once
+
+
+@dataclass(frozen=True)
+class Job:
+    """A simulation to run at fidelity ``code``."""
+
+    model: Path
+    allocation: str
+    seed: int
+    out: Path
+
+
+@dataclass(frozen=True)
+class JobOutcome:
+    """Result of a job. Unlike a ``Run`` it can be sent between processes."""
+
+    record: RunRecord
+    folder: Path
+    problems: tuple[str, ...]
+
+    @property
+    def completed(self) -> bool:
+        """True if the run completed and everything could be written."""
+        return self.record.outcome.status == "completed" and not self.problems
+
+
+def run_all(output: Output, jobs: Mapping[str, Job]) -> dict[str, JobOutcome]:
+    """Run all *jobs* and return their outcomes by name. Raises the error of the first that cannot start."""
+    from volery.cli.run_display import live_progress
+
+    context = multiprocessing.get_context("spawn")
+    reports = context.SimpleQueue()
+    with (
+        live_progress(output) as drawings,
+        ProcessPoolExecutor(
+            len(jobs), context, _begin_process, (reports if drawings else None, os.getpid())
+        ) as pool,
+        _signals_left_to_processes(),
+    ):
+        futures = {name: pool.submit(_run, name, job) for name, job in jobs.items()}
+        _draw_until_done(list(futures.values()), reports, drawings)
+    try:
+        return {name: future.result() for name, future in futures.items()}
+    except BrokenProcessPool as error:  # ended while it started, by a signal or for want of memory
+        raise VoleryError("a process that ran a simulation was ended from outside") from error
+
+
+def _draw_until_done(futures: list[Future[JobOutcome]], reports: Any, drawings: Drawings | None) -> None:
+    while wait(futures, timeout=POLL_PERIOD_S).not_done:
+        while drawings is not None and not reports.empty():
+            drawings.show(*reports.get())
+
+
+@contextmanager
+def _signals_left_to_processes() -> Iterator[None]:
+    """Leave SIGINT and SIGTERM to the processes that run the simulations.
+
+    The terminal sends SIGINT to them as well; SIGTERM is forwarded.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def forward(number: int, frame: FrameType | None) -> None:
+        for child in multiprocessing.active_children():
+            child.terminate()
+
+    before = {
+        signal.SIGINT: signal.signal(signal.SIGINT, signal.SIG_IGN),
+        signal.SIGTERM: signal.signal(signal.SIGTERM, forward),
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _begin_process(queue: Any, parent: int) -> None:
+    """Begin a process that runs simulations: where it reports, and its end with *parent*."""
+    _Reports.open(queue, parent)
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:  # it died before
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+class _Reports:
+    """The queue for progress and the process that reads it.
+
+    Both are set once when a process starts: a queue cannot be sent later.
+    """
+
+    queue: Any = None
+    parent = 0
+
+    @classmethod
+    def open(cls, queue: Any, parent: int) -> None:
+        cls.queue, cls.parent = queue, parent
+
+    @classmethod
+    def sender(cls, name: str) -> Callable[[Progress], None] | None:
+        from volery.cli.run_display import RateLimited
+
+        queue = cls.queue
+        return None if queue is None else RateLimited(lambda progress: queue.put((name, progress)))
+
+
+def _run(name: str, job: Job) -> JobOutcome:
+    """Run *job* in its own process."""
+    from volery.run.result import Options
+    from volery.run.simulate import simulate
+
+    options = Options(fidelity="code", seed=job.seed, out=job.out, show=_Reports.sender(name))
+    run = simulate(job.model, options, allocation=job.allocation)
+    if os.getppid() != _Reports.parent:  # it was killed: nothing would end this process
+        os._exit(FAILED)
+    problems = [] if run.completed else [f"{run.record.outcome.status}: {run.record.outcome.reason}"]
+    return JobOutcome(run.record, job.out, (*problems, *run.problems))
+
+
+MINIMUM_PYTHON = (3, 11)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Something that may be installed.
+
+    ``find`` returns a version or a path, or an empty text if the part is missing.
+    """
+
+    name: str
+    find: Callable[[], str]
+    enables: str
+    get: str
+    needed: bool = False
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A part and what was found of it; ``found`` is empty if it is missing."""
+
+    name: str
+    found: str
+    needed: bool
+    enables: str
+    get: str
+
+
+def distribution(name: str) -> Callable[[], str]:
+    """Return a function that finds a Python package by the name it is installed under."""
+
+    def find() -> str:
+        try:
+            return version(name)
+        except PackageNotFoundError:
+            return ""
+
+    return find
+
+
+def module(name: str) -> Callable[[], str]:
+    """Return a function that finds a Python module of any origin, such as Debian's."""
+
+    def find() -> str:
+        found = find_spec(name)
+        return (found.origin or "installed") if found else ""
+
+    return find
+
+
+def program(*names: str) -> Callable[[], str]:
+    """Return a function that finds a program by any of *names*."""
+    return lambda: next((found for name in names if (found := shutil.which(name))), "")
+
+
+def _python() -> str:
+    return platform.python_version() if sys.version_info >= MINIMUM_PYTHON else ""
+
+
+def _core(name: str, enables: str) -> Part:
+    return Part(name, distribution(name), enables, f"pip install {name}", needed=True)
+
+
+def _optional(name: str, extra: str, enables: str) -> Part:
+    return Part(name, distribution(name), enables, install_command(extra))
+
+
+PARTS: tuple[Part, ...] = (
+    Part("Python 3.11 or newer", _python, "everything", "apt install python3", needed=True),
+    _core("greenlet", "code that blocks, in virtual time"),
+    _core("numpy", "arrays"),
+    _core("pymavlink", "MAVLink: ArduPilot, PX4 and ground stations"),
+    _core("pyserial", "radios and cables to real vehicles"),
+    _core("mcap", "traces that Foxglove opens"),
+    _core("pydantic", "run records and cost laws"),
+    _core("shapely", "geofences"),
+    _optional("numba", "simulation", "simulated vehicles, and the cost of C++ code on another processor"),
+    _optional("ruamel.yaml", "model", "models and catalogues of processors"),
+    _optional("rosbags", "ros", "ROS messages and bags, also without ROS"),
+    _optional("jinja2", "report", "HTML reports"),
+    Part("mavsdk", distribution("mavsdk"), "to fly `volery serve` with MAVSDK", "pip install 'mavsdk>=3,<4'"),
+    Part("MAVProxy", distribution("MAVProxy"), "to fly `volery serve` by typing", "pip install MAVProxy"),
+    Part("rospy", module("rospy"), "real ROS 1: the bridge, --graph ros1", "apt install python3-rospy"),
+    Part("rclpy", module("rclpy"), "real ROS 2: the bridge, --graph ros2", "source your ROS 2 set-up"),
+    Part(
+        "g++ or clang++",
+        program("g++", "clang++"),
+        "components in C++ (language c++ or roscpp)",
+        "apt install g++",
+    ),
+    Part(
+        "LLVM 17 to 19",
+        program("opt-19", "opt-18", "opt-17", "opt"),
+        "cost of C++ code on another processor",
+        "apt install clang-19 llvm-19",
+    ),
+    Part("addr2line", program("addr2line"), "the line where a C++ component crashed", "apt install binutils"),
+    Part(
+        "a browser",
+        program("chromium", "chromium-browser", "google-chrome", "firefox"),
+        "to open report.html",
+        "apt install chromium",
+    ),
+)
+
+
+@commands.add("json", "debug")
+def doctor(output: Output) -> int:
+    """Show which parts are installed, what each missing part would enable, and how to install it.
+
+    Exit status: 0 if no necessary part is missing, 1 otherwise.
+    """
+    findings = [Finding(part.name, part.find(), part.needed, part.enables, part.get) for part in PARTS]
+    for one in findings:
+        output.show(_line(one))
+    missing = [one.name for one in findings if one.needed and not one.found]
+    output.show(f"missing: {', '.join(missing)}" if missing else "every necessary part is installed")
+    output.give({"ok": not missing, "parts": [asdict(one) for one in findings]})
+    return FAILED if missing else OK
+
+
+def _line(one: Finding) -> Text:
+    if one.found:
+        return Text.assemble(
+            ("✓ ", "green"), (f"{one.name} ", "bold"), one.found, (f"  {one.enables}", "dim")
+        )
+    mark = ("✗ ", "bold red") if one.needed else ("· ", "yellow")
+    return Text.assemble(mark, (f"{one.name} ", "bold"), "missing", f"  {one.enables}: ", (one.get, "cyan"))

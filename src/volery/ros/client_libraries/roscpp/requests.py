@@ -1,0 +1,405 @@
+"""Handlers of the requests of C++ code: topics, services, timers, spinning, names, time and parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from volery.base.errors import UsageError
+from volery.base.time import Ns
+from volery.ros.client_libraries.abi_codec import CppFiber, Reader, RequestHandler, Writer
+from volery.ros.client_libraries.roscpp.session import RefusedRequestError, Session
+from volery.ros.graph import BEST_AVAILABLE, LATCHED, Client, QoS, ServiceError, Timer
+from volery.ros.messages import from_cdr, service, to_cdr
+from volery.trace.events import Text
+
+# -- topics
+
+
+def _subscriber_qos(depth: int) -> QoS:
+    """Return a QoS that matches every publisher, because ROS 1 has no QoS."""
+    return QoS(depth or None, BEST_AVAILABLE, BEST_AVAILABLE)
+
+
+class _Publisher:
+    """A publisher of messages in CDR."""
+
+    def __init__(self, session: Session, arguments: Reader) -> None:
+        topic, self._type = arguments.text(), arguments.text()
+        depth, latched = arguments.integer(), arguments.flag()
+        qos = LATCHED if latched else QoS(depth or None)
+        self.made = session.node.advertise(topic, self._type, qos)
+        self.close = self.made.close
+
+    def publish(self, data: bytes) -> None:
+        """Publish the message that *data* encodes."""
+        self.made.publish(from_cdr(self._type, data))
+
+
+def _publish(session: Session, arguments: Reader) -> None:
+    session.find(arguments.integer(), _Publisher).publish(arguments.raw())
+
+
+def _subscribe(session: Session, arguments: Reader) -> int:
+    topic, kind = arguments.text(), arguments.text()
+    depth, callback = arguments.integer(), arguments.integer()
+
+    def on_message(message: Any) -> None:
+        session.call_back(callback, to_cdr(message))
+
+    return session.keep(session.node.subscribe(topic, kind, on_message, _subscriber_qos(depth)))
+
+
+def _publisher_count(session: Session, arguments: Reader) -> int:
+    count: int = session.entity(arguments.integer()).publishers()
+    return count
+
+
+def _wait_for_message(session: Session, arguments: Reader) -> bytes:
+    topic, kind, within = arguments.text(), arguments.text(), _timeout(arguments.integer())
+    received: list[Any] = []
+    group = session.node.group()
+    subscription = session.node.subscribe(topic, kind, received.append, _subscriber_qos(1), group)
+    try:
+        group.spin_once(within)
+    finally:
+        subscription.close()
+    reply = Writer().flag(bool(received)).done()
+    return reply + to_cdr(received[0]) if received else reply
+
+
+def _timeout(timeout: Ns) -> Ns | None:
+    """Return a time-out of roscpp, of which a negative one means none."""
+    return None if timeout < 0 else timeout
+
+
+# -- services
+
+
+def _serve(session: Session, arguments: Reader) -> int:
+    name, request_type, callback = arguments.text(), arguments.text(), arguments.integer()
+    kind = service(request_type.removesuffix("_Request"))
+
+    def handler(request: Any) -> Any:
+        result = Reader(session.call_back(callback, to_cdr(request)))
+        if not result.flag():
+            raise RefusedRequestError(name, "its handler returned false")
+        return from_cdr(kind.response.__msgtype__, result.raw())
+
+    return session.keep(session.node.serve(name, kind.name, handler))
+
+
+class _Client:
+    """A client of a service whose requests and responses are in CDR."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._request = service(client.type).request.__msgtype__
+
+    def call(self, data: bytes) -> bytes | None:
+        """Return the encoded response, or None if the call fails."""
+        try:
+            return to_cdr(self._client.call(from_cdr(self._request, data)))
+        except ServiceError:
+            return None
+
+
+def _create_client(session: Session, arguments: Reader) -> int:
+    return session.keep(_Client(session.node.client(arguments.text(), arguments.text())))
+
+
+def _call(session: Session, arguments: Reader) -> bytes:
+    response = session.find(arguments.integer(), _Client).call(arguments.raw())
+    return Writer().flag(response is not None).done() + (response or b"")
+
+
+def _wait_for_service(session: Session, arguments: Reader) -> bool:
+    return session.node.wait_for_service(arguments.text(), _timeout(arguments.integer()))
+
+
+# -- timers
+
+
+class _Timer:
+    """A ``ros::Timer``, which calls the callable numbered *callback* each *period*, or once."""
+
+    def __init__(self, session: Session, period: Ns, callback: int, *, oneshot: bool) -> None:
+        if period <= 0:
+            raise UsageError(
+                f"{session.component}: a ros::Timer with a period of {period} ns; it must be above 0"
+            )
+        self._session = session
+        self._period = period
+        self._callback = callback
+        self._oneshot = oneshot
+        self._timer: Timer | None = None
+        self._expected: Ns = 0
+        self._last: tuple[Ns, Ns] = (0, 0)  # expected and actual time of the last call
+        self._took: Ns = 0
+
+    @property
+    def started(self) -> bool:
+        """Whether the timer runs."""
+        return self._timer is not None
+
+    def start(self) -> None:
+        """Start the timer; the first call is one period from now. A running timer is not changed."""
+        if self._timer is None:
+            self._expected = self._session.now() + self._period
+            self._timer = self._session.node.timer(self._period, self._fire)
+
+    def close(self) -> None:
+        """Stop the timer."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def set_period(self, period: Ns) -> None:
+        """Set another period, which begins now."""
+        self._period = period
+        if self.started:
+            self.close()
+            self.start()
+
+    def _fire(self) -> None:
+        now, expected = self._session.now(), self._expected
+        event = Writer()
+        for moment in (*self._last, expected, now, self._took):
+            event.integer(moment)
+        self._last = expected, now
+        self._expected += self._period * max(1, (now - expected) // self._period + 1)
+        if self._oneshot:
+            self.close()
+        self._session.call_back(self._callback, event.done())
+        self._took = self._session.now() - now
+
+
+def _create_timer(session: Session, arguments: Reader) -> int:
+    period, oneshot, autostart = arguments.integer(), arguments.flag(), arguments.flag()
+    timer = _Timer(session, period, arguments.integer(), oneshot=oneshot)
+    if autostart:
+        timer.start()
+    return session.keep(timer)
+
+
+def _find_timer(session: Session, arguments: Reader) -> _Timer:
+    return session.find(arguments.integer(), _Timer)
+
+
+SIMPLE: dict[str, Callable[[Session, Reader], Any]] = {
+    "advertise": lambda session, arguments: session.keep(_Publisher(session, arguments)),
+    "publish": _publish,
+    "subscribers": lambda session, arguments: session.find(
+        arguments.integer(), _Publisher
+    ).made.subscribers(),
+    "subscribe": _subscribe,
+    "publishers": _publisher_count,
+    "wait_for_message": _wait_for_message,
+    "serve": _serve,
+    "client": _create_client,
+    "call": _call,
+    "wait_for_service": _wait_for_service,
+    "timer": _create_timer,
+    "timer_start": lambda session, arguments: _find_timer(session, arguments).start(),
+    "timer_stop": lambda session, arguments: _find_timer(session, arguments).close(),
+    "timer_started": lambda session, arguments: _find_timer(session, arguments).started,
+    "timer_period": lambda session, arguments: _find_timer(session, arguments).set_period(
+        arguments.integer()
+    ),
+}
+
+WITH_FIBER: dict[str, Callable[[Session, CppFiber, Reader], Any]] = {
+    "spin_once": lambda session, fiber, arguments: session.spin(fiber, session.node.spin_available),
+    "spin": lambda session, fiber, arguments: session.spin(fiber, session.node.spin),
+}
+
+
+_SEVERITIES = (7, 6, 4, 3, 2)
+"""Severities of syslog by roscpp's levels: debug, info, warn, error, fatal."""
+
+Simple = Callable[[Session, Reader], Any]
+"""Executes a request; returns a boolean, an integer, a text, bytes or nothing."""
+
+
+def request_handlers(session: Session) -> dict[str, RequestHandler]:
+    """Return the handlers of all requests of the component that *session* belongs to, by name."""
+
+    def simple(handle: Simple) -> RequestHandler:
+        return lambda fiber, arguments: _encoded(handle(session, arguments))
+
+    def with_fiber(handle: Callable[[Session, CppFiber, Reader], Any]) -> RequestHandler:
+        return lambda fiber, arguments: _encoded(handle(session, fiber, arguments))
+
+    handlers = {name: simple(one) for name, one in {**_PROCESS, **_NAMES, **_TIME, **_PARAMETERS}.items()}
+    handlers.update({name: simple(one) for name, one in SIMPLE.items()})
+    handlers.update({name: with_fiber(one) for name, one in WITH_FIBER.items()})
+    return {f"ros.{name}": handler for name, handler in handlers.items()}
+
+
+def _encoded(value: bytes | str | int | None) -> bytes:
+    if value is None:
+        return b""
+    if isinstance(value, bytes):
+        return value
+    return Writer().text(value).done() if isinstance(value, str) else Writer().integer(value).done()
+
+
+# -- the process
+
+
+def _init(session: Session, arguments: Reader) -> None:
+    session.join(arguments.text(), anonymous=arguments.flag())
+
+
+def _log(session: Session, arguments: Reader) -> None:
+    severity, text = _SEVERITIES[arguments.integer()], arguments.text()
+    with session.kernel as kernel:
+        kernel.record(Text(kernel.now(), session.component, severity, text))
+
+
+_PROCESS: dict[str, Simple] = {
+    "init": _init,
+    "initialized": lambda session, arguments: session.opened is not None,
+    "ok": lambda session, arguments: session.ok(),
+    "shutdown": lambda session, arguments: session.end(),
+    "wait_for_shutdown": lambda session, arguments: session.wait_for_end(),
+    "close": lambda session, arguments: session.close(arguments.integer()),
+    "log": _log,
+}
+
+
+# -- names
+
+
+def _resolve(session: Session, arguments: Reader) -> str:
+    namespace, name = arguments.text(), arguments.text()
+    if namespace and not name.startswith(("/", "~")):
+        name = f"{namespace.rstrip('/')}/{name}"
+    return session.node.resolve(name)
+
+
+def _node_handle(session: Session, arguments: Reader) -> str:
+    """Return the absolute namespace of a handle that was created in the namespace of another."""
+    node, parent, namespace = session.node, arguments.text() or session.node.namespace, arguments.text()
+    if namespace.startswith("~"):
+        inner = namespace[1:].strip("/")
+        return f"{node.name}/{inner}" if inner else node.name
+    if namespace.startswith("/"):
+        return namespace
+    return f"{parent.rstrip('/')}/{namespace}".rstrip("/") or "/"
+
+
+_NAMES: dict[str, Simple] = {
+    "resolve": _resolve,
+    "node_handle": _node_handle,
+    "name": lambda session, arguments: session.node.name,
+    "namespace": lambda session, arguments: session.node.namespace,
+}
+
+
+# -- time
+
+
+class _Rate:
+    """A ``ros::Rate``, which measures the execution time of each cycle."""
+
+    def __init__(self, session: Session, period: Ns) -> None:
+        if period <= 0:
+            raise UsageError(f"{session.component}: ros::Rate with a period of {period} ns; give one above 0")
+        self._session = session
+        self._rate = session.node.rate(period)
+        self._began = session.now()
+
+    def sleep(self) -> Ns:
+        """Block until the next release; return the duration of the cycle in ns."""
+        took = self._session.now() - self._began
+        self._rate.sleep()
+        self._began = self._session.now()
+        return took
+
+
+_TIME: dict[str, Simple] = {
+    "now": lambda session, arguments: session.now(),
+    "sleep": lambda session, arguments: session.node.sleep(arguments.integer()),
+    "rate": lambda session, arguments: session.keep(_Rate(session, arguments.integer())),
+    "rate_sleep": lambda session, arguments: session.find(arguments.integer(), _Rate).sleep(),
+}
+
+
+# -- parameters, whose values are encoded as a letter for the kind and the value
+
+
+def write_parameter(writer: Writer, value: Any) -> None:
+    """Append a value. A value of a kind that C++ does not know is written as its text."""
+    if isinstance(value, bool):
+        writer.text("b").flag(value)
+    elif isinstance(value, int):
+        writer.text("i").integer(value)
+    elif isinstance(value, float):
+        writer.text("d").real(value)
+    elif isinstance(value, (list, tuple)):
+        writer.text("l").integer(len(value))
+        for item in value:
+            write_parameter(writer, item)
+    elif isinstance(value, dict):
+        writer.text("m").integer(len(value))
+        for name, item in value.items():
+            write_parameter(writer.text(name), item)
+    else:
+        writer.text("s").text(str(value))
+
+
+def read_parameter(reader: Reader) -> Any:
+    """Read a value."""
+    kind = reader.text()
+    if kind == "l":
+        return [read_parameter(reader) for _ in range(reader.integer())]
+    if kind == "m":
+        return {reader.text(): read_parameter(reader) for _ in range(reader.integer())}
+    return {"b": reader.flag, "i": reader.integer, "d": reader.real, "s": reader.text}[kind]()
+
+
+def _leaf_names(tree: Any, prefix: str = "") -> Iterable[str]:
+    if not isinstance(tree, dict):
+        yield prefix
+        return
+    for name, inner in tree.items():
+        yield from _leaf_names(inner, f"{prefix}/{name}")
+
+
+def _get_parameter(session: Session, arguments: Reader) -> bytes:
+    name, missing = arguments.text(), object()
+    value = session.node.get_parameter(name, missing)
+    reply = Writer().flag(value is not missing)
+    if value is not missing:
+        write_parameter(reply, value)
+    return reply.done()
+
+
+def _set_parameter(session: Session, arguments: Reader) -> None:
+    session.node.set_parameter(arguments.text(), read_parameter(arguments))
+
+
+def _delete_parameter(session: Session, arguments: Reader) -> bool:
+    name = arguments.text()
+    exists = session.node.has_parameter(name)
+    if exists:
+        session.node.delete_parameter(name)
+    return exists
+
+
+def _parameter_names(session: Session, arguments: Reader) -> bytes:
+    names = sorted(_leaf_names(session.node.get_parameter("/", {})))
+    reply = Writer().integer(len(names))
+    for name in names:
+        reply.text(name)
+    return reply.done()
+
+
+_PARAMETERS: dict[str, Simple] = {
+    "param_get": _get_parameter,
+    "param_set": _set_parameter,
+    "param_has": lambda session, arguments: session.node.has_parameter(arguments.text()),
+    "param_delete": _delete_parameter,
+    "param_names": _parameter_names,
+}

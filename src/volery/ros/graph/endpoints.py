@@ -1,0 +1,416 @@
+"""Topics and services of the embedded graph: publishers, subscriptions, clients and servers.
+
+A client blocks while the server's own task answers.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
+from volery.base.time import Ns, to_seconds
+from volery.kernel.waiting import Signal
+from volery.ros.graph.callbacks import CallbackGroup
+from volery.ros.graph.graph_context import GraphContext, NodeContext, ServiceEnd, SubscriptionEnd, Topic
+from volery.ros.graph.interface import (
+    BEST_AVAILABLE,
+    BEST_EFFORT,
+    RELIABLE,
+    TRANSIENT_LOCAL,
+    VOLATILE,
+    Callback,
+    Handler,
+    QoS,
+    Route,
+    Work,
+)
+from volery.ros.messages import cdr_size, message_class, service
+from volery.ros.messages.encodings import copied_to_cdr
+from volery.trace.events import NONE, Call, Message, Published, Text
+
+WARNING = 4
+"""Severity, as in syslog."""
+
+
+def topic_named(graph: GraphContext, name: str, message_type: str, node: NodeContext) -> Topic:
+    """Return the topic `name`, created if necessary.
+
+    Raises:
+        UsageError: the topic carries another type.
+    """
+    full = message_class(message_type).__msgtype__
+    found = graph.topics.get(name)
+    if found is None:
+        found = graph.topics[name] = Topic(name, full)
+    elif found.type != full:
+        users = [publisher.node.name for publisher in found.publishers]
+        users += [subscription.node.name for subscription in found.subscriptions]
+        raise UsageError(
+            f"node {node.name}: topic {name} carries {found.type} (of {', '.join(users)}), not {full}"
+        )
+    return found
+
+
+def incompatible(offered: QoS, requested: QoS) -> str:
+    """Return why a publisher's QoS does not match a subscription's, by the rules of DDS; empty if it does."""
+    if requested.reliability == RELIABLE and offered.reliability == BEST_EFFORT:
+        return "reliable is wanted, best effort offered"
+    if requested.durability == TRANSIENT_LOCAL and offered.durability == VOLATILE:
+        return "transient local is wanted, volatile offered"
+    return ""
+
+
+class Connection(NamedTuple):
+    """A publisher's connection to a subscription; ``deliver(message, sent, publisher, size)``."""
+
+    to: SubscriptionEnd
+    deliver: Callable[[Any, Ns, str, int], None]
+
+
+def _over(route: Route, reliable: bool, to: SubscriptionEnd) -> Callable[[Any, Ns, str, int], None]:
+    """Return what delivers messages over a network; a loss is repeated if the connection is `reliable`."""
+
+    def deliver(content: Any, sent: Ns, publisher: str, size: int) -> None:
+        arrive, lose = (
+            partial(to.arrive, content, sent, publisher, size),
+            partial(to.lose, sent, publisher, size),
+        )
+        route(size, reliable, arrive, lose)
+
+    return deliver
+
+
+class EmbeddedPublisher:
+    """See ``volery.ros.graph.interface.Publisher``."""
+
+    def __init__(self, node: NodeContext, topic: Topic, qos: QoS) -> None:
+        self.node, self.qos = node, qos
+        self.topic, self.type = topic.name, topic.type
+        self._topic = topic
+        self._class = message_class(topic.type)
+        self._connections: list[Connection] = []
+        self._latches = qos.durability == TRANSIENT_LOCAL
+        self._latched: deque[tuple[Any, Ns, int]] = deque(maxlen=qos.depth)
+        self._recorded = node.graph.records(topic.name)
+        self._sized = not node.graph.unrecorded  # whether the size of a message matters
+        self._open = True
+        topic.publishers.append(self)
+        for subscription in topic.subscriptions:
+            self.connect(subscription)
+
+    def connect(self, subscription: SubscriptionEnd) -> None:
+        """Connect a subscription and deliver latched (transient-local) messages."""
+        graph, node, other = self.node.graph, self.node, subscription.node
+        why = incompatible(self.qos, subscription.qos)
+        if why:
+            text = f"{self.topic}: {other.name} does not hear {node.name}: {why}"
+            graph.record(Text(node.kernel.now(), node.name, WARNING, text))
+            return
+        route = graph.route(node.id, other.id)
+        if route is None:
+            connection = Connection(subscription, subscription.arrive)
+        else:
+            reliable = BEST_EFFORT not in (self.qos.reliability, subscription.qos.reliability)
+            connection = Connection(subscription, _over(route, reliable, subscription))
+            self._sized = True
+        self._connections.append(connection)
+        if other is not node:
+            node.charge_background("accept")
+            other.charge_background("connect")
+        if self._latches and subscription.qos.durability in (TRANSIENT_LOCAL, BEST_AVAILABLE):
+            for content, sent, size in self._latched:
+                connection.deliver(content.copy(), sent, node.name, size)
+
+    def disconnect(self, subscription: SubscriptionEnd) -> None:
+        """Stop sending to a subscription."""
+        self._connections = [one for one in self._connections if one.to is not subscription]
+
+    def publish(self, message: Any) -> None:
+        """Send a copy of `message` as it is when the call has been served."""
+        node = self.node
+        with node.kernel as kernel:
+            if not self._open:
+                raise UsageError(f"node {node.name}: its publisher of {self.topic} is closed")
+            if not isinstance(message, self._class):
+                kind = getattr(message, "__msgtype__", "") or f"a {type(message).__name__}"
+                raise UsageError(f"topic {self.topic} carries {self.type}, not {kind}")
+            node.consume("publish", float(len(self._connections)))
+            connections = self._connections
+            if not (connections or self._recorded or self._latches):
+                return
+            content = node.graph.copy(message) if node.graph.as_bytes else message.copy()
+            sent, size = kernel.now(), 0
+            if self._recorded:
+                data = copied_to_cdr(content)
+                size = len(data)
+                kernel.record(Published(sent, self.topic, self.type, node.name, data))
+            elif self._sized:
+                size = cdr_size(content)
+            if self._latches:
+                self._latched.append((content.copy(), sent, size))
+            single = len(connections) == 1
+            for connection in connections:
+                connection.deliver(content if single else content.copy(), sent, node.name, size)
+
+    def subscribers(self) -> int:
+        """Return the number of subscriptions it is connected to."""
+        with self.node.kernel:
+            return len(self._connections)
+
+    def close(self) -> None:
+        """Stop publishing."""
+        with self.node.kernel.guard:
+            if self._open:
+                self._open = False
+                self._connections = []
+                self._topic.publishers.remove(self)
+                self.node.graph.changed.notify()
+
+
+class EmbeddedSubscription:
+    """See ``interface.Subscription``. ``dropped`` counts messages that a full queue dropped."""
+
+    def __init__(
+        self, node: NodeContext, topic: Topic, callback: Callback, qos: QoS, group: CallbackGroup
+    ) -> None:
+        self.node, self.qos = node, qos
+        self.topic, self.type = topic.name, topic.type
+        self.dropped = 0
+        self._topic = topic
+        self._callback = callback
+        self._group = group
+        self._queue: deque[Any] = deque()
+        self._run = self.run
+        self._open = True
+        topic.subscriptions.append(self)
+        for publisher in topic.publishers:
+            publisher.connect(self)
+
+    def arrive(self, message: Any, sent: Ns, publisher: str, size: int) -> None:
+        """Queue a message that has arrived. A framework callback."""
+        if not self._open:
+            return
+        node, kernel = self.node, self.node.kernel
+        now = kernel.now()
+        if not node.graph.unrecorded:
+            kernel.record(Message(sent, now, self.topic, publisher, node.name, size))
+        if node.processor is not None:
+            node.charge_reception(now)
+        queue = self._queue
+        if len(queue) == self.qos.depth:
+            queue.popleft()  # its turn in the group goes to the next oldest
+            self.dropped += 1
+            queue.append(message)
+        else:
+            queue.append(message)
+            self._group.add(Work(now, self._run))
+
+    def lose(self, sent: Ns, publisher: str, size: int) -> None:
+        """Record that a message was lost. A framework callback."""
+        self.node.graph.record(Message(sent, NONE, self.topic, publisher, self.node.name, size))
+
+    def run(self) -> None:
+        """Call back with the oldest message."""
+        if self._queue:
+            self._callback(self._queue.popleft())
+
+    def publishers(self) -> int:
+        """Return the number of publishers it is connected to."""
+        with self.node.kernel:
+            return sum(1 for publisher in self._topic.publishers if not incompatible(publisher.qos, self.qos))
+
+    def close(self) -> None:
+        """Stop receiving and drop the waiting messages."""
+        with self.node.kernel.guard:
+            if self._open:
+                self._open = False
+                self._queue.clear()
+                self._topic.subscriptions.remove(self)
+                for publisher in self._topic.publishers:
+                    publisher.disconnect(self)
+                self.node.graph.changed.notify()
+
+
+HANDLER_FAILED = "its handler "
+"""Beginning of the problem of a call that the server has failed."""
+ROSPY_FAILED = "responded with an error"
+"""Part of the same problem in the words of rospy's client."""
+
+
+class CallFailedError(Exception):
+    """Raised by a handler to fail the call, as a handler of roscpp that returns false; nothing else fails."""
+
+
+class ServiceError(VoleryError):
+    """A service call failed: there is no server, its handler raised, or no answer came in time.
+
+    Attributes:
+        service: Name of the service.
+        what: What happened.
+        by_server: Whether the server itself has ended the call with an error.
+    """
+
+    def __init__(self, name: str, what: str) -> None:
+        self.service, self.what = name, what
+        self.by_server = what.startswith(HANDLER_FAILED) or ROSPY_FAILED in what
+        super().__init__(f"service {name}: {what}")
+
+
+def failure_text(error: Exception) -> str:
+    """Return the problem of a call whose handler has raised *error*."""
+    if isinstance(error, CallFailedError):
+        return f"{HANDLER_FAILED}failed the call: {error}"
+    return f"{HANDLER_FAILED}raised {type(error).__name__}: {error}"
+
+
+class Exchange:
+    """A request and its answer, in transit."""
+
+    __slots__ = ("answer", "answered", "caller", "problem", "request")
+
+    def __init__(self, caller: NodeContext, request: Any, name: str) -> None:
+        self.caller, self.request = caller, request
+        self.answer: Any = None
+        self.problem = ""
+        self.answered = Signal(caller.kernel, f"service {name} (answer)")
+
+    def done(self) -> bool:
+        """Return whether the call has ended, with an answer or a problem."""
+        return self.answer is not None or bool(self.problem)
+
+    def succeed(self, answer: Any) -> None:
+        """End the call with an answer. A framework callback."""
+        self.answer = answer
+        self.answered.notify()
+
+    def fail(self, problem: str) -> None:
+        """End the call without an answer. A framework callback."""
+        self.problem = self.problem or problem
+        self.answered.notify()
+
+
+class EmbeddedService:
+    """See ``volery.ros.graph.interface.Service``."""
+
+    def __init__(
+        self, node: NodeContext, name: str, service_type: str, handler: Handler, group: CallbackGroup
+    ) -> None:
+        kind = service(service_type)
+        other = node.graph.services.get(name)
+        if other is not None:
+            raise UsageError(f"node {node.name}: service {name} is served by {other.node.name} already")
+        self.node = node
+        self.name, self.type = name, kind.name
+        self._kind = kind
+        self._handler, self._group = handler, group
+        self._pending: list[Exchange] = []
+        node.graph.services[name] = self
+
+    def arrive(self, exchange: Exchange) -> None:
+        """Queue a request that has arrived. A framework callback."""
+        if self.node.graph.services.get(self.name) is not self:
+            self._send_back(exchange, exchange.fail, "its server has gone", 0)
+            return
+        self._pending.append(exchange)
+        self._group.add(Work(self.node.kernel.now(), partial(self.answer, exchange)))
+
+    def answer(self, exchange: Exchange) -> None:
+        """Run the handler and send the answer; an exception is reported to the caller and raised again."""
+        if exchange not in self._pending:
+            return
+        with self.node.kernel:
+            self.node.consume_if_priced("serve")
+        try:
+            answer = self._handler(exchange.request)
+            if not isinstance(answer, self._kind.response):
+                raise UsageError(
+                    f"the handler of {self.name} returned {answer!r}, not a {self.type} response"
+                )
+        except Exception as error:
+            with self.node.kernel:
+                self._pending.remove(exchange)
+                self._send_back(exchange, exchange.fail, failure_text(error), 0)
+            if not isinstance(error, CallFailedError):
+                raise
+            return
+        with self.node.kernel:
+            self._pending.remove(exchange)
+            content = self.node.graph.copy(answer)
+            self._send_back(exchange, exchange.succeed, content, cdr_size(content))
+
+    def _send_back(self, exchange: Exchange, end: Callable[[Any], None], content: Any, size: int) -> None:
+        lost = partial(exchange.fail, "the answer was lost on the way")
+        self.node.graph.carry(self.node, exchange.caller, size, partial(end, content), lost)
+
+    def close(self) -> None:
+        """Stop serving; pending calls fail."""
+        graph = self.node.graph
+        with graph.kernel.guard:
+            if graph.services.get(self.name) is self:
+                del graph.services[self.name]
+                for exchange in self._pending:
+                    exchange.fail("its server has gone")
+                self._pending.clear()
+                graph.changed.notify()
+
+
+class EmbeddedClient:
+    """See ``interface.Client``. The wait for the answer belongs to the caller's activation."""
+
+    def __init__(self, node: NodeContext, name: str, service_type: str) -> None:
+        self.name = name
+        self._kind = service(service_type)
+        self.type = self._kind.name
+        self._node = node
+
+    def call(self, request: Any, within: Ns | None = None) -> Any:
+        """Block until the answer has arrived; raise ``ServiceError`` if there is none."""
+        node = self._node
+        with node.kernel as kernel:
+            start = kernel.now()
+            server = self._server(request)
+            node.consume_if_priced("call_service")
+            exchange = Exchange(node, node.graph.copy(request), self.name)
+            node.graph.carry(
+                node,
+                server.node,
+                cdr_size(exchange.request),
+                partial(server.arrive, exchange),
+                partial(exchange.fail, "the request was lost on the way"),
+            )
+            if not exchange.answered.wait_for(exchange.done, within):
+                exchange.fail(f"no answer within {to_seconds(within or 0):g} s")
+            callee, caller = server.node.id.component, node.id.component
+            outcome = "ServiceError" if exchange.problem else "ok"
+            kernel.record(Call(start, kernel.now(), caller, callee, self.name, outcome))
+        if exchange.problem:
+            raise ServiceError(self.name, exchange.problem)
+        return exchange.answer
+
+    def _server(self, request: Any) -> ServiceEnd:
+        if not isinstance(request, self._kind.request):
+            raise UsageError(f"service {self.name} takes a {self._kind.request.__msgtype__}, not {request!r}")
+        services = self._node.graph.services
+        server = services.get(self.name)
+        if server is None:
+            hint = did_you_mean(self.name, services)
+            raise ServiceError(self.name, f"no node serves it{hint}; there is {choices(services)}")
+        if server.type != self.type:
+            raise ServiceError(self.name, f"{server.node.name} serves it as {server.type}, not {self.type}")
+        return server
+
+    def wait(self, within: Ns | None = None) -> bool:
+        """Block until a node serves it; return False if `within` ns have passed first."""
+        return self._node.graph.changed.wait_for(self.ready_now, within)
+
+    def ready(self) -> bool:
+        """Return whether a node serves it now."""
+        with self._node.kernel:
+            return self.ready_now()
+
+    def ready_now(self) -> bool:
+        """Return whether a node serves it now, without being an interaction point."""
+        return self.name in self._node.graph.services

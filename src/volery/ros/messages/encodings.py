@@ -1,0 +1,309 @@
+"""Messages as bytes: CDR of ROS 2, and the encoding, names and checksums of ROS 1.
+
+CDR is little endian with its four-byte header. Values are those of ROS 2 in both encodings. ROS 1's
+``Header`` has a ``seq`` that ROS 2 dropped: it is encoded as 0 (publishers of ROS 1 count it) and dropped
+when decoded. A type whose definitions differ in more than the spelling of a field cannot be carried, and an
+error says so. The field layouts are for code generators.
+"""
+
+from __future__ import annotations
+
+import struct
+from functools import cache
+from hashlib import md5
+from typing import Any, NamedTuple
+
+from volery.base.errors import UsageError
+from volery.ros.messages import lazy_rosbags as rosbags
+from volery.ros.messages.message import Message
+from volery.ros.messages.packages import ROS1_SPELLING
+from volery.ros.messages.store import message_class, message_name, service, service_name, store
+
+_CDR_HEADER = b"\x00\x01\x00\x00"
+
+
+@cache
+def _codec(name: str) -> rosbags.Msgdef[object]:
+    message_class(name)
+    return store().get_msgdef(name)
+
+
+@cache
+def _has_lists(name: str) -> bool:
+    """Return whether the type contains lists or arrays, which must be converted before encoding."""
+    for _, (kind, detail) in store().fielddefs[name][1]:
+        if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
+            return True
+        if kind == rosbags.Nodetype.NAME and _has_lists(str(detail)):
+            return True
+    return False
+
+
+def to_cdr(message: Message) -> bytes:
+    """Encode a message; raise ``UsageError`` if a value does not fit its field."""
+    if _has_lists(message.__msgtype__):
+        message = message.copy()
+    return copied_to_cdr(message)
+
+
+def copied_to_cdr(message: Message) -> bytes:
+    """Encode a message that ``Message.copy`` has returned, without preparing it again."""
+    name = message.__msgtype__
+    codec = _codec(name)
+    try:
+        raw = bytearray(4 + codec.getsize_cdr(0, message, store()))
+        raw[0:4] = _CDR_HEADER
+        codec.serialize_cdr_le(memoryview(raw)[4:], 0, message, store())
+    except (struct.error, rosbags.SerdeError, TypeError, ValueError, AttributeError) as error:
+        raise UsageError(f"{name}: {_culprit(message)}: {error}") from error
+    return bytes(raw)
+
+
+def cdr_size(message: Message) -> int:
+    """Return the number of bytes that ``to_cdr`` would give."""
+    codec = _codec(message.__msgtype__)
+    if codec.size_cdr:
+        return 4 + codec.size_cdr
+    return 4 + codec.getsize_cdr(0, message, store())
+
+
+def _culprit(message: Message) -> str:
+    """Describe the first field whose value cannot be encoded."""
+    for label, (kind, detail) in store().fielddefs[message.__msgtype__][1]:
+        value: Any = getattr(message, label, None)
+        if kind == rosbags.Nodetype.NAME:
+            if getattr(value, "__msgtype__", None) != detail and not isinstance(value, Message):
+                return f"{label} is {value!r}, not a {detail}"
+            deeper = _culprit(value)
+            if deeper != _UNKNOWN:
+                return f"{label}.{deeper}"
+        elif kind == rosbags.Nodetype.BASE and not _fits(str(detail[0]), value):
+            return f"{label} is {value!r}, not a {detail[0]}"
+    return _UNKNOWN
+
+
+_UNKNOWN = "a value does not fit its field"
+_FORMATS = {
+    "bool": "?", "byte": "B", "char": "B", "octet": "B", "int8": "b", "uint8": "B", "int16": "h",
+    "uint16": "H", "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
+}  # fmt: skip
+
+
+def _fits(base: str, value: Any) -> bool:
+    if base == "string":
+        return isinstance(value, str)
+    try:
+        struct.pack(f"<{_FORMATS[base]}", value)
+    except (struct.error, OverflowError, TypeError, KeyError):
+        return False
+    return True
+
+
+def from_cdr(name: str, data: bytes | memoryview) -> Any:
+    """Decode a message of type `name`; raise ``UsageError`` if the bytes are no such message."""
+    full = message_name(name)
+    _codec(full)
+    try:
+        return store().deserialize_cdr(data, full)
+    except rosbags.SerdeError as error:
+        raise UsageError(f"these {len(data)} bytes are no {full}: {error}") from error
+
+
+_HEADER = "std_msgs/msg/Header"
+_TIMES = {"builtin_interfaces/msg/Time": "time", "builtin_interfaces/msg/Duration": "duration"}
+
+
+class Ros1Type(NamedTuple):
+    """A message type in ROS 1: ``package/Name``, MD5 sum, full text, whether its first field is a header."""
+
+    name: str
+    md5: str
+    text: str
+    has_header: bool
+
+
+class Ros1Service(NamedTuple):
+    """A service type in ROS 1; ``md5`` is over request and response."""
+
+    name: str
+    md5: str
+    request: Ros1Type
+    response: Ros1Type
+
+
+@cache
+def _noetic() -> rosbags.Typestore:
+    """Return the definitions of ROS 1 Noetic; types that it lacks are added on demand."""
+    return rosbags.get_typestore(rosbags.Stores.ROS1_NOETIC)
+
+
+def definition_store(full: str) -> rosbags.Typestore:
+    """Return Noetic's store with type `full`; ``UsageError`` if its layout differs in ROS 1 and ROS 2."""
+    ours, noetic = store(), _noetic()
+    for _, what in ours.fielddefs[full][1]:
+        inner = _nested(what)
+        if inner and inner not in _TIMES:
+            definition_store(inner)
+    if full not in noetic.fielddefs:
+        noetic.register({full: ours.fielddefs[full]})
+    elif _layout(ours, full) != _layout(noetic, full):
+        raise UsageError(f"{full} has other fields in ROS 1 than in ROS 2; it cannot be carried on ROS 1")
+    return noetic
+
+
+def _nested(what: Any) -> str:
+    kind, detail = what
+    if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
+        return _nested(detail[0])
+    return str(detail) if kind == rosbags.Nodetype.NAME else ""
+
+
+def _layout(of: rosbags.Typestore, full: str) -> list[Any]:
+    """Return the types of the fields without a header's ``seq``; names do not matter to the bytes."""
+    return [_plain(what) for name, what in of.fielddefs[full][1] if not (full == _HEADER and name == "seq")]
+
+
+def _plain(what: Any) -> Any:
+    kind, detail = what
+    if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
+        return kind, _plain(detail[0]), detail[1] if kind == rosbags.Nodetype.ARRAY else 0
+    return detail[0] if kind == rosbags.Nodetype.BASE else detail
+
+
+def ros1_name(name: str) -> str:
+    """Return a type's name in ROS 1: ``std_msgs/String`` for ``std_msgs/msg/String``; services likewise."""
+    package, _, label = name.replace("/msg/", "/").replace("/srv/", "/").partition("/")
+    for theirs, ours in ROS1_SPELLING.get(package, {}).items():
+        if label == ours:
+            return f"{package}/{theirs}"
+    return f"{package}/{label}"
+
+
+def our_name(name: str) -> str:
+    """Return the full name of a type of ROS 1, known or not: ``std_msgs/msg/String``."""
+    package, _, label = name.partition("/")
+    return f"{package}/msg/{ROS1_SPELLING.get(package, {}).get(label, label)}" if label else name
+
+
+@cache
+def ros1_type(name: str) -> Ros1Type:
+    """Return a message type in ROS 1; ``UsageError`` if it is unknown or has other fields there."""
+    full = message_name(name)
+    text, checksum = definition_store(full).generate_msgdef(full, ros_version=1)
+    fields = store().fielddefs[full][1]
+    return Ros1Type(ros1_name(full), checksum, text, bool(fields) and fields[0][1][1] == _HEADER)
+
+
+@cache
+def ros1_service(name: str) -> Ros1Service:
+    """Return a service type in ROS 1; ``UsageError`` if it is unknown or has other fields there."""
+    kind = service(service_name(name))
+    label = ros1_name(kind.name)
+    halves = []
+    for end, cls in (("Request", kind.request), ("Response", kind.response)):
+        halves.append(ros1_type(cls.__msgtype__)._replace(name=f"{label}{end}"))
+    texts = _hashed(kind.request.__msgtype__) + _hashed(kind.response.__msgtype__)
+    return Ros1Service(label, md5(texts.encode(), usedforsecurity=False).hexdigest(), *halves)
+
+
+def _hashed(full: str) -> str:
+    """Return the text whose MD5 sum is the type's: constants, then fields, nested types as their sums."""
+    noetic = definition_store(full)
+    constants, fields = noetic.fielddefs[full]
+    lines = [f"{kind} {name}={value}" for name, kind, value in constants]
+    for name, what in fields:
+        if name != "structure_needs_at_least_one_member":
+            lines.append(f"{_hashed_type(what)} {name}")
+    return "\n".join(lines)
+
+
+def _hashed_type(what: Any) -> str:
+    kind, detail = what
+    if kind == rosbags.Nodetype.BASE:
+        return str(detail[0])
+    if kind == rosbags.Nodetype.NAME:
+        return _TIMES.get(detail) or ros1_type(detail).md5
+    inner, count = detail
+    if inner[0] == rosbags.Nodetype.NAME and inner[1] not in _TIMES:
+        return _hashed_type(inner)  # sums carry no brackets
+    return f"{_hashed_type(inner)}[{count if kind == rosbags.Nodetype.ARRAY else ''}]"
+
+
+def to_ros1(message: Message) -> bytes:
+    """Encode a message for ROS 1; raise ``UsageError`` if a value does not fit its field."""
+    name = message.__msgtype__
+    ros1_type(name)
+    return cdr_to_ros1(name, to_cdr(message))
+
+
+def cdr_to_ros1(name: str, data: bytes) -> bytes:
+    """Convert CDR bytes of type `name` to ROS 1's."""
+    return bytes(store().cdr_to_ros1(data, name))
+
+
+def from_ros1(name: str, data: bytes | memoryview) -> Any:
+    """Decode ROS 1 bytes as a message of type `name`; raise ``UsageError`` if they are no such message."""
+    full = message_name(name)
+    message_class(full)
+    try:
+        return from_cdr(full, store().ros1_to_cdr(data, full))
+    except (rosbags.SerdeError, IndexError) as error:
+        raise UsageError(f"these {len(data)} bytes are no {full} of ROS 1: {error}") from error
+
+
+FILLER = "structure_needs_at_least_one_member"
+"""Field of one byte in the encoding of a type without fields."""
+
+
+class FieldLayout(NamedTuple):
+    """A field: exactly one of ``base`` (a number, bool or string) and ``nested`` (a type's name) is given.
+
+    ``length`` is ``None`` for a single value, 0 for a sequence, else the length of an array. ``carried`` is
+    False for what ROS 1 has and the encoding has not: a header's ``seq``.
+    """
+
+    name: str
+    base: str = ""
+    nested: str = ""
+    length: int | None = None
+    carried: bool = True
+
+
+class Constant(NamedTuple):
+    """A constant of a type."""
+
+    name: str
+    base: str
+    value: Any
+
+
+class Layout(NamedTuple):
+    """A message type: full name (``package/msg/Name``), ROS 1 name (``package/Name``), and its parts."""
+
+    name: str
+    label: str
+    constants: tuple[Constant, ...]
+    fields: tuple[FieldLayout, ...]
+
+
+def ros1_layout(name: str) -> Layout:
+    """Return a message type's layout in ROS 1; ``UsageError`` if it is unknown or differs there."""
+    full = message_name(name)
+    message_class(full)
+    constants, fields = definition_store(full).fielddefs[full]
+    return Layout(
+        full,
+        ros1_name(full),
+        tuple(Constant(label, base, value) for label, base, value in constants),
+        tuple(_field(full, label, what) for label, what in fields if label != FILLER),
+    )
+
+
+def _field(owner: str, name: str, what: Any) -> FieldLayout:
+    kind, detail = what
+    if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
+        inner, count = detail
+        return _field(owner, name, inner)._replace(length=count if kind == rosbags.Nodetype.ARRAY else 0)
+    if kind == rosbags.Nodetype.NAME:
+        return FieldLayout(name, nested=str(detail))
+    return FieldLayout(name, base=str(detail[0]), carried=(owner, name) != ("std_msgs/msg/Header", "seq"))
