@@ -23,15 +23,11 @@ from volery.simulation.autopilots.dji.flight_controller import (
     ENGINE_START_TIME,
     F_ABOVE,
     FINISHED_LANDING_TIME,
-    LONGEST_PATH_M,
-    MAX_WAYPOINTS,
-    MIN_WAYPOINTS,
     NO_RC_HEIGHT_M,
     NO_RC_RADIUS_M,
     P_BELOW,
     RANGE_M,
     RC_LOST_AFTER,
-    STAY_ACTION,
     SWITCH,
     FlightController,
     controller_of,
@@ -45,10 +41,14 @@ from volery.simulation.autopilots.dji.parameters import (
     parameters,
     tuning,
 )
-from volery.simulation.autopilots.dji.sdk_setpoints import (
+from volery.simulation.autopilots.dji.sdk_commands import (
     LIFT_OFF_M,
     LIFT_OFF_M_S,
     LIFT_OFF_PERCENT,
+    LONGEST_PATH_M,
+    MAX_WAYPOINTS,
+    MIN_WAYPOINTS,
+    STAY_ACTION,
     SdkControl,
 )
 from volery.simulation.autopilots.flight_stack.flight import Flight

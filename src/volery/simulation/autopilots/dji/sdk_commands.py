@@ -1,20 +1,21 @@
-"""Set-points of an onboard program: four numbers and a flag that defines their meaning.
+"""What an onboard program commands through the SDK: set-points with their manoeuvre, and waypoint missions.
 
-They follow the conventions of the ROS node: east-north-up or forward-left-up, anticlockwise, radians. Heights
-count from the place of take-off.
+A set-point is four numbers and a flag that defines their meaning. It follows the conventions of the ROS node:
+east-north-up or forward-left-up, anticlockwise, radians. Heights count from the place of take-off.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, hypot, isfinite, pi, sin
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from volery.base.frames import Vector
-from volery.ros.messages.dji_constants import HORIZONTAL, SETPOINT_HEIGHTS, VERTICAL, Flag
+from volery.ros.messages.dji_constants import HORIZONTAL, MISSION_SPEEDS, SETPOINT_HEIGHTS, VERTICAL, Flag
 from volery.simulation.autopilots.dji.parameters import SDK_CLIMB, SDK_SPEED, SDK_TILT
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
+from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, WAYPOINT, MissionItem
 from volery.simulation.autopilots.vehicle_state import Manoeuvre
 
 if TYPE_CHECKING:
@@ -200,3 +201,58 @@ class SdkControl(Manoeuvre):
             speed_down=SDK_CLIMB,
             accel_z=tuning.accel_z,
         )
+
+
+MIN_WAYPOINTS, MAX_WAYPOINTS = 2, 99
+"""Number of waypoints of a mission."""
+STAY_ACTION = 0
+"""Action of a waypoint: stay for a number of milliseconds."""
+LONGEST_PATH_M = 30_000.0
+"""Longest path of a mission."""
+NO_ACTION, GO_HOME_AT_END, LAND_AT_END, TO_FIRST, NO_EXIT = range(5)
+"""Actions at the end of a mission."""
+YAW_LOCKED, YAW_BY_WAYPOINT = 1, 3
+STOP_S = 0.1
+"""Stop at each waypoint, unless turns are coordinated [s]."""
+
+
+def mission_refusal(task: Any) -> str:
+    """Return why a mission is refused, or an empty text."""
+    points = task.mission_waypoint
+    low, high = MISSION_SPEEDS
+    if not MIN_WAYPOINTS <= len(points) <= MAX_WAYPOINTS:
+        return f"{len(points)} waypoints; {MIN_WAYPOINTS} to {MAX_WAYPOINTS}"
+    if not (low <= task.velocity_range <= high and low <= task.idle_velocity <= task.velocity_range):
+        return f"speeds {task.idle_velocity:g} and {task.velocity_range:g} m/s; {low:g} to {high:g}"
+    for number, point in enumerate(points, start=1):
+        place = (point.latitude, point.longitude, point.altitude)
+        if not all(isfinite(value) for value in place) or abs(place[0]) > 90.0 or abs(place[1]) > 180.0:
+            return f"waypoint {number} is nowhere"
+    return ""
+
+
+def mission_items(task: Any) -> list[MissionItem]:
+    """Return the items of an accepted mission."""
+    once = [_item(point, coordinated=task.trace_mode == 1) for point in task.mission_waypoint]
+    items = once * max(1, min(2, task.mission_exec_times))
+    return [*items, items[0]] if task.action_on_finish == TO_FIRST else items
+
+
+def _item(point: Any, coordinated: bool) -> MissionItem:
+    stay = _stay(point)
+    return MissionItem(
+        WAYPOINT,
+        GLOBAL_RELATIVE,
+        param1=stay or (0.0 if coordinated else STOP_S),
+        x=round(point.latitude * 1e7),
+        y=round(point.longitude * 1e7),
+        z=point.altitude,
+    )
+
+
+def _stay(point: Any) -> float:
+    """Return how long the actions of a waypoint stay [s]."""
+    action = point.waypoint_action
+    count = action.action_repeat & 0x0F if point.has_action else 0
+    listed = zip(action.command_list[:count], action.command_parameter[:count], strict=True)
+    return sum(int(milliseconds) for command, milliseconds in listed if command == STAY_ACTION) / 1000.0
