@@ -107,8 +107,9 @@ ENERGY = Kind("energy", "J", "3 mJ or 0.2 Wh")
 CHARGE = Kind("battery capacity", "C", "5 Ah or 5200 mAh")
 VOLTAGE = Kind("voltage", "V", "14.8 V")
 BANDWIDTH = Kind("bandwidth", "bit/s", "57600 bit/s or 20 Mbit/s")
+DATA_SIZE = Kind("size", "B", "96 B or 12 kB")
 RATIO = Kind("ratio", "1", "0.5 % or 0.005")
-KINDS = (TIME, FREQUENCY, LENGTH, SPEED, ANGLE, ENERGY, CHARGE, VOLTAGE, BANDWIDTH, RATIO)
+KINDS = (TIME, FREQUENCY, LENGTH, SPEED, ANGLE, ENERGY, CHARGE, VOLTAGE, BANDWIDTH, DATA_SIZE, RATIO)
 
 
 def unit(text: str) -> Quantity:

@@ -15,6 +15,7 @@ from volery.base.errors import Location
 from volery.base.time import Ns
 from volery.model.fields import (
     ANYTHING,
+    DATA_SIZE,
     ENERGY,
     FREQUENCY,
     PERIOD,
@@ -57,6 +58,9 @@ CPP_LANGUAGES = ("c++", "roscpp", "rclcpp")
 
 ROS_LANGUAGES = ("rospy", "rclpy", "roscpp", "rclcpp")
 """Languages whose components are ROS nodes."""
+
+ROS_CALLS = ("publish", "sleep", "spin_once", "call_service")
+"""Calls into ROS that ``calls`` may state by their bare names."""
 
 PROVENANCES = ("estimated", "measured", "calculated", "required")
 """Where a figure comes from (MARTE's NFP source)."""
@@ -228,6 +232,7 @@ class Activity:
     )
     priority: Annotated[int, Whole(), "Priority; a greater number is more urgent."] = 0
     start_ns: Annotated[Ns, TIME, "Delay of the first release."] = 0
+    jitter_ns: Annotated[Ns, TIME, "Most that a release comes after it is due."] = 0
 
 
 def _with_deadline(node: Node, path: Path, reading: Reading) -> Node:
@@ -239,6 +244,38 @@ def _with_deadline(node: Node, path: Path, reading: Reading) -> Node:
 
 
 ACTIVITY = Shorter(Record(Activity, prepare=_with_deadline), switch=True)
+
+
+# -- topics and calls
+
+
+@dataclass(frozen=True, slots=True)
+class Publication:
+    """A topic that a component publishes, by its name before remapping."""
+
+    name: str
+    type: Annotated[str, TEXT, "Message type, such as `sensor_msgs/Image`."]
+    on: Annotated[
+        str, TEXT, "The subscribed topic in whose callback it is published; by default, in an activation."
+    ] = ""
+    count: Annotated[int, Whole(least=1), "Messages in one activation or callback, at most."] = 1
+    size_b: Annotated[float | None, DATA_SIZE, "Greatest size of a message."] = None
+
+
+@dataclass(frozen=True, slots=True)
+class Subscription:
+    """A topic that a component subscribes to, by its name before remapping."""
+
+    name: str
+    type: Annotated[str, TEXT, "Message type, such as `sensor_msgs/Image`."]
+    callback: Annotated[
+        tuple[Figure, ...], FIGURES, "What its callback takes, one figure for each kind of processor."
+    ] = ()
+
+
+CALLS = MapOf(MapOf(Whole(least=0), free=True))
+ACTIVATION = "activation"
+"""What ``calls`` are stated for, beside operations."""
 
 
 # -- components
@@ -369,6 +406,19 @@ class Component:
     activation: Annotated[
         tuple[Figure, ...], FIGURES, "What an activation takes, one figure for each kind of processor."
     ] = ()
+    calls: Annotated[
+        Mapping[str, Mapping[str, int]],
+        CALLS,
+        "Most calls of an `activation` or of an operation: `<required port>.<operation>`, or a ROS call such "
+        "as `publish`, and how many. Static analysis needs it.",
+    ] = field(default_factory=dict)
+    publishes: Annotated[
+        Mapping[str, Publication], MapOf(Record(Publication), free=True), "Topics that it publishes."
+    ] = field(default_factory=dict)
+    subscribes: Annotated[
+        Mapping[str, Subscription], MapOf(Record(Subscription), free=True), "Topics that it subscribes to."
+    ] = field(default_factory=dict)
+    memory_b: Annotated[float | None, DATA_SIZE, "Greatest memory of its process that it takes."] = None
     where: Location | None = field(default=None, compare=False)
 
     @property
@@ -388,7 +438,26 @@ class _Component(Record):
         for operation in made.operations:
             at = (*path, "operations", operation)
             reading.known(at, operation, "operation of its provided ports", offered)
+        for caller, calls in made.calls.items():
+            at = (*path, "calls", caller)
+            reading.known(at, caller, "operation of its provided ports", [ACTIVATION, *offered])
+            for call in calls:
+                _check_call((*at, call), call, made, reading)
+        for publication in made.publishes.values():
+            if publication.on:
+                at = (*path, "publishes", publication.name, "on")
+                reading.known(at, publication.on, "subscribed topic", made.subscribes)
         return made
+
+
+def _check_call(path: Path, call: str, component: Component, reading: Reading) -> None:
+    """Report a call that is neither of a required port nor a ROS call."""
+    port, dot, operation = call.partition(".")
+    if not dot:
+        reading.known(path, call, "call", ROS_CALLS)
+    elif reading.known(path, port, "required port", component.requires):
+        offered = _operations_of(component.requires[port].interface, reading)
+        reading.known(path, operation, "operation of that port", offered)
 
 
 def library(reading: Reading) -> dict[str, Component]:
