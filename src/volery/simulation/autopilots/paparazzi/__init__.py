@@ -1,6 +1,7 @@
 """Simulated rotorcraft firmware of Paparazzi behind pprzlink 2.0.
 
-Protocol and rules follow public definitions; nothing was compared with a flight.
+Protocol and rules follow public definitions and recordings of the firmware's own simulator;
+``firmware.ASSUMED`` lists what is assumed.
 """
 
 from volery.links.pprzlink_codec import PPRZLINK
