@@ -12,7 +12,7 @@ from volery.report.html_report import write_comparison, write_report
 from volery.requirements.accounts import Accounts
 from volery.requirements.record import write_record
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
-from volery.trace.attachments import scenery_to_json
+from volery.trace.attachments import to_json
 from volery.trace.mcap_writer import Attachment, McapWriter
 
 pytestmark = pytest.mark.integration
@@ -43,7 +43,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         folder.mkdir()
         setup = sample_setup(onboard_mhz=megahertz)
         accounts = Accounts(setup)
-        world = Attachment("world.json", "application/json", scenery_to_json(sample_scenery()))
+        world = Attachment("world.json", "application/json", to_json(sample_scenery()))
         writer = McapWriter(folder / "trace.mcap", setup, [world])
         for event in sample_events(onboard_mhz=megahertz):
             accounts(event)

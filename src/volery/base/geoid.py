@@ -75,8 +75,9 @@ def _weights(f: float) -> tuple[float, float, float, float]:
     )
 
 
+@cache
 def read_grid() -> Egm96Grid:
-    """Return the grid of the package."""
+    """Return the grid of the package; it is read once a process."""
     return Egm96Grid(unpack(files("volery.base").joinpath(GRID_FILE).read_bytes()))
 
 
@@ -133,15 +134,10 @@ class Egm96(Geoid):
 
     def separation(self, latitude: float, longitude: float) -> float:
         """See ``Geoid``."""
-        return _grid().height(latitude, longitude)
+        return read_grid().height(latitude, longitude)
 
     def __repr__(self) -> str:
         return "Egm96()"
-
-
-@cache
-def _grid() -> Egm96Grid:
-    return read_grid()
 
 
 EGM96: Geoid = Egm96()

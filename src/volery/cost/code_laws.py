@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from volery.base.errors import EstimateError
 from volery.cost.figures import Figure, WithProvenance
-from volery.cost.python_operations import STEPS_PER_NS, OperationTable, operation_table
+from volery.cost.python_operations import STEPS_PER_NS, operation_table
 
 
 class CodeLaw(WithProvenance):
@@ -32,20 +32,15 @@ class CodeLaw(WithProvenance):
         return self.slowdown.value * self.at_mhz / frequency_mhz / STEPS_PER_NS
 
     @property
-    def operations(self) -> OperationTable:
-        """Times of the interpreter's operations on the reference machine."""
-        return operation_table()
-
-    @property
     def error(self) -> float | None:
         """Relative error to be expected of a program's time; None where the slowdown's is not known."""
         if self.slowdown.error is None:
             return None
-        return self.operations.mean_error + self.slowdown.error
+        return operation_table().mean_error + self.slowdown.error
 
     def how_good(self) -> str:
         """Return the expected error and its parts as a phrase."""
-        table, slowdown = self.operations, self.slowdown
+        table, slowdown = operation_table(), self.slowdown
         whole = "unknown" if self.error is None else f"{self.error:.0%}"
         factor = "" if slowdown.error is None else f" within {slowdown.error:.0%}"
         return (

@@ -20,7 +20,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import repeat
 from operator import length_hint
-from typing import Any, TypeVar
+from typing import Any
 
 from volery.cost.python_operations import (
     CATCH,
@@ -179,7 +179,7 @@ class _CounterInserter(ast.NodeTransformer):
             return visited
         cell = ast.Subscript(ast.Name(CELL, ast.Load()), ast.Constant(0), ast.Store())
         counter = ast.AugAssign(cell, ast.Add(), ast.Constant(steps))
-        return [_at(counter, statements[0]), *visited]
+        return [ast.copy_location(counter, statements[0]), *visited]
 
     def visit_Module(self, node: ast.Module) -> ast.Module:
         head = _prologue_length(node.body)
@@ -188,7 +188,7 @@ class _CounterInserter(ast.NodeTransformer):
 
     def _visit_function(self, node: ast.FunctionDef | ast.AsyncFunctionDef) -> ast.AST:
         head = 1 if ast.get_docstring(node, clean=False) is not None else 0
-        body = node.body[head:] or [_at(ast.Pass(), node)]  # a docstring may be all there is
+        body = node.body[head:] or [ast.copy_location(ast.Pass(), node)]  # a docstring may be all there is
         node.body = node.body[:head] + self._block(body, self._weights[ENTER])
         return node
 
@@ -249,7 +249,7 @@ class _CounterInserter(ast.NodeTransformer):
         if iterating:
             argument = node.args[0]
             counting = ast.Call(ast.Name(f"{ITERATED}{iterating}__", ast.Load()), [argument], [])
-            node.args = [_at(counting, argument)]
+            node.args = [ast.copy_location(counting, argument)]
         return node
 
     def _visit_comprehension(self, node: Any) -> ast.AST:
@@ -284,7 +284,7 @@ class _CounterInserter(ast.NodeTransformer):
             return expression
         self.ticks.add(weight)
         tick = ast.Call(ast.Name(f"{TICK}{weight}__", ast.Load()), [], [])
-        return _at(ast.BoolOp(ast.Or(), [tick, expression]), expression)
+        return ast.copy_location(ast.BoolOp(ast.Or(), [tick, expression]), expression)
 
 
 def _iterating_call(node: ast.Call) -> str:
@@ -329,13 +329,6 @@ def _prologue_length(body: list[ast.stmt]) -> int:
             break
         count += 1
     return count
-
-
-Node = TypeVar("Node", ast.stmt, ast.expr)
-
-
-def _at(new: Node, place: ast.AST) -> Node:
-    return ast.copy_location(new, place)
 
 
 class StepCounter:

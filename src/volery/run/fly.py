@@ -28,7 +28,7 @@ from volery.trace.attachments import (
     RunSetup,
     Scenery,
     VehicleSetup,
-    scenery_to_json,
+    to_json,
 )
 from volery.trace.events import Failure
 from volery.trace.mcap_writer import Attachment
@@ -173,7 +173,7 @@ class _Flight:
         if opened.fleet is not None:
             origin = opened.fleet.frame
             scenery = Scenery(Origin(origin.latitude, origin.longitude, origin.amsl))
-            attachments.append(Attachment(WORLD_ATTACHMENT, "application/json", scenery_to_json(scenery)))
+            attachments.append(Attachment(WORLD_ATTACHMENT, "application/json", to_json(scenery)))
         if path is not None:
             attachments.append(Attachment(path.name, "text/x-python", path.read_bytes()))
         return setup, attachments

@@ -27,7 +27,7 @@ from volery.trace.attachments import (
     RunSetup,
     Scenery,
     VehicleSetup,
-    scenery_to_json,
+    to_json,
 )
 from volery.trace.events import NONE
 from volery.trace.mcap_writer import Attachment
@@ -140,7 +140,7 @@ def _missing_networks(system: System) -> Iterable[str]:
 
 def attachments_of(system: System) -> list[Attachment]:
     """Return the map and the text of every file of the model."""
-    scenery = scenery_to_json(scenery_of(system.environment))
+    scenery = to_json(scenery_of(system.environment))
     found = [Attachment(WORLD_ATTACHMENT, "application/json", scenery)]
     for number, source in enumerate(system.sources):
         name = MODEL_ATTACHMENT if number == 0 else source.name

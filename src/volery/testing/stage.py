@@ -381,20 +381,17 @@ class SimulatedStage(Stage):
         driver, link = self._access.another(self.name_of_vehicle)
         return Commander(self.kernel, driver, link, self._access.protocol)
 
-    def another_program(self) -> Any:
+    def another_program(self, **options: str) -> Any:
         """Return the vehicle for another program, on a new link or as another node."""
-        return self._program()
+        driver, _ = self._access.another(self.name_of_vehicle, **options)
+        return self._kind(self.kernel, self.name_of_vehicle, driver)
 
     def of_system(self, system: int) -> Any:
         """Return the vehicle of another system id; ``NotPossibleError`` for drivers without system ids."""
         try:
-            return self._program(system=str(system))
+            return self.another_program(system=str(system))
         except UsageError as error:
             raise NotPossibleError(f"the driver takes no system id: {error}") from None
-
-    def _program(self, **options: str) -> Any:
-        driver, _ = self._access.another(self.name_of_vehicle, **options)
-        return self._kind(self.kernel, self.name_of_vehicle, driver)
 
     @property
     def flight(self) -> Flight:

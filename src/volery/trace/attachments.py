@@ -162,13 +162,8 @@ class RunSetup:
 _SETUP = TypeAdapter(RunSetup)
 
 
-def setup_to_json(setup: RunSetup) -> bytes:
-    """Return the set-up as UTF-8 JSON: the same bytes for the same set-up."""
-    return to_json(setup)
-
-
 def setup_from_json(data: bytes) -> RunSetup:
-    """Return the set-up that ``setup_to_json`` wrote.
+    """Return the set-up that ``to_json`` wrote.
 
     Raises:
         UsageError: *data* is anything else.
@@ -232,13 +227,8 @@ class Scenery:
 _SCENERY = TypeAdapter(Scenery)
 
 
-def scenery_to_json(scenery: Scenery) -> bytes:
-    """Return the scenery as UTF-8 JSON: the same bytes for the same scenery."""
-    return to_json(scenery)
-
-
 def scenery_from_json(data: bytes) -> Scenery:
-    """Return the scenery that ``scenery_to_json`` wrote.
+    """Return the scenery that ``to_json`` wrote.
 
     Raises:
         UsageError: *data* is anything else.

@@ -25,7 +25,7 @@ from mcap.opcode import Opcode
 
 from volery.base.files import Output
 from volery.base.time import Ns, S
-from volery.trace.attachments import SETUP_ATTACHMENT, RunSetup, setup_to_json
+from volery.trace.attachments import SETUP_ATTACHMENT, RunSetup, to_json
 from volery.trace.encoding import LITTLE_ENDIAN_CDR, OWN_EVENTS, Codec, type_name
 from volery.trace.events import NONE, Event, Message, Published, Record, VehicleState
 
@@ -109,7 +109,7 @@ class McapWriter:
         self._writers[Published] = self._write_published
         self._output.write(MAGIC + _record(records.Header(profile=_ROS2_PROFILE, library="volery")))
         self.metadata("volery", {"schema": TRACE_SCHEMA, "seed": str(setup.seed)})
-        self.attach(Attachment(SETUP_ATTACHMENT, "application/json", setup_to_json(setup)))
+        self.attach(Attachment(SETUP_ATTACHMENT, "application/json", to_json(setup)))
         for attachment in attachments:
             self.attach(attachment)
 

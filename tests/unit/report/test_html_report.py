@@ -27,11 +27,11 @@ from volery.report.terminal import comparison_table, cost_table, short_compariso
 from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RunRecord, read_record, write_record
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
-from volery.trace.attachments import RunSetup, scenery_to_json
+from volery.trace.attachments import RunSetup, to_json
 from volery.trace.events import Event, Failure, Message, Milestone, Text, VehicleState
 from volery.trace.mcap_writer import Attachment, McapWriter
 
-_MAP = Attachment("world.json", "application/json", scenery_to_json(sample_scenery()))
+_MAP = Attachment("world.json", "application/json", to_json(sample_scenery()))
 
 
 def make_run(folder: Path, megahertz: float = 1500.0, seconds: float = 120.0) -> RunRecord:

@@ -14,15 +14,14 @@ from volery.testing.sample_run import sample_events, sample_scenery, sample_setu
 from volery.trace.attachments import (
     RunSetup,
     scenery_from_json,
-    scenery_to_json,
     setup_from_json,
-    setup_to_json,
+    to_json,
 )
 from volery.trace.events import Event, Failure, Published, Slice, Text
 from volery.trace.mcap_writer import Attachment, McapWriter
 from volery.trace.reader import Reading, read
 
-_MAP = Attachment("world.json", "application/json", scenery_to_json(sample_scenery()))
+_MAP = Attachment("world.json", "application/json", to_json(sample_scenery()))
 
 
 def write_sample(path: Path, seconds: float = 20.0, seed: int = 7) -> list[Event]:
@@ -221,7 +220,7 @@ def test_a_full_disk_leaves_a_readable_trace_and_a_problem(tmp_path: Path) -> No
 
 
 def test_set_ups_survive_and_others_are_refused() -> None:
-    assert setup_from_json(setup_to_json(sample_setup())) == sample_setup()
+    assert setup_from_json(to_json(sample_setup())) == sample_setup()
     for wrong in (b"{", b"[]", b'{"schema":"volery-setup/9"}', b'{"schema":"volery-setup/1","seed":"x"}'):
         with pytest.raises(UsageError, match=r"run-setup\.json"):
             setup_from_json(wrong)

@@ -14,7 +14,7 @@ from volery.requirements.accounts import Accounts
 from volery.requirements.record import write_record
 from volery.ros.messages.store import definition
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
-from volery.trace.attachments import scenery_to_json
+from volery.trace.attachments import to_json
 from volery.trace.mcap_writer import Attachment, McapWriter
 
 
@@ -22,7 +22,7 @@ def make_run(folder, megahertz=1500.0):
     """A run folder as a run leaves it."""
     folder.mkdir()
     setup = sample_setup(onboard_mhz=megahertz)
-    attached = [Attachment("world.json", "application/json", scenery_to_json(sample_scenery()))]
+    attached = [Attachment("world.json", "application/json", to_json(sample_scenery()))]
     writer, accounts = McapWriter(folder / "trace.mcap", setup, attached, definition), Accounts(setup)
     for event in sample_events(seconds=20.0, onboard_mhz=megahertz):
         writer(event)
