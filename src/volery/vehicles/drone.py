@@ -9,9 +9,8 @@ from volery.base.frames import LocalFrame
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S, from_seconds
 from volery.vehicles.driver import Capability, ManualControl
-from volery.vehicles.executor import RESTARTS
+from volery.vehicles.executor import NO_GOAL, RESTARTS, STREAM, TO_SAFETY, TRAVEL, TURN, Goal
 from volery.vehicles.limits import height_violation
-from volery.vehicles.operation import NO_GOAL, STREAM, TO_SAFETY, TRAVEL, TURN, Goal
 from volery.vehicles.telemetry import Velocity
 from volery.vehicles.vehicle import Vehicle, path_timeout, travel_timeout
 
@@ -56,7 +55,7 @@ class Drone(Vehicle):
             OutOfBounds: limits or fence forbid it; raised before anything is sent.
             Refused: it flies already, or the autopilot refuses.
         """
-        self._require(Capability.TAKEOFF)
+        self._connect(Capability.TAKEOFF)
         try:
             asked = f"take off to {height:g} m"
         except (TypeError, ValueError):
@@ -107,7 +106,7 @@ class Drone(Vehicle):
                 sent), or were violated on the way.
             Refused: it is on the ground, or the autopilot refuses.
         """
-        self._require(Capability.GOTO)
+        self._connect(Capability.GOTO)
         if not isinstance(goal, Position):
             raise UsageError(
                 f"{self.name}: goto({goal!r}): a goal is a Position, as in "
@@ -118,7 +117,7 @@ class Drone(Vehicle):
             self._check_speed(asked, speed)
         self._check_flying(asked)
         self._check_altitude(goal)
-        path = self._check_path(asked, self.position, goal)
+        path = self._check_path(asked, self._poll().position, goal)
         within = path_timeout(path, speed)
         self._operate(
             "goto",
@@ -136,7 +135,7 @@ class Drone(Vehicle):
         Raises:
             OutOfBounds: the straight path violates the fence, unless the drone is out of bounds already.
         """
-        self._require(Capability.RETURN_HOME)
+        self._connect(Capability.RETURN_HOME)
         home, here = self.home, self.position
         if not self._is_out_of_bounds():
             self._check_path("return home", here, Position(home.latitude, home.longitude, here.altitude))
@@ -174,7 +173,7 @@ class Drone(Vehicle):
         Raises:
             OutOfBounds: it would leave limits or fence within *lasting* seconds.
         """
-        self._require(Capability.VELOCITY)
+        self._connect(Capability.VELOCITY)
         velocity = Velocity(north, east, up)
         asked = f"fly at {north:g} m/s north, {east:g} m/s east, {up:g} m/s up"
         if not all(isfinite(part) for part in (*velocity, yaw_rate)):
@@ -202,7 +201,7 @@ class Drone(Vehicle):
         Args:
             degrees: heading, clockwise from north.
         """
-        self._require(Capability.HEADING)
+        self._connect(Capability.HEADING)
         asked = f"turn to {degrees:g} degrees"
         if not isfinite(degrees):
             raise UsageError(f"{self.name}: {asked}: not a number")
@@ -232,7 +231,7 @@ class Drone(Vehicle):
 
     def _land(self, operation: str, at: Position | None = None) -> None:
         """Land as *operation*: what a program asked for and its end are recorded under different names."""
-        self._require(Capability.LAND)
+        self._connect(Capability.LAND)
         here = at or self._driver.telemetry.position
         within = self._landing_timeout(0.0)
         self._operate(
@@ -259,7 +258,7 @@ class Drone(Vehicle):
         Raises:
             UsageError: a value is out of range or not a number.
         """
-        self._require(Capability.MANUAL_CONTROL)
+        self._connect(Capability.MANUAL_CONTROL)
         control = ManualControl(pitch, roll, throttle, yaw)
         for name, value, low in zip(ManualControl._fields, control, (-1.0, -1.0, 0.0, -1.0), strict=True):
             if not low <= value <= 1.0:
@@ -272,7 +271,7 @@ class Drone(Vehicle):
         It needs no position and returns when the mode is seen. Raises ``Refused`` unless ``manual_control``
         was called within the last second.
         """
-        self._require(Capability.STABILIZE)
+        self._connect(Capability.STABILIZE)
         self._enter_manual_mode("stabilize", "fly stabilized", self._driver.stabilize)
 
     def altitude_hold(self) -> None:
@@ -281,7 +280,7 @@ class Drone(Vehicle):
         A throttle of 0.5 keeps the altitude. It needs no position and returns when the mode is seen. Raises
         ``Refused`` unless ``manual_control`` was called within the last second.
         """
-        self._require(Capability.ALTITUDE_HOLD)
+        self._connect(Capability.ALTITUDE_HOLD)
         self._enter_manual_mode("altitude_hold", "hold the altitude", self._driver.altitude_hold)
 
     # -- end of a program

@@ -1,5 +1,7 @@
 """The executor of steps, one for all drivers: time-outs, refusals, restarts, takeover and link loss.
 
+The policies under which operations are allowed, and the goals that they are measured against, are here, too.
+
 A driver states what to send and how telemetry shows that it is done; everything that can go wrong meanwhile
 is handled here, once. MAVLink does not say who changed a mode. A mode that this program did not command is
 therefore taken as the choice of a pilot, another station or a failsafe, and is never overridden in flight.
@@ -7,19 +9,23 @@ therefore taken as the choice of a pilot, another station or a failsafe, and is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import hypot, nan
+from typing import NamedTuple
 
 from volery.base.errors import Failsafe, LinkLost, NotArrived, Overridden, Refused, VehicleError
+from volery.base.frames import LocalFrame
+from volery.base.position import Position
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.api import Action, Handle, Kernel
 from volery.kernel.waiting import sleep
 from volery.vehicles.driver import Driver, Step
-from volery.vehicles.telemetry import Telemetry
+from volery.vehicles.limits import FLOOR
+from volery.vehicles.telemetry import REFRESHED_AFTER, STALE_AFTER, Telemetry, describe_state, failsafe_cause
 
 RESTARTS = 3
 """How often a sequence that is undone before lift-off is started again."""
-RECENT_CAUSE: Ns = 5 * S
-"""Age up to which a text of the autopilot counts as the reason of a mode change."""
 REASON_WAIT: Ns = 500 * MS
 """Time to wait for the text with the reason, which often follows a refusal."""
 RECENT_TEXT_S = 3.0
@@ -35,6 +41,66 @@ def _no_check(_operation: str, _now: Ns) -> None:
     """Accept everything."""
 
 
+class Goal(NamedTuple):
+    """Where an operation should end; NaN for a coordinate that does not matter."""
+
+    latitude: float
+    longitude: float
+    amsl: float
+
+
+NO_GOAL = Goal(nan, nan, nan)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OperationPolicy:
+    """When a kind of operation is allowed and what is monitored meanwhile.
+
+    Args:
+        needs_control: refuse the operation while another station has control.
+        recorded: record every one; otherwise only failures (set-points come in loops).
+        bounded: monitor limits and fence.
+        goes_on: keep monitoring after the call has returned, until the next operation.
+        travels: refuse the operation below the battery reserve.
+        manual: keep the age of the last manual control.
+        to_safety: brings the vehicle to safety, so it aborts the operation of another task.
+        ignored: bounds that are not monitored.
+    """
+
+    needs_control: bool = True
+    recorded: bool = True
+    bounded: bool = False
+    goes_on: bool = False
+    travels: bool = False
+    manual: bool = False
+    to_safety: bool = False
+    ignored: frozenset[str] = frozenset()
+
+
+PLAIN = OperationPolicy(manual=True)
+UNGUARDED = OperationPolicy(manual=True, needs_control=False)
+TURN = OperationPolicy(bounded=True)
+TRAVEL = OperationPolicy(bounded=True, travels=True)
+FLY_MISSION = OperationPolicy(bounded=True, travels=True, ignored=frozenset({FLOOR}))
+STREAM = OperationPolicy(bounded=True, travels=True, goes_on=True, recorded=False)
+MANUAL = OperationPolicy(bounded=True, goes_on=True, manual=True)
+TO_SAFETY = OperationPolicy(to_safety=True)
+LAST_RESORT = OperationPolicy(to_safety=True, needs_control=False)
+
+
+def distance_to(goal: Goal, position: Position | None) -> tuple[float, float]:
+    """Return horizontal and vertical distance (m) of *position* (AMSL) from *goal*; NaN where unknown."""
+    if position is None:
+        return nan, nan
+    height = position.altitude.metres
+    vertical = abs(height - goal.amsl)
+    if goal.latitude != goal.latitude:
+        return nan, vertical
+    frame = LocalFrame(goal.latitude, goal.longitude, height)
+    east, north, _ = frame.to_enu(position.latitude, position.longitude, height)
+    return hypot(east, north), vertical
+
+
 class StepExecutor:
     """Executes steps for one vehicle and tracks which mode this program commanded.
 
@@ -48,6 +114,7 @@ class StepExecutor:
         self._kernel = kernel
         self._driver = driver
         self._link_timeout = link_timeout
+        self._silent_after = min(link_timeout, STALE_AFTER)
         self.commanded = ""  # mode that this program commanded last; empty while another has control
         self._previous = ""  # mode commanded before, until the one commanded last is seen
         self._claim = 0  # counts aborts; steps begun under an earlier claim end
@@ -172,11 +239,20 @@ class StepExecutor:
         self._taking_back = True
         return True
 
-    def check_link(self, asked: str) -> None:
-        """Raise ``LinkLost`` if the link has timed out: what is sent then may be obeyed much later."""
-        telemetry = self._driver.telemetry
-        if telemetry.detects_silence and telemetry.last_message_ns >= 0 and self.link_lost():
+    def check_link(self, asked: str, to_safety: bool) -> None:
+        """Raise ``LinkLost`` if the link has timed out; after a silence wait until the state is fresh.
+
+        What is sent on a lost link may be obeyed much later; an order of safety is sent all the same. A mode
+        from before a silence must decide nothing.
+        """
+        telemetry, now = self._driver.telemetry, self._kernel.now()
+        fresh = now - telemetry.last_message_ns < self._silent_after and now >= telemetry.fresh_from
+        if fresh or telemetry.last_message_ns < 0:
+            return
+        if telemetry.detects_silence and not to_safety and self.link_lost():
             raise self.link_lost_error(asked)
+        if telemetry.stale and not self.link_lost():
+            self.wait(lambda: not telemetry.stale or self.link_lost(), REFRESHED_AFTER)
 
     def link_lost_error(self, asked: str) -> LinkLost:
         """Return the error for a lost link."""
@@ -415,52 +491,5 @@ def _repeat(kernel: Kernel, period: Ns, action: Action) -> Handle:
     return kernel.every(period, tick)
 
 
-_CAUSES: Mapping[str, tuple[str, ...]] = {
-    "battery": ("battery",),
-    "fence": ("fence",),
-    "position: GPS or estimator": ("gps", "ekf", "position", "navigation", "estimator", "vibration"),
-    "link to the ground station": ("gcs", "data link", "datalink", "ground control"),
-    "manual control": ("radio", "rc failsafe", "manual control", "rc signal"),
-    "thrust": ("thrust", "motor", "crash", "attitude"),
-    "terrain": ("terrain",),
-}
-"""Words in an autopilot's texts that tell the cause of a failsafe."""
-_LOW_SHARE = 0.15
-
-
-def failsafe_cause(telemetry: Telemetry, now: Ns) -> str:
-    """Return why a failsafe of the autopilot acts, in words; empty if none does.
-
-    An autopilot may act by itself without reporting the status of a failsafe: ArduPilot at its fence. Then
-    its text tells.
-
-    Args:
-        telemetry: telemetry of the vehicle.
-        now: the present time, ns.
-    """
-    said = [text.text.lower() for text in telemetry.texts if now - text.at <= RECENT_CAUSE]
-    acts = [text for text in said if "failsafe" in text or "breach" in text]
-    if not telemetry.failsafe and not acts:
-        return ""
-    for text in (*reversed(acts), *reversed(said)):
-        for cause, words in _CAUSES.items():
-            if any(word in text for word in words):
-                return cause
-    if telemetry.stream_lost:
-        return "set-points of this program"
-    if telemetry.position_lost_for(now):
-        return "position: GPS or estimator"
-    if telemetry.battery.remaining <= _LOW_SHARE:
-        return "battery"
-    return "not stated by the autopilot"
-
-
 def _because(cause: str) -> str:
     return f"; failsafe ({cause})" if cause else ""
-
-
-def describe_state(telemetry: Telemetry) -> str:
-    """Return position, mode and whether it is armed, as last reported."""
-    armed = "armed" if telemetry.armed else "disarmed"
-    where = f"at {telemetry.position}" if telemetry.position is not None else "position unknown"
-    return f"{where}, mode {telemetry.mode or 'unknown'}, {armed}"

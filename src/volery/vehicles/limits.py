@@ -138,49 +138,7 @@ def _check_heights(what: str, low: Altitude | None, high: Altitude | None) -> No
         raise UsageError(f"{what}: its floor of {low} is not below its ceiling of {high}")
 
 
-class HomeFrame(NamedTuple):
-    """The local frame about home. ``amsl`` is the altitude of home in metres above mean sea level."""
-
-    amsl: float
-    frame: LocalFrame
-
-    @classmethod
-    def at(cls, home: Position) -> HomeFrame:
-        """Return the frame about *home*, which has an AMSL altitude."""
-        amsl = home.altitude.metres
-        return cls(amsl, LocalFrame(home.latitude, home.longitude, amsl))
-
-    def above(self, altitude: Altitude) -> float | None:
-        """Return metres above home, or ``None`` for kinds of altitude that home alone cannot convert."""
-        if isinstance(altitude, AboveHome):
-            return altitude.metres
-        if isinstance(altitude, AMSL):
-            return altitude.metres - self.amsl
-        return None
-
-    def local(self, position: Position) -> Vector:
-        """Return metres east and north of home and metres above home.
-
-        The third value is the difference of altitudes, not the coordinate in the tangent plane. An altitude
-        of another kind (above ground) is taken as above home: the best estimate without a terrain model.
-        """
-        up = self.above(position.altitude)
-        height = position.altitude.metres if up is None else up
-        east, north, _ = self.frame.to_enu(position.latitude, position.longitude, self.amsl + height)
-        return east, north, height
-
-    def band(self, floor: Altitude | None, ceiling: Altitude | None) -> tuple[float, float]:
-        """Return lower and upper boundary in metres above home; infinite where not stated."""
-        low = None if floor is None else self.above(floor)
-        high = None if ceiling is None else self.above(ceiling)
-        return (-inf if low is None else low, inf if high is None else high)
-
-    def area(self, corners: Sequence[Corner]) -> BaseGeometry:
-        """Return the enclosed area in metres; both halves of an outline that crosses itself."""
-        outline = Polygon([self.local(Position(*corner, AMSL(self.amsl)))[:2] for corner in corners])
-        area = make_valid(outline, method="structure", keep_collapsed=False)
-        prepare(area)
-        return area
+NO_FENCE = Fence()
 
 
 class _ZoneArea(NamedTuple):
@@ -204,14 +162,55 @@ class Bounds:
 
     def __init__(self, home: Position, limits: Limits, fence: Fence | None) -> None:
         self.home, self.limits, self.fence = home, limits, fence
-        self._frame = frame = HomeFrame.at(home)
-        stated = fence or Fence()
-        self._stated = stated
-        self._polygon = frame.area(stated.polygon) if stated.polygon else None
-        self._low, self._high = frame.band(stated.floor, stated.ceiling)
-        self._zones = [_zone_area(zone, frame) for zone in stated.no_fly]
+        self._stated = stated = fence or NO_FENCE
+        self._amsl = home.altitude.metres
+        self._frame = LocalFrame(home.latitude, home.longitude, self._amsl)
+        self._converted: tuple[Position | None, Vector] = None, (0.0, 0.0, 0.0)  # the last one
+        self._polygon = self._area(stated.polygon) if stated.polygon else None
+        self._low, self._high = self._band(stated)
+        self._zones = tuple(map(self._zone_area, stated.no_fly))
         self.home_violation = self._find_home_violation()
         """Why no flight can start at home within the fence; empty if one can."""
+
+    # -- the local frame
+
+    def local(self, position: Position) -> Vector:
+        """Return metres east and north of home and metres above home.
+
+        The third value is the difference of altitudes, not the coordinate in the tangent plane. An altitude
+        of another kind (above ground) is taken as above home: the best estimate without a terrain model.
+        The same report of a position is converted once, although path and monitor both check it.
+        """
+        converted, local = self._converted
+        if position is converted:
+            return local
+        height = self._above(position.altitude)
+        east, north, _ = self._frame.to_enu(position.latitude, position.longitude, self._amsl + height)
+        self._converted = position, (east, north, height)
+        return east, north, height
+
+    def _above(self, altitude: Altitude) -> float:
+        """Return metres above home."""
+        return altitude.metres - self._amsl if isinstance(altitude, AMSL) else altitude.metres
+
+    def _band(self, area: Fence | Zone) -> tuple[float, float]:
+        """Return floor and ceiling in metres above home; infinite where not stated."""
+        low = -inf if area.floor is None else self._above(area.floor)
+        return low, inf if area.ceiling is None else self._above(area.ceiling)
+
+    def _area(self, corners: Sequence[Corner]) -> BaseGeometry:
+        """Return the enclosed area in metres; both halves of an outline that crosses itself."""
+        outline = Polygon([self.local(Position(*corner, AMSL(self._amsl)))[:2] for corner in corners])
+        area = make_valid(outline, method="structure", keep_collapsed=False)
+        prepare(area)
+        return area
+
+    def _zone_area(self, zone: Zone) -> _ZoneArea:
+        """Return the areas of a zone; a small zone gets a smaller tolerance, or nothing would be left."""
+        area = self._area(zone.corners)
+        inner = area.buffer(-min(TOLERANCE_M, sqrt(float(area.area)) / 4.0))
+        prepare(inner)
+        return _ZoneArea(zone.name, area, inner, *self._band(zone))
 
     # -- home
 
@@ -231,7 +230,7 @@ class Bounds:
         corners = self._stated.polygon
         if any(abs(longitude) > 90.0 for _, longitude in corners):
             return ""
-        swapped = self._frame.area([(longitude, latitude) for latitude, longitude in corners])
+        swapped = self._area([(longitude, latitude) for latitude, longitude in corners])
         inside = swapped.covers(Point(0.0, 0.0))
         return "; corners are (latitude, longitude): are they swapped?" if inside else ""
 
@@ -239,7 +238,8 @@ class Bounds:
 
     def path(self, start: Position, goal: Position) -> Path:
         """Return the straight path from *start* to *goal* in the local frame about home."""
-        return self._frame.local(start), self._frame.local(goal)
+        end = self.local(goal)
+        return self.local(start), end
 
     def path_violation(self, path: Path, goal: Position) -> str:
         """Return why the vehicle must not go along *path*, which ends at *goal*; empty if it may."""
@@ -288,8 +288,8 @@ class Bounds:
 
     def violations(self, position: Position) -> Mapping[str, str]:
         """Return the bounds that *position* (AMSL) violates as {name: message}."""
-        east, north, up = self._frame.local(position)
-        limits, found, distance, point = self.limits, dict[str, str](), hypot(east, north), Point(east, north)
+        east, north, up = self.local(position)
+        limits, found, distance = self.limits, dict[str, str](), hypot(east, north)
         if distance > limits.farthest + TOLERANCE_M:
             found["farthest"] = (
                 f"it is {distance:.0f} m from home, beyond {limits.farthest:g} m (Limits.farthest)"
@@ -298,6 +298,7 @@ class Bounds:
             found["highest"] = f"it is {up:.1f} m above home, beyond {limits.highest:g} m (Limits.highest)"
         if up < limits.lowest - TOLERANCE_M:
             found["lowest"] = f"it is {-up:.1f} m below home, beyond {-limits.lowest:g} m (Limits.lowest)"
+        point = Point(east, north) if self.fence is not None else None
         if self._polygon is not None and not self._polygon.contains(point):
             outside = float(self._polygon.distance(point))
             if outside > TOLERANCE_M:
@@ -323,14 +324,6 @@ def height_violation(height: float, limits: Limits, home: Position | None = None
     elif limits.lowest <= height - home.altitude.metres <= limits.highest:
         hint = f"; did you mean AMSL({height:g})? Home is {home.altitude.metres:g} m AMSL"
     return f"{height:g} m above home asked, but the limit is {limits.highest:g} m (Limits.highest){hint}"
-
-
-def _zone_area(zone: Zone, frame: HomeFrame) -> _ZoneArea:
-    """Return the areas of a zone; a small zone gets a smaller tolerance, or nothing would be left."""
-    area = frame.area(zone.corners)
-    inner = area.buffer(-min(TOLERANCE_M, sqrt(float(area.area)) / 4.0))
-    prepare(inner)
-    return _ZoneArea(zone.name, area, inner, *frame.band(zone.floor, zone.ceiling))
 
 
 def _track(path: Path) -> BaseGeometry:

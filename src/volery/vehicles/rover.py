@@ -7,7 +7,7 @@ from math import nan
 from volery.base.errors import UsageError
 from volery.base.position import AboveHome, Position
 from volery.vehicles.driver import Capability, ManualControl
-from volery.vehicles.operation import TO_SAFETY, TRAVEL, Goal
+from volery.vehicles.executor import TO_SAFETY, TRAVEL, Goal
 from volery.vehicles.vehicle import Vehicle
 
 
@@ -33,7 +33,7 @@ class Rover(Vehicle):
             OutOfBounds: limits or fence forbid the goal or the straight path (raised before anything is
                 sent), or were violated on the way.
         """
-        self._require(Capability.GOTO)
+        self._connect(Capability.GOTO)
         latitude, longitude = (goal.latitude, goal.longitude) if isinstance(goal, Position) else goal
         there = Position(latitude, longitude, AboveHome(0.0))
         asked = f"drive to {latitude:.7f}, {longitude:.7f}"
@@ -61,7 +61,7 @@ class Rover(Vehicle):
         Raises:
             OutOfBounds: the straight path violates the fence, unless the rover is out of bounds already.
         """
-        self._require(Capability.RETURN_HOME)
+        self._connect(Capability.RETURN_HOME)
         home, here = self.home, self.position
         level = Position(here.latitude, here.longitude, home.altitude)
         if not self._is_out_of_bounds():
@@ -80,7 +80,7 @@ class Rover(Vehicle):
 
         Raises ``Refused`` unless ``manual_control`` was called within the last second.
         """
-        self._require(Capability.MANUAL_CONTROL)
+        self._connect(Capability.MANUAL_CONTROL)
         self._enter_manual_mode("manual", "drive by hand", self._driver.manual)
 
     def manual_control(self, steering: float, throttle: float) -> None:
@@ -93,7 +93,7 @@ class Rover(Vehicle):
         Raises:
             UsageError: a value is out of range or not a number.
         """
-        self._require(Capability.MANUAL_CONTROL)
+        self._connect(Capability.MANUAL_CONTROL)
         for name, value in (("steering", steering), ("throttle", throttle)):
             if not -1.0 <= value <= 1.0:
                 raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from -1 to 1")

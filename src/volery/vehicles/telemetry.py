@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from math import inf, nan
 from typing import NamedTuple
 
@@ -66,6 +67,20 @@ FIXED = frozenset(
 )
 UNFIXED = frozenset({"no_gps", "no_fix", "2d_fix", "2d", "na", "gps health 0", "gps health 1"})
 """Terms of the drivers' protocols with a position by satellites, and without one."""
+
+RECENT_CAUSE: Ns = 5 * S
+"""Age up to which a text of the autopilot counts as the reason of a mode change."""
+_CAUSES: Mapping[str, tuple[str, ...]] = {
+    "battery": ("battery",),
+    "fence": ("fence",),
+    "position: GPS or estimator": ("gps", "ekf", "position", "navigation", "estimator", "vibration"),
+    "link to the ground station": ("gcs", "data link", "datalink", "ground control"),
+    "manual control": ("radio", "rc failsafe", "manual control", "rc signal"),
+    "thrust": ("thrust", "motor", "crash", "attitude"),
+    "terrain": ("terrain",),
+}
+"""Words in an autopilot's texts that tell the cause of a failsafe."""
+_LOW_SHARE = 0.15
 
 
 class Telemetry:
@@ -196,3 +211,37 @@ class Telemetry:
     def silence(self, now: Ns) -> float:
         """Return seconds since the last message; infinite before the first."""
         return inf if self.last_message_ns < 0 else (now - self.last_message_ns) / S
+
+
+def failsafe_cause(telemetry: Telemetry, now: Ns) -> str:
+    """Return why a failsafe of the autopilot acts, in words; empty if none does.
+
+    An autopilot may act by itself without reporting the status of a failsafe: ArduPilot at its fence. Then
+    its text tells.
+
+    Args:
+        telemetry: telemetry of the vehicle.
+        now: the present time, ns.
+    """
+    said = [text.text.lower() for text in telemetry.texts if now - text.at <= RECENT_CAUSE]
+    acts = [text for text in said if "failsafe" in text or "breach" in text]
+    if not telemetry.failsafe and not acts:
+        return ""
+    for text in (*reversed(acts), *reversed(said)):
+        for cause, words in _CAUSES.items():
+            if any(word in text for word in words):
+                return cause
+    if telemetry.stream_lost:
+        return "set-points of this program"
+    if telemetry.position_lost_for(now):
+        return "position: GPS or estimator"
+    if telemetry.battery.remaining <= _LOW_SHARE:
+        return "battery"
+    return "not stated by the autopilot"
+
+
+def describe_state(telemetry: Telemetry) -> str:
+    """Return position, mode and whether it is armed, as last reported."""
+    armed = "armed" if telemetry.armed else "disarmed"
+    where = f"at {telemetry.position}" if telemetry.position is not None else "position unknown"
+    return f"{where}, mode {telemetry.mode or 'unknown'}, {armed}"

@@ -53,11 +53,10 @@ from volery.vehicles.driver import (
     Waypoint,
     item_problem,
 )
-from volery.vehicles.executor import LINK_TIMEOUT, StepExecutor, describe_state
-from volery.vehicles.limits import Bounds, BoundsMonitor, Fence, Limits, Path, low_battery, states_amsl
-from volery.vehicles.operation import (
+from volery.vehicles.executor import (
     FLY_MISSION,
     LAST_RESORT,
+    LINK_TIMEOUT,
     MANUAL,
     NO_GOAL,
     PLAIN,
@@ -65,9 +64,19 @@ from volery.vehicles.operation import (
     UNGUARDED,
     Goal,
     OperationPolicy,
+    StepExecutor,
     distance_to,
 )
-from volery.vehicles.telemetry import Attitude, Battery, StatusText, Telemetry, Velocity
+from volery.vehicles.limits import Bounds, BoundsMonitor, Fence, Limits, Path, low_battery, states_amsl
+from volery.vehicles.telemetry import (
+    REFRESHED_AFTER,
+    Attitude,
+    Battery,
+    StatusText,
+    Telemetry,
+    Velocity,
+    describe_state,
+)
 
 FIRST_MESSAGE_WITHIN_S = 10.0
 READY_WITHIN_S = 120.0
@@ -75,8 +84,6 @@ MISSION_WITHIN_S = 3600.0
 BATTERY_MEASURED_WITHIN_S = 10.0
 LINK_RETURN_S = 30.0
 """How long the end of a program waits for a lost link."""
-REFRESHED_WITHIN_S = 2.0
-"""Time after which telemetry is complete again once a link has returned."""
 
 ASK_PERIOD: Ns = 500 * MS
 ASK_FOR: Ns = MINUTE
@@ -154,6 +161,7 @@ class Vehicle(ABC):
         driver.telemetry.detects_silence = driver.cycle is None
         self._executor = StepExecutor(kernel, driver, link_timeout)
         self._truth = truth
+        self._supported: frozenset[Capability] = frozenset()  # as known once the vehicle was connected
         self._bounds: Bounds | None = None
         self._in_progress: tuple[Task | None, str] | None = None
         self._monitor: Handle | None = None  # monitors what goes on after a call has returned
@@ -311,21 +319,26 @@ class Vehicle(ABC):
         with self.kernel.guard:
             self._link_loss_query = query = self.kernel.every(ASK_PERIOD, ask)
 
-    def _connect(self) -> None:
-        """Process received messages; wait for the first one if there was none."""
+    def _connect(self, capability: Capability | None = None) -> None:
+        """Process received messages; wait for the first one if there was none.
+
+        Args:
+            capability: what the vehicle must be able to do; ``CapabilityError`` if it cannot.
+        """
         telemetry = self._poll()
         if telemetry.last_message_ns < 0 or telemetry.kind != self.kind:
             self.wait_connected()
-
-    def _require(self, capability: Capability) -> None:
-        self._connect()
+        if capability is None:
+            return
         problem = self._driver.problem()
         if isinstance(problem, CapabilityError):
             raise CapabilityError(f"{self.name}: {problem}")
-        capabilities = self._driver.capabilities
-        if capability not in capabilities:
-            can = ", ".join(sorted(each.value for each in capabilities))
-            raise CapabilityError(f"{self.name} cannot {capability.value}; it can {can}")
+        if capability not in self._supported:
+            capabilities = self._driver.capabilities
+            if capability not in capabilities:
+                can = ", ".join(sorted(each.value for each in capabilities))
+                raise CapabilityError(f"{self.name} cannot {capability.value}; it can {can}")
+            self._supported |= capabilities
 
     def _wait_for_link(self) -> None:
         """If the link is or was lost, give it time to return and telemetry time to become fresh."""
@@ -340,7 +353,7 @@ class Vehicle(ABC):
                 f"{describe_state(telemetry)}{', FLYING' if telemetry.flying else ''}, {self._reaction()}"
             )
         if not telemetry.detects_silence:
-            self._executor.wait(lambda: False, from_seconds(REFRESHED_WITHIN_S))
+            self._executor.wait(lambda: False, REFRESHED_AFTER)
 
     def _reaction(self) -> str:
         return self._driver.on_link_loss() or "its reaction to a lost link is not known"
@@ -385,7 +398,7 @@ class Vehicle(ABC):
 
         The operation of another task is aborted. Raises ``Overridden`` if another station has control.
         """
-        self._require(Capability.HOLD)
+        self._connect(Capability.HOLD)
         self._operate("hold", "hold", self._driver.hold, policy=TO_SAFETY)
 
     def resume(self) -> None:
@@ -394,12 +407,12 @@ class Vehicle(ABC):
         The vehicle then holds its position. Raises ``Failsafe`` or ``Overridden`` for any other failsafe, or
         if another station has control.
         """
-        self._require(Capability.HOLD)
+        self._connect(Capability.HOLD)
         self._operate("resume", "take the vehicle back", self._driver.hold, policy=TO_SAFETY)
 
     def upload_mission(self, mission: Sequence[MissionItem]) -> None:
         """Replace the mission on board. Each leg is checked against limits and fence as a straight path."""
-        self._require(Capability.MISSION)
+        self._connect(Capability.MISSION)
         items = list(mission)
         if not items:
             raise UsageError(f"{self.name}: an empty mission; give at least one item")
@@ -417,7 +430,7 @@ class Vehicle(ABC):
         Args:
             within: longest duration of the mission, s.
         """
-        self._require(Capability.MISSION)
+        self._connect(Capability.MISSION)
         if self._mission and self._driver.telemetry.position is not None:
             self._check_mission(self._mission)
         self._operate(
@@ -465,8 +478,10 @@ class Vehicle(ABC):
             raise UsageError(f"{self.name}: the fence excludes home: {bounds.home_violation}")
         return bounds
 
-    def _check_path(self, asked: str, start: Position, goal: Position) -> Path:
+    def _check_path(self, asked: str, start: Position | None, goal: Position) -> Path:
         """Return the straight path; raise ``OutOfBounds`` if it violates limits or fence. *start* is AMSL."""
+        if start is None:
+            raise self._unknown("its position")
         bounds = self._home_bounds()
         if bounds is None:
             raise self._unknown("its home")
@@ -490,13 +505,13 @@ class Vehicle(ABC):
                 f"subtract its height there and say AMSL"
             )
         if isinstance(goal.altitude, AboveGround):
-            self._require(Capability.TERRAIN)
+            self._connect(Capability.TERRAIN)
         seen = self._driver.telemetry
         if isinstance(goal.altitude, AMSL) and not seen.amsl_known:
             raise Refused(self.name, f"go to {goal}", seen.amsl_remedy)
 
     def _check_speed(self, asked: str, speed: float) -> None:
-        self._require(Capability.SPEED)
+        self._connect(Capability.SPEED)
         if not (isfinite(speed) and speed > 0):
             raise UsageError(f"{self.name}: {asked}: a speed of {speed:g} m/s; give one above 0")
 
@@ -525,13 +540,13 @@ class Vehicle(ABC):
         here, bounds = self._driver.telemetry.position, self._home_bounds()
         return here is not None and bounds is not None and bool(bounds.violations(here))
 
-    def _check_reserve(self, asked: str) -> None:
+    def _check_reserve(self, asked: str) -> float:
+        """Return the battery reserve, 0..1; raise ``LowBattery`` if the battery is below it."""
         reserve, telemetry = self.limits.reserve, self._driver.telemetry
-        if reserve == 0.0:
-            return
-        if self.limits.battery_reserve is None and not isfinite(telemetry.battery.remaining):
-            return
-        if not isfinite(telemetry.battery.remaining) and not self._executor.wait(
+        measured = isfinite(telemetry.battery.remaining)
+        if reserve == 0.0 or (self.limits.battery_reserve is None and not measured):
+            return reserve
+        if not measured and not self._executor.wait(
             lambda: isfinite(telemetry.battery.remaining), from_seconds(BATTERY_MEASURED_WITHIN_S)
         ):
             raise CapabilityError(
@@ -540,6 +555,7 @@ class Vehicle(ABC):
             )
         if telemetry.battery.remaining < reserve:
             raise low_battery(self.name, asked, telemetry.battery.remaining, reserve)
+        return reserve
 
     def _amsl(self, position: Position) -> Position:
         """Return the same place with an AMSL altitude; above ground is taken as above home."""
@@ -576,7 +592,8 @@ class Vehicle(ABC):
         """
         with self.kernel as kernel:
             task = kernel.current()
-            self._abort_other(task, operation, policy)
+            if self._in_progress is not None:
+                self._abort_other(*self._in_progress, task, operation, policy)
             mine = self._in_progress = (task, operation)
             start = kernel.now()
         outcome, said = "ok", ""
@@ -585,14 +602,11 @@ class Vehicle(ABC):
                 self._bounds_error = None
             if self._bounds_error is not None:
                 self._raise_bounds_error()
-            if not policy.to_safety:
-                self._executor.check_link(asked)
-            self._wait_until_refreshed()
+            self._executor.check_link(asked, policy.to_safety)
             if policy.needs_control and not (policy.to_safety and self._executor.take_back()):
                 self._executor.check_ours(asked)
-            if policy.travels:
-                self._check_reserve(asked)
-            self._execute(asked, plan, policy, restarts)
+            reserve = self._check_reserve(asked) if policy.travels else 0.0
+            self._execute(asked, plan, policy, reserve, restarts)
         except BaseException as error:
             outcome, said = type(error).__name__, str(error)
             raise
@@ -603,21 +617,12 @@ class Vehicle(ABC):
                 if policy.recorded or outcome != "ok":
                     self._record(start, operation, asked, (outcome, said), goal())
 
-    def _wait_until_refreshed(self) -> None:
-        """After a silence wait until the state is fresh: a mode from before it must decide nothing."""
-        telemetry = self._driver.telemetry
-        if telemetry.stale and telemetry.last_message_ns >= 0 and not self._executor.link_lost():
-            self._executor.wait(
-                lambda: not telemetry.stale or self._executor.link_lost(), from_seconds(REFRESHED_WITHIN_S)
-            )
-
-    def _abort_other(self, task: Task | None, operation: str, policy: OperationPolicy) -> None:
-        """Abort the operation of another task, or raise ``UsageError`` unless this one brings to safety."""
-        if self._in_progress is None:
-            return
+    def _abort_other(
+        self, holder: Task | None, running: str, task: Task | None, operation: str, policy: OperationPolicy
+    ) -> None:
+        """Abort what *holder* has *running*, or raise ``UsageError`` unless *operation* brings to safety."""
         if self._straying is not None and not policy.to_safety:
             raise type(self._straying)(self.name, operation, self._straying.what)
-        holder, running = self._in_progress
         if holder is not None and (holder.done or holder.scope.cancelled):
             return
         if not policy.to_safety:
@@ -627,7 +632,12 @@ class Vehicle(ABC):
         self._executor.abort_for(f"{operation}(){by}")
 
     def _execute(
-        self, asked: str, plan: Callable[[], Sequence[Step]], policy: OperationPolicy, restarts: int
+        self,
+        asked: str,
+        plan: Callable[[], Sequence[Step]],
+        policy: OperationPolicy,
+        reserve: float,
+        restarts: int,
     ) -> None:
         if not policy.manual:
             self._manual_control_at = None
@@ -637,14 +647,8 @@ class Vehicle(ABC):
         if not policy.bounded:
             self._executor.execute(asked, plan, restarts=restarts)
             return
-        reserve = self.limits.reserve if policy.travels else 0.0
-        monitor = BoundsMonitor(
-            self._driver.telemetry,
-            self._home_bounds(),
-            reserve,
-            policy.ignored,
-            needs_position=policy.travels,
-        )
+        seen, bounds = self._driver.telemetry, self._home_bounds()
+        monitor = BoundsMonitor(seen, bounds, reserve, policy.ignored, needs_position=policy.travels)
         try:
             self._executor.execute(asked, plan, restarts=restarts, check=monitor.check)
         except (OutOfBounds, LowBattery, PositionLost) as error:

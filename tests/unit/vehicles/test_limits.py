@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
-from volery.vehicles.limits import Bounds, Fence, HomeFrame, Limits, Zone, height_violation
+from volery.vehicles.limits import Bounds, Fence, Limits, Zone, height_violation
 
 HOME = Position(46.0828, -103.8990, AMSL(900.0))
 FRAME = LocalFrame(HOME.latitude, HOME.longitude, 900.0)
@@ -137,7 +137,7 @@ def test_against_a_path_taken_in_small_steps(x0: float, y0: float, x1: float, y1
 
 @given(metres, metres)
 def test_home_is_where_the_local_frame_begins(east: float, north: float) -> None:
-    local = HomeFrame.at(HOME).local(at(east, north, 25.0))
+    local = Bounds(HOME, Limits(), None).local(at(east, north, 25.0))
     assert local[0] == pytest.approx(east, abs=0.01)
     assert local[1] == pytest.approx(north, abs=0.01)
     assert local[2] == pytest.approx(25.0)

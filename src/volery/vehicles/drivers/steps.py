@@ -62,6 +62,37 @@ def immediate_step(ask: str, action: Action, enters: str = "") -> Step:
     return Step(ask=ask, send=action, done=lambda seen: True, within=ANSWERED_WITHIN, enters=enters)
 
 
+def mode_step(
+    seen: Telemetry, mode: str, answer: str, note: Callable[[str], None], command: Callable[[str], None]
+) -> Step:
+    """Return a step that enters *mode*.
+
+    Args:
+        seen: telemetry of the vehicle.
+        mode: the mode.
+        answer: key of the acknowledgement.
+        note: notes that this program commands the mode, also where the step will be skipped.
+        command: sends the command.
+    """
+
+    def send() -> None:
+        note(mode)
+        command(mode)
+
+    if seen.mode == mode:
+        note(mode)
+    return Step(
+        ask=f"change to {mode}",
+        send=send,
+        done=lambda seen: seen.mode == mode,
+        within=ANSWERED_WITHIN,
+        skippable=True,
+        answer=answer,
+        again=S,
+        enters=mode,
+    )
+
+
 def ready_step(within: Ns, advice: str, keep: Repeat | None = None) -> Step:
     """Return a step that waits until the vehicle could arm and go to a position."""
     return Step(

@@ -43,6 +43,7 @@ from volery.vehicles.drivers.steps import (
     disarmed_step,
     heading_reached,
     immediate_step,
+    mode_step,
     send_nothing,
 )
 from volery.vehicles.telemetry import Velocity
@@ -139,6 +140,11 @@ class ArduPilot(MavlinkDriver):
     def __init__(self, kernel: Kernel, name: str, backend: ArduPilotBackend) -> None:
         super().__init__(kernel, name, backend)
         self._setpoints = ArduPilotSetpoints(kernel, backend)
+
+    @property
+    def offboard_mode(self) -> str:
+        """GUIDED; words that are no mode while another station has control in it."""
+        return self._takeover.offboard_mode
 
     def on_link_loss(self) -> str:
         """Return the reaction to a lost link, from the failsafe for ground stations."""
@@ -310,18 +316,20 @@ class ArduPilot(MavlinkDriver):
     def _change_mode(self, mode: str) -> Step:
         if self._setpoints.following:
             self._setpoints.end_velocity()
-        return super()._change_mode(mode)
+        return mode_step(self.telemetry, mode, Ack.MODE, self._note_commanded, self._backend.set_mode)
 
     def _guided(self) -> Sequence[Step]:
         """Enter GUIDED and only then release manual control."""
         return (self._change_mode(GUIDED), self._release_step())
 
     def _release_step(self) -> Step:
-        return immediate_step("let go of the sticks", self._release)
-
-    def _release(self) -> None:
-        if self._setpoints.held is not None:
-            self._setpoints.release()
+        return Step(
+            ask="let go of the sticks",
+            send=self._setpoints.release,
+            done=lambda _: self._setpoints.held is None,
+            within=ANSWERED_WITHIN,
+            skippable=True,
+        )
 
     def _until_disarmed(self, mode: str, ask: str, within: Ns) -> Sequence[Step]:
         if not self.telemetry.armed:

@@ -329,19 +329,17 @@ class DjiDecoder:
             return
         if self.located_at > self._placed_at:
             self._placed_at = self.located_at
-            telemetry.update_position(self._at(self._altitude))
+            telemetry.update_position(self._at(self._place, self._altitude))
         if not isfinite(self._ground):
             telemetry.home = None
         elif not telemetry.armed or (telemetry.home is None and not telemetry.flying):
-            telemetry.home = self._at(self._ground)
+            telemetry.home = self._at(self._place, self._ground)
 
-    def _at(self, altitude: float) -> Position | None:
-        """Return the present place with a reported *altitude*, AMSL as far as home's is stated."""
-        if self._place is None:
-            return None
+    def _at(self, place: tuple[float, float], altitude: float) -> Position:
+        """Return *place* with a reported *altitude*, AMSL as far as home's is stated."""
         known = isfinite(self.home_altitude) and isfinite(self._ground)
         amsl = self.home_altitude + altitude - self._ground if known else altitude
-        return Position(*self._place, AMSL(amsl))
+        return Position(*place, AMSL(amsl))
 
     def add_text(self, severity: int, text: str) -> None:
         """Add a text about the aircraft, which sends none itself."""

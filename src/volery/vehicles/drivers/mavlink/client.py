@@ -408,7 +408,9 @@ class MavlinkClient:
         self._link.send(Frame(name, fields, GCS_SYSTEM, GCS_COMPONENT))
 
     def _send_to(self, name: str, **fields: Any) -> None:
-        self._send(name, target_system=self._system or 0, target_component=self._component, **fields)
+        """Send a message to the autopilot."""
+        to = {"target_system": self._system or 0, "target_component": self._component}
+        self._link.send(Frame(name, to | fields, GCS_SYSTEM, GCS_COMPONENT))
 
     def _command(self, command: str, *parameters: float) -> None:
         named = {f"param{number}": float(value) for number, value in enumerate(parameters, 1)}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
-from volery.base.errors import CapabilityError, LinkError, Refused
+from volery.base.errors import CapabilityError, Refused
 from volery.base.geoid import Geoid
 from volery.base.time import Ns, S
 from volery.kernel.api import Action, Kernel
@@ -110,6 +110,8 @@ class MavlinkDriver:
         self.name = name
         self.telemetry = backend.telemetry
         self.cycle: Action | None = backend.cycle
+        self.poll = backend.poll
+        self.problem = backend.problem
         self._kernel = kernel
         self._backend = backend
         self._takeover = Takeover(kernel, backend.telemetry, self.obeys)
@@ -119,19 +121,6 @@ class MavlinkDriver:
     def capabilities(self) -> frozenset[Capability]:
         """Capabilities of the kind of vehicle; none before the first message."""
         return _CAPABILITIES.get(self.telemetry.kind, _NONE)
-
-    @property
-    def offboard_mode(self) -> str:
-        """Mode in which it obeys; words that are no mode while another station has control in that mode."""
-        return self._takeover.offboard_mode
-
-    def poll(self) -> None:
-        """Process received messages without waiting."""
-        self._backend.poll()
-
-    def problem(self) -> LinkError | CapabilityError | None:
-        """Return what is wrong with the link, or why the vehicle is not supported, as an error to raise."""
-        return self._backend.problem()
 
     @abstractmethod
     def stop(self) -> None:
@@ -243,30 +232,6 @@ class MavlinkDriver:
         self.telemetry.mission_ended = False
 
     # -- common steps
-
-    @abstractmethod
-    def _note_commanded(self, mode: str) -> None:
-        """Note that this program commands *mode*."""
-
-    def _change_mode(self, mode: str) -> Step:
-        """Return a step that enters *mode*."""
-
-        def send() -> None:
-            self._note_commanded(mode)
-            self._backend.set_mode(mode)
-
-        if self.telemetry.mode == mode:
-            self._note_commanded(mode)  # the step will be skipped
-        return Step(
-            ask=f"change to {mode}",
-            send=send,
-            done=lambda seen: seen.mode == mode,
-            within=ANSWERED_WITHIN,
-            skippable=True,
-            answer=Ack.MODE,
-            again=S,
-            enters=mode,
-        )
 
     def _reach_home(self, mode: str, resting: str, within: Ns) -> Step:
         """Return a step that waits until a rover rests near home; there it may change to *resting*."""

@@ -314,8 +314,9 @@ class PaparazziDecoder:
         if self.origin is None:
             return
         self._flight_at = self._kernel.now()
-        telemetry.update_position(self.origin.position(_enu(fields, "")))
-        telemetry.above_home = telemetry.position.altitude.metres - self.origin.amsl
+        position = self.origin.position(_enu(fields, ""))
+        telemetry.update_position(position)
+        telemetry.above_home = position.altitude.metres - self.origin.amsl
         if telemetry.mode == GUIDED:
             telemetry.target = self.origin.position(_enu(fields, "carrot_"))
         north, east, up = (fields[name] * SPEED for name in ("vnorth", "veast", "vup"))

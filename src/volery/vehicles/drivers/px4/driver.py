@@ -65,6 +65,7 @@ from volery.vehicles.drivers.steps import (
     disarmed_step,
     heading_reached,
     immediate_step,
+    mode_step,
     send_nothing,
 )
 from volery.vehicles.telemetry import Telemetry, Velocity
@@ -392,6 +393,9 @@ class PX4(MavlinkDriver):
         )
 
     # -- common steps
+
+    def _change_mode(self, mode: str) -> Step:
+        return mode_step(self.telemetry, mode, Ack.MODE, self._note_commanded, self._backend.set_mode)
 
     def _note_commanded(self, mode: str) -> None:
         self._manual.note_commanded(mode)
