@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import isfinite, radians
 
-from volery.base.errors import CapabilityError, LinkError, Refused
+from volery.base.errors import CapabilityError, Refused
 from volery.base.frames import heading_to_yaw
 from volery.base.position import Position
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import Action, Kernel
 from volery.ros.messages.dji_constants import GUIDES, HEADERS, HEALTHY_GPS, DisplayMode, Source
-from volery.vehicles.driver import Capability, ManualControl, MissionItem, Step
+from volery.vehicles.driver import Capability, ManualControl, Step
 from volery.vehicles.drivers.dji.backend import QUIET, DjiBackend
 from volery.vehicles.drivers.dji.decoder import MOST_VOLTS, SETTLED, STALE, TAKEN_OVER_FOR
 from volery.vehicles.drivers.dji.missions import MissionRunner, above_home, check_amsl
@@ -63,9 +63,13 @@ class Dji:
         self._kernel = kernel
         self._backend = backend
         self._stream = backend.stream
-        self._steps = DjiSteps(name, backend)
-        self._tasks = DjiTasks(self._steps)
-        self._mission = MissionRunner(self._steps, self._tasks)
+        self._steps = steps = DjiSteps(name, backend)
+        self.problem, self.close, self.stop = backend.problem, backend.close, backend.stream.stop
+        tasks = DjiTasks(steps)
+        self.ready, self.arm, self.disarm = steps.ready, tasks.arm, tasks.disarm
+        self.takeoff, self.return_home, self.land = tasks.takeoff, tasks.return_home, tasks.land
+        mission = MissionRunner(steps, tasks)
+        self.upload, self.start_mission = mission.upload, mission.start
 
     @property
     def offboard_mode(self) -> str:
@@ -86,46 +90,12 @@ class Dji:
     def poll(self) -> None:
         """Do nothing: messages are processed as they arrive."""
 
-    def problem(self) -> LinkError | CapabilityError | None:
-        """Return what is wrong with the link, as an error to raise."""
-        return self._backend.problem()
-
     def on_link_loss(self) -> str:
         """Return the assumed reaction: neither public definitions nor parameters state it."""
         return (
             "it brakes and hovers where it is (assumed: within 0.5 s), until its battery is low, the pilot "
             "takes it or its transmitter is lost; landing, going home and missions go on"
         )
-
-    def close(self) -> None:
-        """Stop all communication."""
-        self._backend.close()
-
-    # -- tasks and motors
-
-    def ready(self, within: Ns) -> Sequence[Step]:
-        """Activate, wait for a healthy position, and set the local reference."""
-        return self._steps.ready(within)
-
-    def arm(self) -> Sequence[Step]:
-        """Start the motors."""
-        return self._tasks.arm()
-
-    def disarm(self, force: bool) -> Sequence[Step]:
-        """Stop the motors; in the air only with *force*."""
-        return self._tasks.disarm(force)
-
-    def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
-        """Start task 4, which climbs to a fixed height, then climb to *height* by set-points."""
-        return self._tasks.takeoff(height, within)
-
-    def return_home(self, within: Ns) -> Sequence[Step]:
-        """Start task 1: climb, go home and land; near home it lands at once."""
-        return self._tasks.return_home(within)
-
-    def land(self, within: Ns) -> Sequence[Step]:
-        """Start task 6; done when the motors have stopped."""
-        return self._tasks.land(within)
 
     # -- operations by set-points
 
@@ -231,20 +201,6 @@ class Dji:
         if self._stream.is_manual:
             self._stream.fresh = True
             self._backend.wake()
-
-    def stop(self) -> None:
-        """Stop sending set-points: it brakes and hovers."""
-        self._stream.stop()
-
-    # -- missions
-
-    def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
-        """Upload a mission as waypoints above the place of take-off."""
-        return self._mission.upload(mission)
-
-    def start_mission(self, within: Ns) -> Sequence[Step]:
-        """Take off and start the mission; done when landed, or at rest at its end in the air."""
-        return self._mission.start(within)
 
 
 ASSUMED: Mapping[str, str] = {

@@ -16,11 +16,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import radians
 
-from volery.base.errors import CapabilityError, LinkError, NotArrived, Refused
+from volery.base.errors import CapabilityError, NotArrived, Refused
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.vehicles.driver import Capability, ManualControl, MissionItem, Step
+from volery.vehicles.driver import Capability, MissionItem, Step
 from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
 from volery.vehicles.drivers.paparazzi.decoder import ATTITUDE_MODE, FAILSAFE, GUIDED, HEIGHT_MODE
 from volery.vehicles.drivers.paparazzi.sequences import PaparazziSteps
@@ -71,6 +71,8 @@ class Paparazzi:
         self._backend = backend
         self._steps = PaparazziSteps(kernel, backend)
         self._setpoints = self._steps.setpoints
+        self.problem = backend.problem
+        self.manual_control, self.stop = self._setpoints.set_control, self._setpoints.end
         self._takeoff_and_landing = TakeoffAndLanding(self._steps, blocks)
         self._takeover = Takeover(kernel, backend.telemetry, GUIDED)
 
@@ -98,10 +100,6 @@ class Paparazzi:
             f"goes on without end; in NAV (taking off, landing) it goes on with its plan{far}; flown by "
             "sticks it descends (FAILSAFE)"
         )
-
-    def problem(self) -> LinkError | CapabilityError | None:
-        """Return what is wrong with the link, or why the aircraft is not supported, as an error to raise."""
-        return self._backend.problem()
 
     def close(self) -> None:
         """Stop all communication and release the link."""
@@ -225,14 +223,6 @@ class Paparazzi:
     def manual(self) -> Sequence[Step]:
         """Raise ``CapabilityError``: this is for rovers."""
         raise CapabilityError(f"{self.name}: a rotorcraft has no wheels to steer by hand")
-
-    def manual_control(self, control: ManualControl | None) -> None:
-        """Repeat *control* while the mode is ours; ``None`` ends the repetition."""
-        self._setpoints.set_control(control)
-
-    def stop(self) -> None:
-        """Stop repeating set-points and manual control."""
-        self._setpoints.end()
 
     # -- missions
 
