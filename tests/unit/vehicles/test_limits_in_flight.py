@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from volery.base.errors import LowBattery, OutOfBounds, UsageError
-from volery.base.frames import LocalFrame
+from volery.base.frames import LocalFrame, Vector
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
@@ -142,3 +142,21 @@ def test_swapped_corners_are_recognised() -> None:
 def test_bounds_that_make_no_sense(make: Any, says: str) -> None:
     with pytest.raises(UsageError, match=says):
         make()
+
+
+def test_one_report_of_a_position_is_converted_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    converted: list[float] = []
+    to_enu = LocalFrame.to_enu
+
+    def counted(frame: LocalFrame, latitude: float, longitude: float, amsl: float) -> Vector:
+        converted.append(latitude)
+        return to_enu(frame, latitude, longitude, amsl)
+
+    bounds, here, goal = Bounds(HOME, Limits(farthest=50.0), None), place(0, 60), place(0, 40)
+    monkeypatch.setattr(LocalFrame, "to_enu", counted)
+    start, end = bounds.path(here, goal)
+    assert list(bounds.violations(here)) == ["farthest"]
+    assert (start[1], end[1]) == (pytest.approx(60.0, abs=0.01), pytest.approx(40.0, abs=0.01))
+    assert sorted(converted) == sorted([here.latitude, goal.latitude])
+    assert not bounds.violations(place(0, 40))
+    assert len(converted) == 3

@@ -87,16 +87,20 @@ def test_the_state_is_marked_stale_from_the_silence_until_it_is_fresh_again(benc
     at.fly(mission)
 
 
-def test_nothing_but_an_order_of_safety_is_sent_into_a_lost_link(bench: Make) -> None:
-    at = bench()
+@pytest.mark.parametrize(("stated", "silent_s"), [({}, 6.0), ({"link_timeout": S}, 1.5)])
+def test_nothing_but_an_order_of_safety_is_sent_into_a_lost_link(
+    bench: Make, stated: dict[str, int], silent_s: float
+) -> None:
+    at = bench(**stated)
 
     def mission(drone: Any) -> None:
         drone.takeoff(10)
         at.autopilot.mute = True
-        sleep(at.kernel, 6 * S)
+        sleep(at.kernel, round(silent_s * S))
         at.autopilot.received.clear()
         with pytest.raises(LinkLost):
             drone.goto(north(30))
+        sleep(at.kernel, S // 10)
         assert not at.autopilot.sent("SET_POSITION_TARGET_GLOBAL_INT")
         with pytest.raises(LinkLost):
             drone.land()
