@@ -71,7 +71,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "model": ("ruamel.yaml", "networkx"),
     "ros": ("rosbags", "lz4"),
     "report": ("jinja2",),
-    "analysis": ("matplotlib", "pyulog"),
+    "control": ("matplotlib", "pyulog"),
 }
 """Modules that each extra installs, as in ``pyproject.toml``."""
 

@@ -154,12 +154,14 @@ class StepResponse(NamedTuple):
         return abs(self.steady_error) / abs(self.size)
 
 
+LEAST_STEP = {"deg": 5.0, "rad": float(np.radians(5.0)), "m": 0.5, "deg/s": 10.0, "m/s": 0.5}
+"""Least size of a step that is worth a row, by unit."""
+
+
 def default_threshold(signal: Signal) -> float:
-    """Return the least size of a step that is worth a row: 5 degrees, or a tenth of the signal's range."""
-    if signal.unit == "deg":
-        return 5.0
-    if signal.unit == "rad":
-        return float(np.radians(5.0))
+    """Return the least size of a step: that of its unit, and for other units a tenth of the range."""
+    if signal.unit in LEAST_STEP:
+        return LEAST_STEP[signal.unit]
     spread = signal.goal if signal.goal is not None else signal.measured
     known = spread[np.isfinite(spread)]
     return max(float(np.ptp(known)) / 10.0, 1e-9) if len(known) else 1e-9
@@ -192,29 +194,21 @@ def step_responses(signal: Signal, least: float | None = None) -> list[StepRespo
 
 
 def _goal_levels(signal: Signal, threshold: float) -> list[tuple[float, float, float]]:
-    """Return start, end and set-point of each stretch after a step of the set-point.
+    """Return start, end and set-point of each step of the set-point.
 
-    A set-point that is still changing counts as one step to where it stands at last.
+    A step begins when the set-point leaves where it stood and ends at the next step, so a ramp counts as one
+    step. Stretches in which the set-point never stands are no steps. The set-point that is there at first is
+    a step from where the measurement is.
     """
     assert signal.goal is not None
-    times, goal = signal.times, signal.goal
-    known = np.isfinite(goal)
-    times, goal = times[known], goal[known]
-    if not len(times):
-        return []
-    changes = _differences(goal, signal.period)
-    moved = [int(index) + 1 for index in np.flatnonzero(np.abs(changes) > threshold * 1e-3)]
-    starts = [
-        index
-        for number, index in enumerate(moved)
-        if number == 0 or times[index] - times[moved[number - 1]] >= STANDS_S
-    ]
-    starts.insert(0, 0)  # the set-point that appears is a step, too, unless the measurement is there
+    known = np.isfinite(signal.goal)
+    times, goal = signal.times[known], _unwrapped(signal.goal[known], signal.period)
+    tolerance = threshold / 5.0
+    stands = _stretches(_rests(times, goal, tolerance), np.abs(np.diff(goal)) > tolerance)
     levels = []
-    for number, index in enumerate(starts):
-        stop = starts[number + 1] - 1 if number + 1 < len(starts) else len(times) - 1
-        if times[stop] - times[index] >= STANDS_S:
-            levels.append((float(times[index]), float(times[stop]), float(goal[stop])))
+    for number, (begin, end) in enumerate(stands):
+        first = stands[number - 1][1] if number else begin
+        levels.append((float(times[first]), float(times[end - 1]), float(np.median(goal[begin:end]))))
     return levels
 
 
@@ -244,9 +238,14 @@ def _rests(times: Array, values: Array, tolerance: float) -> NDArray[np.bool_]:
     return rests
 
 
-def _stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.view(np.int8), [0]))))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+def _stretches(flags: NDArray[np.bool_], breaks: NDArray[np.bool_] | None = None) -> list[tuple[int, int]]:
+    """Return begin and end of each stretch of True; it also ends before a sample that follows a break."""
+    changes = np.diff(np.concatenate(([0], flags.view(np.int8), [0])))
+    begins, ends = list(np.flatnonzero(changes == 1)), list(np.flatnonzero(changes == -1))
+    if breaks is not None:
+        inside = np.flatnonzero(breaks & flags[:-1] & flags[1:]) + 1
+        begins, ends = sorted([*begins, *inside]), sorted([*ends, *inside])
+    return [(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]
 
 
 def judge(signal: Signal, goal: float) -> StepResponse | None:
@@ -295,11 +294,6 @@ def judge(signal: Signal, goal: float) -> StepResponse | None:
         pushed=disturbance[2] if disturbance is not None else np.nan,
         recovery=disturbance[1] if disturbance is not None else np.nan,
     )
-
-
-def _differences(values: Array, period: float | None) -> Array:
-    steps = np.diff(values)
-    return np.asarray(wrap(steps, period)) if period is not None else steps
 
 
 def _unwrapped(values: Array, period: float | None) -> Array:
@@ -361,13 +355,14 @@ def _disturbance(times: Array, error: Array, band: float) -> tuple[float, float,
 
 
 COLUMNS = (
+    ("at", "start"),
     ("step", "size"),
     ("delay", "delay"),
     ("rise", "rise"),
-    ("overshoot", "overshoot"),
-    ("to 10 %", "settled_10"),
-    ("to 3 %", "settled_3"),
-    ("steady error", "steady_error"),
+    ("over", "overshoot"),
+    ("10 %", "settled_10"),
+    ("3 %", "settled_3"),
+    ("steady", "steady_error"),
     ("IAE", "iae"),
     ("ITAE", "itae"),
     ("recovery", "recovery"),

@@ -32,6 +32,7 @@ from volery.trace.events import (
     Activation,
     Call,
     Charge,
+    ControlSample,
     Event,
     Failure,
     LinkState,
@@ -313,6 +314,8 @@ def _story(journey: list[tuple[Ns, float, float, float]]) -> Iterator[Event]:
     yield Text(2 * S, "drone_1", 6, "EKF3 IMU0 is using GPS")
     yield Text(21 * S, "drone_2", 4, "Arm: Battery below minimum")
     yield LinkState(500 * MS, "drone_1", "up", "")
+    figures = 0.3, 0.2, 0.1, 0.1, 0.0, 0.0, 0.1
+    yield ControlSample(600 * MS, "drone_1", "altitude", "P", "m", 0.0, *figures)
     yield Failure(21 * S, "drone_2", "takeoff refused: Arm: Battery below minimum")
 
 

@@ -194,6 +194,28 @@ class Failure(NamedTuple):
     what: str
 
 
+class ControlSample(NamedTuple):
+    """One sample of a control loop: its terms in the unit of the output, the rest in ``unit``.
+
+    ``period`` is a full turn of an angle, 0.0 for another quantity. ``controller`` names the law. Before the
+    first measurement all of it is NaN.
+    """
+
+    at: Ns
+    vehicle: str
+    loop: str
+    controller: str
+    unit: str
+    period: float
+    goal: float
+    measurement: float
+    error: float
+    proportional: float
+    integral: float
+    derivative: float
+    output: float
+
+
 class Verdict(NamedTuple):
     """A requirement at the end of a run.
 
@@ -224,6 +246,7 @@ Event = (
     | LinkState
     | Failure
     | Verdict
+    | ControlSample
 )
 Record = Callable[[Any], None]
 """Records an ``Event``: what a package that records events is given."""

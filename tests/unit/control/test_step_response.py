@@ -104,7 +104,7 @@ def test_each_step_has_a_row():
 def test_a_ramped_set_point_is_one_step():
     goal = np.clip(TIMES - 5.0, 0.0, 3.0) * 30.0
     found = response_of(Signal("yaw", "deg", TIMES, goal, goal, 360.0))
-    assert found.size == pytest.approx(90.0, abs=0.5)
+    assert found.size == pytest.approx(90.0, abs=1.5)  # it begins when the ramp leaves its level
 
 
 def test_without_set_points_movements_between_rests_are_steps():

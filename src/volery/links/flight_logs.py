@@ -1,0 +1,197 @@
+"""Flight logs as tables of numbers: MAVLink telemetry logs, ArduPilot's DataFlash logs and PX4's ULog.
+
+A table holds the numeric fields of one type of message, each as an array, and ``time`` in seconds since the
+start of the log. Formats are recognised by their first bytes and not by their names. The libraries of the
+autopilots' projects decode DataFlash (pymavlink) and ULog (pyulog).
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Iterable, Mapping
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pymavlink import DFReader
+
+from volery.base.errors import UsageError
+from volery.base.installed import require_extra
+from volery.links.mavlink_messages import constant
+from volery.links.tlog import read_tlog
+
+Table = Mapping[str, NDArray[np.float64]]
+Tables = dict[str, Table]
+
+TIME = "time"
+STATION = "station."
+"""Prefix of the messages that a ground station sent."""
+DATAFLASH, ULOG, TLOG = "DataFlash", "ULog", "tlog"
+_ULOG_MAGIC = b"ULog\x01\x12\x35"
+_DATAFLASH_HEAD = b"\xa3\x95"
+_DAMAGE = (
+    struct.error,
+    EOFError,
+    OSError,
+    LookupError,
+    TypeError,
+    ValueError,
+    AttributeError,
+    ArithmeticError,
+)
+"""What the libraries raise at damaged bytes."""
+_NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
+
+
+def log_format(path: Path) -> str:
+    """Return the format of a log.
+
+    Raises:
+        UsageError: the file cannot be read, is empty or is no flight log.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(4096)
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
+    if not head:
+        raise UsageError(f"{path} is empty: it has 0 bytes")
+    if head.startswith(_ULOG_MAGIC):
+        return ULOG
+    if head.startswith((_DATAFLASH_HEAD, b"FMT, ")):
+        return DATAFLASH
+    if any(head[at] in (0xFD, 0xFE) for at in range(8, min(len(head), 2048))):
+        return TLOG
+    raise UsageError(
+        f"{path} is no flight log: it begins as none of a tlog, a DataFlash log (.bin) or a ULog (.ulg)"
+    )
+
+
+def read_flight_log(path: Path, wanted: Collection[str] = ()) -> Tables:
+    """Return the tables of a log.
+
+    A log that is cut or damaged is read as far as that is possible.
+
+    Args:
+        path: a tlog, a DataFlash log (binary or text) or a ULog.
+        wanted: names of the messages to read; all if empty. Reading few is faster.
+
+    Raises:
+        UsageError: the file cannot be read, or holds no message that is wanted.
+    """
+    kind = log_format(path)
+    read = {DATAFLASH: _dataflash, ULOG: _ulog, TLOG: _tlog}[kind]
+    tables = read(path, set(wanted))
+    if not tables:
+        names = f" among {', '.join(sorted(wanted))}" if wanted else ""
+        raise UsageError(f"{path} ({kind}) holds no message{names}; was it cut before its first one?")
+    return tables
+
+
+class _Rows:
+    """Rows of the numeric fields of messages, collected message by message."""
+
+    def __init__(self) -> None:
+        self._rows: dict[str, tuple[tuple[str, ...], list[tuple[float, ...]]]] = {}
+
+    def add(self, name: str, time: float, fields: Mapping[str, Any]) -> None:
+        """Add the numbers of one message; elements of an array are ``field[0]``, ``field[1]`` ..."""
+        numbers: dict[str, float] = {TIME: time}
+        for key, value in fields.items():
+            if isinstance(value, int | float):
+                numbers[key] = float(value)
+            elif isinstance(value, list | tuple) and len(value) <= _LONGEST_ARRAY:
+                for index, one in enumerate(value):
+                    if isinstance(one, int | float):
+                        numbers[f"{key}[{index}]"] = float(one)
+        columns, rows = self._rows.setdefault(name, (tuple(numbers), []))
+        if columns == tuple(numbers):
+            rows.append(tuple(numbers.values()))
+
+    def tables(self) -> Tables:
+        """Return what was collected, with times since the first row of all."""
+        starts = [rows[0][0] for _, rows in self._rows.values() if rows]
+        start = min(starts, default=0.0)
+        made: Tables = {}
+        for name, (columns, rows) in self._rows.items():
+            values = np.array(rows, dtype=float)
+            values[:, 0] -= start
+            made[name] = {column: values[:, index] for index, column in enumerate(columns)}
+        return made
+
+
+_LONGEST_ARRAY = 8
+
+
+def _tlog(path: Path, wanted: set[str]) -> Tables:
+    """Read the messages of the first autopilot; those of other systems are the ground stations'."""
+    rows = _Rows()
+    autopilot = 0
+    early = []
+    for at_us, frame in read_tlog(path):
+        if not autopilot and frame.name == "HEARTBEAT" and frame.fields["autopilot"] != _NO_AUTOPILOT:
+            autopilot = frame.system
+        if wanted and frame.name not in wanted and f"{STATION}{frame.name}" not in wanted:
+            continue
+        early.append((at_us, frame))
+    for at_us, frame in early:
+        name = frame.name if frame.system == autopilot else f"{STATION}{frame.name}"
+        if not wanted or name in wanted:
+            rows.add(name, at_us / 1e6, frame.fields)
+    return rows.tables()
+
+
+def _dataflash(path: Path, wanted: set[str]) -> Tables:
+    rows = _Rows()
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # it prints what is damaged
+        try:
+            binary = path.open("rb").read(2) == _DATAFLASH_HEAD
+            kind = DFReader.DFReader_binary if binary else DFReader.DFReader_text
+            reader = kind(str(path))
+            names = list(wanted) or None
+            while (message := reader.recv_match(type=names)) is not None:
+                fields = {key: getattr(message, key) for key in message._fieldnames}
+                time = fields.pop("TimeUS", None)
+                instance = fields.get("I")
+                name = message.get_type()
+                if isinstance(instance, int) and instance > 0 and name not in {"MODE", "EV"}:
+                    name = f"{name}[{instance}]"
+                if time is not None:
+                    rows.add(name, time / 1e6, fields)
+        except _DAMAGE:
+            pass  # what was read up to the damage counts
+    return rows.tables()
+
+
+def _ulog(path: Path, wanted: set[str]) -> Tables:
+    require_extra("control", "logs of PX4")
+    from pyulog import ULog
+
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+        try:
+            log = ULog(str(path), sorted(wanted) or None, disable_str_exceptions=True)
+        except _DAMAGE as error:
+            raise UsageError(f"{path} is a damaged ULog: {error}") from error
+    tables: Tables = {}
+    for data in sorted(log.data_list, key=lambda one: (one.name, one.multi_id)):
+        name = data.name if data.multi_id == 0 else f"{data.name}[{data.multi_id}]"
+        columns = {
+            key: np.asarray(values, dtype=float)
+            for key, values in data.data.items()
+            if np.issubdtype(np.asarray(values).dtype, np.number)
+        }
+        stamps = columns.pop("timestamp", None)
+        if stamps is not None and len(stamps):
+            tables[name] = {TIME: (stamps - log.start_timestamp) / 1e6, **columns}
+    return tables
+
+
+def columns_of(tables: Mapping[str, Table]) -> Iterable[str]:
+    """Yield the names ``TABLE.column`` of every column but the times."""
+    for name in sorted(tables):
+        for column in tables[name]:
+            if column != TIME:
+                yield f"{name}.{column}"

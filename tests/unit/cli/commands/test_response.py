@@ -1,0 +1,72 @@
+"""``volery response``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from rigs.flight_log_files import dataflash
+from volery.cli.main import app
+
+
+def run(*arguments: object) -> Any:
+    return CliRunner().invoke(app, ["response", *(str(one) for one in arguments)])
+
+
+def turn(path: Path, lag: float) -> Path:
+    times = np.arange(0.0, 10.0, 0.05)
+    yaw = 90.0 * (1.0 - np.exp(-np.maximum(times - 2.0, 0.0) / lag))
+    rows = zip(times, np.where(times >= 2.0, 90.0, 0.0), yaw, strict=True)
+    return dataflash(path, {"ATT": ("DesYaw,Yaw", rows)})
+
+
+def test_a_step_is_judged(tmp_path: Path) -> None:
+    log = turn(tmp_path / "a.bin", 0.5)
+    shown = run(log)
+    assert shown.exit_code == 0
+    assert "yaw in deg" in shown.stdout
+    (found,) = json.loads(run(log, "--json").stdout)
+    assert found["steps"][0]["settled_10"] == pytest.approx(1.15, abs=0.06)
+
+
+def test_several_records_are_compared_and_drawn(tmp_path: Path) -> None:
+    fast, slow = turn(tmp_path / "fast.bin", 0.3), turn(tmp_path / "slow.bin", 1.0)
+    figure = tmp_path / "figure.png"
+    shown = run(fast, slow, "--plot", figure)
+    assert shown.exit_code == 0
+    assert "fast.bin" in shown.stdout
+    assert "slow.bin" in shown.stdout
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    assert run(fast, "--plot", tmp_path / "one.svg").exit_code == 0
+    assert b"<svg" in (tmp_path / "one.svg").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("nowhere.bin",), "there is no file or folder nowhere.bin"),
+        (("LOG", "--signal", "warp"), "no signal 'warp'; it has yaw"),
+        (("LOG", "--plot", "figure.bmp"), "a figure is a .png"),
+        (("LOG", "--plot", "nowhere/figure.png"), "no folder nowhere"),
+        (("LOG", "--goal", "ATT.Yaw"), "state --measured"),
+        (("LOG", "--step", "-3"), "above 0"),
+        (("EMPTY",), "is empty"),
+    ],
+)
+def test_bad_input_is_named(tmp_path: Path, arguments: tuple[str, ...], said: str) -> None:
+    files = {"LOG": turn(tmp_path / "a.bin", 0.5), "EMPTY": tmp_path / "empty.tlog"}
+    files["EMPTY"].touch()
+    result = run(*(files.get(one, one) for one in arguments))
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_a_record_without_steps_says_so(tmp_path: Path) -> None:
+    log = turn(tmp_path / "a.bin", 0.5)
+    assert "no step was found" in run(log, "--step", "500").stdout

@@ -1,0 +1,103 @@
+"""Flight logs become tables of numbers; damaged ones as far as they can be read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rigs.flight_log_files import dataflash, tlog, ulog
+from volery.base.errors import UsageError
+from volery.links.flight_logs import DATAFLASH, TLOG, ULOG, columns_of, log_format, read_flight_log
+from volery.links.link import Frame
+
+BEAT = Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "custom_mode": 4, "mavlink_version": 3}, 1, 1)
+
+
+def attitude(yaw: float, system: int = 1) -> Frame:
+    return Frame("ATTITUDE", {"time_boot_ms": 1, "yaw": yaw}, system, 1)
+
+
+@pytest.fixture
+def copter(tmp_path: Path) -> Path:
+    rows = [(0.1 * step, 90.0, 9.0 * step) for step in range(20)]
+    return dataflash(tmp_path / "00000001.BIN", {"ATT": ("DesYaw,Yaw", rows), "CTUN": ("Alt", [(0.0, 1.5)])})
+
+
+@pytest.fixture
+def px4(tmp_path: Path) -> Path:
+    rows = [(0.1 * step, 1.0, 0.0, 0.0, 0.5 * step) for step in range(20)]
+    return ulog(tmp_path / "log.ulg", {"vehicle_attitude": ("float[4] q", rows)})
+
+
+@pytest.fixture
+def station(tmp_path: Path) -> Path:
+    frames = [(0.0, BEAT), *((0.1 * step, attitude(0.1 * step)) for step in range(1, 20))]
+    turn = Frame("COMMAND_LONG", {"target_system": 1, "command": 115, "param1": 90.0}, 255, 190)
+    return tlog(tmp_path / "flight.tlog", [*frames, (2.5, turn)])
+
+
+def test_formats_are_recognised_by_content(copter: Path, px4: Path, station: Path) -> None:
+    assert [log_format(one) for one in (copter, px4, station)] == [DATAFLASH, ULOG, TLOG]
+
+
+def test_a_dataflash_log(copter: Path) -> None:
+    tables = read_flight_log(copter)
+    assert tables["ATT"]["Yaw"].tolist() == [9.0 * step for step in range(20)]
+    assert tables["ATT"]["time"] == pytest.approx(np.arange(20) * 0.1)
+    assert tables["CTUN"]["Alt"].tolist() == [1.5]
+    assert set(read_flight_log(copter, {"CTUN"})) == {"CTUN"}
+
+
+def test_a_ulog(px4: Path) -> None:
+    table = read_flight_log(px4)["vehicle_attitude"]
+    assert table["q[3]"].tolist() == [0.5 * step for step in range(20)]
+    assert table["time"] == pytest.approx(np.arange(20) * 0.1)
+
+
+def test_a_tlog_keeps_the_station_apart(station: Path) -> None:
+    tables = read_flight_log(station)
+    assert tables["ATTITUDE"]["yaw"] == pytest.approx(0.1 * np.arange(1, 20))
+    assert tables["station.COMMAND_LONG"]["param1"].tolist() == [90.0]
+    assert "ATTITUDE.yaw" in list(columns_of(tables))
+    assert "ATTITUDE.time" not in list(columns_of(tables))
+
+
+def test_a_log_that_was_cut_is_read_up_to_the_cut(copter: Path, px4: Path, station: Path) -> None:
+    for path, table in ((copter, "ATT"), (px4, "vehicle_attitude"), (station, "ATTITUDE")):
+        whole = read_flight_log(path)[table]
+        path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
+        part = read_flight_log(path)[table]
+        assert 3 < len(part["time"]) <= len(whole["time"])
+
+
+def test_damage_inside_a_log_does_not_end_it(copter: Path) -> None:
+    data = bytearray(copter.read_bytes())
+    data[400:410] = bytes(10)
+    copter.write_bytes(data)
+    assert len(read_flight_log(copter)["ATT"]["time"]) >= 15
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "is empty"),
+        (b"time,yaw\n0.0,1.0\n", "no flight log"),
+        (b"ULog\x01\x12\x35\x01" + bytes(8), "holds no message|damaged ULog"),
+        (b"\xa3\x95\x80", "holds no message"),
+    ],
+)
+def test_what_is_no_log_is_refused_by_name(tmp_path: Path, content: bytes, said: str) -> None:
+    path = tmp_path / "wrong.log"
+    path.write_bytes(content)
+    with pytest.raises(UsageError, match=said) as error:
+        read_flight_log(path)
+    assert "wrong.log" in str(error.value)
+
+
+def test_a_missing_file_and_missing_messages_are_named(tmp_path: Path, copter: Path) -> None:
+    with pytest.raises(UsageError, match="nowhere"):
+        read_flight_log(tmp_path / "nowhere.bin")
+    with pytest.raises(UsageError, match="no message among GPS"):
+        read_flight_log(copter, {"GPS"})
