@@ -182,7 +182,7 @@ class Tariff:
     def _compute(self, call: str, x: float) -> Price:
         name = _SPIN.get(x, call) if call == "spin_once" else call
         if name in (*BACKGROUND_EVENTS, *SERVICE_CALLS) and name not in self._parts:
-            return NO_PRICE
+            return self._keep(call, x, NO_PRICE)
         if name not in self._parts:
             name = WARM_CALLS.get(name, name)
         if name not in self._parts:
@@ -198,7 +198,9 @@ class Tariff:
                 f"{self.frequency_mhz:g} MHz; they hold from {self.law.least_mhz:g} to "
                 f"{self.law.greatest_mhz:g} MHz"
             )
-        price = self._split(name, constant, variable, x)
+        return self._keep(call, x, self._split(name, constant, variable, x))
+
+    def _keep(self, call: str, x: float, price: Price) -> Price:
         if len(self._known) < _MAX_CACHED:
             self._known[call, x] = price
         return price

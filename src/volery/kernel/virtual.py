@@ -2,7 +2,7 @@
 
 The hub is a greenlet of its own that takes events from the heap: framework callbacks execute there, and tasks
 are started from there. A task that blocks switches directly to the next task where the next event is one
-(``_switch``), and does not switch at all where no event precedes the end of its wait (``skip``). Every entry
+(``park``), and does not switch at all where no event precedes the end of its wait (``skip``). Every entry
 of the heap has a ticket; an entry is void once its target has another one. Threads that pass a baton were
 measured to be fifty times slower than greenlets, and generators would make every blocking call of a component
 visible in its code.
@@ -199,8 +199,11 @@ class VirtualKernel:
         """Deliver a pending cancellation, else block until the pending execution time has been served."""
         if task.pending_cancellation is not None:
             self._cancel_task(task)
-        amount = task.take_pending()
-        processor = task.contexts[-1].processor
+        context = task.contexts[-1]
+        amount, task.pending_ns = task.pending_ns, 0
+        if context.meter is not None:
+            amount += context.meter()
+        processor = context.processor
         if amount and processor is not None:
             processor.serve(task, amount)
 
@@ -222,12 +225,13 @@ class VirtualKernel:
     def sleep_until(self, when: Ns) -> None:
         """Spend the pending execution time, then block the current task until `when`, ns.
 
-        The most frequent call of a simulation: ``skip``, ``park`` and ``_switch`` are written out here.
+        The most frequent call of a simulation: what it calls otherwise is written out here.
         """
         task = self._current
         if task is None:
             raise UsageError("a framework callback must not block, but waits for a time")
-        self.__enter__()
+        if task.pending_ns or task.pending_cancellation is not None or task.contexts[-1].meter is not None:
+            self._interact(task)
         if when <= self._now:
             return
         due, due_ticket, target = self._heap[0]
@@ -269,7 +273,14 @@ class VirtualKernel:
         task.ticket = next(self._tickets)
         if deadline is not None:
             heappush(self._heap, (max(deadline, self._now), task.ticket, task))
-        self._switch()
+        due, ticket, target = self._heap[0]
+        if due <= self._horizon and target.ticket == ticket and type(target) is Task:
+            heappop(self._heap)
+            self._now = due
+            self._current = target
+            target.flow.switch()
+        else:
+            self._switch_to_hub()
         if task.pending_cancellation is not None:
             self._cancel_task(task)
         return task.woken
@@ -288,17 +299,6 @@ class VirtualKernel:
             self.wake(task)
 
     # -- context switches
-
-    def _switch(self) -> None:
-        """Switch to the next event: directly if that is a task, else through the hub."""
-        due, ticket, target = self._heap[0]
-        if due <= self._horizon and target.ticket == ticket and type(target) is Task:
-            heappop(self._heap)
-            self._now = due
-            self._current = target
-            target.flow.switch()
-        else:
-            self._switch_to_hub()
 
     def _switch_to_hub(self) -> None:
         if self._hub is None:

@@ -27,6 +27,7 @@ Predicate = Callable[[], object]
 MAX_PERIODS_LATE = 2
 """A loop that is later than this does not catch up but counts anew, as rospy's ``Rate`` does."""
 
+_NO_TASK = "only a task can wait: call this from a component, or from a script within adopt()"
 _FRAMEWORK = __name__.partition(".")[0] + "."
 
 
@@ -34,7 +35,7 @@ def current_task(kernel: Kernel) -> Task:
     """Return the running task; raise ``UsageError`` in a framework callback, which must not wait."""
     task = kernel.current()
     if task is None:
-        raise UsageError("only a task can wait: call this from a component, or from a script within adopt()")
+        raise UsageError(_NO_TASK)
     return task
 
 
@@ -102,21 +103,22 @@ def _place_of_caller() -> object:
 def sleep(kernel: Kernel, duration: Ns) -> None:
     """Block the current task for `duration` ns, counted from when its computing so far has been served."""
     with kernel:
-        sleep_within(kernel, duration)
+        sleep_within(kernel, duration, kernel.now())
 
 
-def sleep_within(kernel: Kernel, duration: Ns) -> None:
-    """``sleep`` for a caller that is within ``with kernel`` already."""
+def sleep_within(kernel: Kernel, duration: Ns, now: Ns) -> None:
+    """``sleep`` for a caller that is within ``with kernel`` already, at the time `now`."""
+    task = kernel.current()
     if duration > 0:
-        task = current_task(kernel)
-        due = kernel.now() + duration
-        end_activation(kernel, task)
-        kernel.sleep_until(due)
-        task.release(due)
-        return
-    late = kernel.current()
-    if late is not None:
-        _end_if_late(kernel, late, kernel.now())
+        if task is None:
+            raise UsageError(_NO_TASK)
+        activation = task.finish(now)
+        if activation is not None:
+            kernel.record(activation)
+        kernel.sleep_until(now + duration)
+        task.release(now + duration)
+    elif task is not None:
+        _end_if_late(kernel, task, now)
 
 
 class Rate:

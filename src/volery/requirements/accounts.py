@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from math import fsum
-from operator import itemgetter
 from typing import Any, NamedTuple
 
 from volery.base.time import Ns, to_seconds
@@ -101,7 +100,7 @@ class Accounts:
         self._failures: list[Failure] = []
         self._warnings = dict.fromkeys(setup.warnings)
         self.last: Ns = 0
-        self._folds: dict[type[Any], Callable[[Any], Ns]] = {
+        self._listeners: dict[type[Any], Record] = {
             Slice: self._slice,
             Preemption: self._preemption,
             Message: self._message,
@@ -122,53 +121,58 @@ class Accounts:
 
     def listener(self, kind: type[Any]) -> Record:
         """Return what adds events of *kind*; of kinds without an account, only the time counts."""
-        fold: Callable[[Any], Ns] = self._folds.get(kind, itemgetter(0))
-
-        def take(event: Any) -> None:
-            at = fold(event)
-            if at > self.last:  # noqa: PLR1730  # half the time of max(), for every event of a run
-                self.last = at
-
-        return take
+        return self._listeners.get(kind, self._other)
 
     def _component(self, name: str, processor: str) -> ComponentLedger:
-        ledger = self._components.get(name)
-        if ledger is None:
-            ledger = self._components[name] = ComponentLedger(ComponentSetup(name), processor)
+        """Return the ledger of a component that is not in the set-up."""
+        ledger = self._components[name] = ComponentLedger(ComponentSetup(name), processor)
         return ledger
 
-    def _slice(self, event: Slice) -> Ns:
-        ran = event.end - event.start
-        self._component(event.component, event.processor).executed += ran
-        if event.processor not in self._busy:
-            self._processors[event.processor] = ProcessorSetup(event.processor)
-            self._busy[event.processor] = 0
-        self._busy[event.processor] += ran
-        self._demands.slice(event)
-        return event.end
+    def _other(self, event: Any) -> None:
+        at = event[0]
+        self.last = at if at > self.last else self.last  # half the time of max(), for every event of a run
 
-    def _preemption(self, event: Preemption) -> Ns:
+    def _slice(self, event: Slice) -> None:
+        start, at, processor, _, _, component = event  # the time of an event is its end
+        ran = at - start
+        ledger = self._components.get(component) or self._component(component, processor)
+        ledger.executed += ran
+        if processor not in self._busy:
+            self._processors[processor] = ProcessorSetup(processor)
+            self._busy[processor] = 0
+        self._busy[processor] += ran
+        self._demands.slice(event)
+        self.last = at if at > self.last else self.last
+
+    def _preemption(self, event: Preemption) -> None:
         key = event.processor, event.preempted, event.by
         self._preemptions[key] = self._preemptions.get(key, 0) + 1
-        return event.at
+        self._other(event)
 
-    def _message(self, event: Message) -> Ns:
+    def _message(self, event: Message) -> None:
         for chain in self._chains.values():
             chain.message(event)
-        return event.sent if event.received == NONE else event.received
+        at = event.sent if event.received == NONE else event.received
+        self.last = at if at > self.last else self.last
 
-    def _charge(self, event: Charge) -> Ns:
-        self._component(event.component, event.processor).charge(event)
-        return event.at
+    def _charge(self, event: Charge) -> None:
+        at, component, processor = event[:3]
+        ledger = self._components.get(component) or self._component(component, processor)
+        ledger.charge(event)
+        self.last = at if at > self.last else self.last
 
-    def _activation(self, event: Activation) -> Ns:
-        self._component(event.component, "").activation(event)
-        self._demands.activation(event)
-        return event.finished
+    def _activation(self, event: Activation) -> None:
+        at, component = event.finished, event.component
+        ledger = self._components.get(component) or self._component(component, "")
+        ledger.activation(event)
+        if self._processors:  # bounds are those of processors
+            self._demands.activation(event)
+        self.last = at if at > self.last else self.last
 
-    def _call(self, event: Call) -> Ns:
-        self._component(event.callee, "").call(event)
-        return event.end
+    def _call(self, event: Call) -> None:
+        ledger = self._components.get(event.callee) or self._component(event.callee, "")
+        ledger.call(event)
+        self.last = event.end if event.end > self.last else self.last
 
     def _vehicle(self, name: str) -> VehicleLedger:
         ledger = self._vehicles.get(name)
@@ -176,31 +180,31 @@ class Accounts:
             ledger = self._vehicles[name] = VehicleLedger(VehicleSetup(name))
         return ledger
 
-    def _vehicle_state(self, event: VehicleState) -> Ns:
+    def _vehicle_state(self, event: VehicleState) -> None:
         self._vehicle(event.vehicle).state(event)
-        return event.at
+        self._other(event)
 
-    def _operation(self, event: Operation) -> Ns:
+    def _operation(self, event: Operation) -> None:
         self._vehicle(event.vehicle).operations.append(event)
-        return event.end
+        self.last = event.end if event.end > self.last else self.last
 
-    def _milestone(self, event: Milestone) -> Ns:
+    def _milestone(self, event: Milestone) -> None:
         if event.kind == PARCEL:
             self._parcels.setdefault(event.subject, []).append(event)
-        return event.at
+        self._other(event)
 
-    def _failure(self, event: Failure) -> Ns:
+    def _failure(self, event: Failure) -> None:
         self._failures.append(event)
-        return event.at
+        self._other(event)
 
-    def _verdict(self, event: Verdict) -> Ns:
+    def _verdict(self, event: Verdict) -> None:
         self._verdicts[event.requirement] = event
-        return event.at
+        self._other(event)
 
-    def _text(self, event: Text) -> Ns:
+    def _text(self, event: Text) -> None:
         if event.source == FRAMEWORK and event.severity <= WARNING:
             self._warnings[event.text] = None
-        return event.at
+        self._other(event)
 
     def record(
         self,

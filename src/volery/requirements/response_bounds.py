@@ -117,38 +117,45 @@ def response_bounds(
     for task in every:
         urgent = [one for one in every if one is not task and one.priority >= task.least_priority]
         if cores == 1:
-            bounds[task.name] = _bound(task, _OneCore(urgent, loads))
+            bounds[task.name] = bound_of(task, OneCore(urgent, loads))
             continue
         known = [(one, bound) for one in urgent if (bound := bounds.get(one.name)) is not None]
         others = [seen.get(one.name, Load(WINDOW)) for one in urgent if bounds.get(one.name) is None]
-        bounds[task.name] = _bound(task, _Cores(known, [*loads, *others], cores))
+        bounds[task.name] = bound_of(task, ManyCores(known, [*loads, *others], cores))
     return bounds
 
 
 @dataclass(frozen=True)
-class _OneCore:
+class OneCore:
+    """Interference on one core: more urgent tasks, and loads."""
+
     urgent: Sequence[Demand]
     loads: Sequence[Load]
 
     def interference(self, window: Ns, own: Ns) -> Ns:
+        """Return the most in a *window* in which the task executes *own*, ns."""
         executed = sum(one.cost(one.released_within(window)) for one in self.urgent)
         return executed + sum(min(load.within(window), window) for load in self.loads)
 
 
 @dataclass(frozen=True)
-class _Cores:
+class ManyCores:
+    """Interference on several cores: more urgent tasks with their bounds, and loads."""
+
     urgent: Sequence[tuple[Demand, Ns]]
     loads: Sequence[Load]
     cores: int
 
     def interference(self, window: Ns, own: Ns) -> Ns:
+        """Return the most in a *window* in which the task executes *own*, ns."""
         room = window - own + STEP
         work = [one.cost(one.released_within(window + bound)) for one, bound in self.urgent]
         work += [load.within(window) // self.cores for load in self.loads for _ in range(self.cores)]
         return sum(min(one, room) for one in work) // self.cores
 
 
-def _bound(task: Demand, others: _OneCore | _Cores) -> Ns | None:
+def bound_of(task: Demand, others: OneCore | ManyCores) -> Ns | None:
+    """Return the bound of one task, None where none was found."""
     longest = window = steps = 0
     for activations in range(1, MOST_ACTIVATIONS + 1):
         own = task.cost(activations)
@@ -189,18 +196,14 @@ class _Releases:
             kept = [min(one, event.released) for one in self._last]
             self._last = deque(kept, maxlen=IN_A_ROW + 1)
         self._last.append(event.released)
-        recent = list(self._last)
+        recent, spans = list(self._last), self.spans
         for end in range(len(recent) - 1, 0 if late else len(recent) - 2, -1):
-            self._look_back(recent, end)
-
-    def _look_back(self, recent: list[Ns], end: int) -> None:
-        spans = self.spans
-        for back in range(1, end + 1):
-            span = recent[end] - recent[end - back]
-            if back > len(spans):
-                spans.append(span)
-            elif span < spans[back - 1]:
-                spans[back - 1] = span
+            for back in range(1, end + 1):
+                span = recent[end] - recent[end - back]
+                if back > len(spans):
+                    spans.append(span)
+                elif span < spans[back - 1]:
+                    spans[back - 1] = span
 
     def curve(self, period: Ns) -> tuple[Ns, ...]:
         """Return the least times that 2, 3, ... releases take; empty if they are unknown."""
@@ -244,19 +247,19 @@ class Demands:
 
     def slice(self, event: Slice) -> None:
         """Add a slice of a task."""
-        owner = _owner(event.task)
+        task, start = event.task, event.start
+        # the component of the task: drone/mavros for "drone/mavros (set-points)"
+        owner = task if task.endswith(BACKGROUND) else task.partition(" (")[0]
         where = self._work.setdefault(owner, {})
         work = where.get(event.processor)
         if work is None:
             work = where[event.processor] = _Work()
-        work.since += event.end - event.start
+        work.since += event.end - start
         work.places[event.component] = None
-        self._in_windows((event.processor, owner), event.start, event.end)
-
-    def _in_windows(self, who: tuple[str, str], start: Ns, end: Ns) -> None:
-        while start < end:
+        who = event.processor, owner
+        while start < event.end:
             window = start // WINDOW
-            until = min(end, (window + 1) * WINDOW)
+            until = min(event.end, (window + 1) * WINDOW)
             before = self._windows.get(who, (window, 0))
             executed = until - start + (before[1] if before[0] == window else 0)
             self._windows[who] = window, executed
@@ -316,8 +319,3 @@ class Demands:
         visited = [one for place in work.places if (one := components.get(place)) is not None]
         priorities = [setup.priority, *(one.priority for one in visited if one.active)]
         return Demand(name, max(priorities), tuple(work.costs), spans, min(priorities))
-
-
-def _owner(task: str) -> str:
-    """Return the component of *task*: ``drone/mavros`` for ``drone/mavros (set-points)``."""
-    return task if task.endswith(BACKGROUND) else task.partition(" (")[0]

@@ -43,7 +43,7 @@ class CallbackGroup:
         self._start = start
         self._ready: deque[Work] = deque()
         self._waiting: list[Task] = []
-        self._spun = False
+        self._spin: float = FIRST  # the x of the next ``spin_once``
         self.on_ready: Callable[[], None] | None = None
 
     def __len__(self) -> int:
@@ -96,7 +96,8 @@ class CallbackGroup:
                     self._wait(task, None if within is None else kernel.now() + within)
                 work = self._ready.popleft() if self._ready else None
                 task.release(work.arrived if work else kernel.now())
-                self._charge_spin()
+                self._node.consume("spin_once", self._spin)
+                self._spin = NEXT
         if work is None:
             return False
         work.run()
@@ -117,8 +118,8 @@ class CallbackGroup:
             self.spin_once()
 
     def _charge_spin(self) -> None:
-        self._node.consume("spin_once", NEXT if self._spun else FIRST)
-        self._spun = True
+        self._node.consume("spin_once", self._spin)
+        self._spin = NEXT
 
     def _wait(self, task: Task, deadline: Ns | None) -> None:
         """Block until a callback is ready, the node is closed, or `deadline`, ns, has passed."""

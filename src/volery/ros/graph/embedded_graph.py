@@ -129,8 +129,7 @@ class LocalNode:
     def sleep(self, duration: Ns) -> None:
         """Block the current task for `duration` ns; what the sleep itself takes is executed meanwhile."""
         with self._graph.kernel as kernel:
-            self._node.consume("sleep", max(duration, 0) / US)
-            sleep_within(kernel, duration)
+            sleep_within(kernel, duration, self._node.consume("sleep", max(duration, 0) / US))
 
     def now(self) -> Ns:
         """Return ROS time, ns. An interaction point."""

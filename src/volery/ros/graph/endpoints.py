@@ -137,12 +137,12 @@ class EmbeddedPublisher:
             if not isinstance(message, self._class):
                 kind = getattr(message, "__msgtype__", "") or f"a {type(message).__name__}"
                 raise UsageError(f"topic {self.topic} carries {self.type}, not {kind}")
-            node.consume("publish", float(len(self._connections)))
+            sent = node.consume("publish", float(len(self._connections)))
             connections = self._connections
             if not (connections or self._recorded or self._latches):
                 return
             content = node.graph.copy(message) if node.graph.as_bytes else message.copy()
-            sent, size = kernel.now(), 0
+            size = 0
             if self._recorded:
                 data = copied_to_cdr(content)
                 size = len(data)
@@ -198,7 +198,8 @@ class EmbeddedSubscription:
         if not node.graph.unrecorded:
             kernel.record(Message(sent, now, self.topic, publisher, node.name, size))
         if node.processor is not None:
-            node.charge_reception(now)
+            node.last_traffic = now
+            node.charge_background("receive")
         queue = self._queue
         if len(queue) == self.qos.depth:
             queue.popleft()  # its turn in the group goes to the next oldest

@@ -200,8 +200,8 @@ class NodeContext:
     """A node as its publishers, subscriptions and services use it: their owner, which is charged."""
 
     __slots__ = (
-        "_free", "_last_traffic", "_since", "_slept", "_tariff", "_waited",
-        "closed", "context", "graph", "id", "kernel", "name", "processor",
+        "_free", "_since", "_slept", "_tariff", "_waited",
+        "closed", "context", "graph", "id", "kernel", "last_traffic", "name", "processor",
     )  # fmt: skip
 
     def __init__(self, graph: GraphContext, name: str, context: ExecutionContext) -> None:
@@ -212,10 +212,10 @@ class NodeContext:
         self._tariff = graph.tariffs(self.id)
         self._free = graph.unrecorded and self.processor is None  # neither executed nor recorded
         self._since = self.kernel.now()
-        self._last_traffic: Ns = -WARM
+        self.last_traffic: Ns = -WARM
         self._slept = self._waited = 0.0
 
-    def consume(self, call: str, x: float = 0.0) -> None:
+    def consume(self, call: str, x: float = 0.0) -> Ns:
         """Execute a call into ROS: the caller's part before this returns, the rest in the background.
 
         A framework callback cannot wait: there all of the call goes to the background.
@@ -223,18 +223,21 @@ class NodeContext:
         Args:
             call: Name of the call, see ``Tariff``.
             x: What its price depends on, see ``Tariff``.
+
+        Returns:
+            Time at which the caller's part has been executed, ns.
         """
-        if self._free:
-            return
         kernel = self.kernel
         now = kernel.now()
+        if self._free:
+            return now
         priced = call
         if call == "sleep":
             self._slept += x
         elif call == "publish":
-            if now - self._last_traffic < WARM:
+            if now - self.last_traffic < WARM:
                 priced = "publish_next"
-            self._last_traffic = now
+            self.last_traffic = now
         caller = background = 0
         if self._tariff is not None:
             cost = self._tariff(priced, x)
@@ -242,10 +245,14 @@ class NodeContext:
         if not self.graph.unrecorded:
             kind = _KINDS.get(call) or f"ros:{call}"
             kernel.record(Charge(now, self.id.component, self.id.processor, kind, caller, background, 0.0))
-        if caller and not kernel.consume(caller):
-            background += caller
+        if caller:
+            if kernel.consume(caller):
+                now = kernel.now()
+            else:
+                background += caller
         if background and self.processor is not None:
             self.processor.load(self.context, background)
+        return now
 
     def consume_if_priced(self, call: str) -> None:
         """Execute a call as ``consume`` does, if the law has a figure for it."""
@@ -267,11 +274,6 @@ class NodeContext:
             now, (_, component, name) = self.kernel.now(), self.id
             self.kernel.record(Charge(now, component, name, f"ros:{what}", 0, background, 0.0))
         processor.load(self.context, background)
-
-    def charge_reception(self, now: Ns) -> None:
-        """Execute what a message that has arrived at `now` takes."""
-        self._last_traffic = now
-        self.charge_background("receive")
 
     def start_charging_waits(self) -> None:
         """Charge the client library's threads while the node does not sleep; a sleep's price has them."""

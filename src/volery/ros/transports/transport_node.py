@@ -296,9 +296,10 @@ class TransportNodeContext(NodeContext):
         super().__init__(graph, name, context)
         self.why = ""
 
-    def consume(self, call: str, x: float = 0.0) -> None:
-        """Be an interaction point."""
+    def consume(self, call: str, x: float = 0.0) -> Ns:
+        """Be an interaction point; return the time."""
         self.kernel.consume(0)
+        return self.kernel.now()
 
     def check_open(self) -> None:
         """Raise ``UsageError`` if the node has left the graph, with the reason if it was removed."""

@@ -173,7 +173,8 @@ class Subscriber:
             return
         self.type = type_name("Subscriber", data_class)
         group = session.spinning_group(topic, f"callback of {topic}")
-        self._subscription = session.node.subscribe(name, self.type, self._call, qos, group)
+        call = self._call if callback is None or callback_args is not None else callback
+        self._subscription = session.node.subscribe(name, self.type, call, qos, group)
 
     def _call(self, message: Any) -> None:
         if self.callback is None:

@@ -25,7 +25,6 @@ from volery.ros.client_libraries.rospy.session import (
     Timer,
     TimerEvent,
     as_ns,
-    sleep_on_ros_time,
 )
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
 from volery.trace.events import Text
@@ -271,8 +270,12 @@ def spin(sessions: Sessions) -> None:
 
 
 def sleep(sessions: Sessions, duration: Any) -> None:
-    """Block for a number of seconds or a ``Duration``."""
-    sleep_on_ros_time(sessions.initialised(), duration)
+    """Block for a number of seconds or a ``Duration``; raise ``ROSInterruptException`` at shutdown."""
+    session = sessions.initialised()
+    if not session.shutdown:
+        session.node.sleep(as_ns(duration))
+    if session.shutdown:
+        session.check()
 
 
 def _within(timeout: Any) -> int | None:

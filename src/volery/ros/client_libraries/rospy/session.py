@@ -197,7 +197,8 @@ class Sessions(LaunchedComponents):
 
     def initialised(self) -> Session:
         """Return the session of the current component; raise ``ROSInitException`` before ``init_node``."""
-        session = self.find()
+        task = self.kernel.current()
+        session = None if task is None else self._open.get(task.contexts[-1].component)
         if session is None or not session.initialised:
             raise ROSInitException(f"{self.component}: call rospy.init_node() first")
         return session
@@ -226,9 +227,7 @@ _DurationMessage: Any = message_class("builtin_interfaces/msg/Duration")
 
 def as_ns(value: Any) -> Ns:
     """Return a number of seconds, or a ``Duration``, in ns."""
-    if isinstance(value, (int, float)):
-        return from_seconds(value)
-    return nanoseconds(value)
+    return from_seconds(value) if isinstance(value, (int, float)) else nanoseconds(value)
 
 
 def _parts(secs: float, nsecs: int) -> tuple[int, int]:
@@ -353,10 +352,3 @@ class Timer:
     def shutdown(self) -> None:
         """Stop the timer."""
         self._timer.cancel()
-
-
-def sleep_on_ros_time(session: Session, duration: Any) -> None:
-    """Block for a number of seconds or a ``Duration``; raise ``ROSInterruptException`` at shutdown."""
-    session.check()
-    session.node.sleep(as_ns(duration))
-    session.check()
