@@ -188,7 +188,10 @@ class Processor:
     def _admit(self, job: Job) -> None:
         self._arrivals += 1
         job.arrival = self._arrivals
-        insort(self._jobs, job, key=self._order)
+        if self._jobs:
+            insort(self._jobs, job, key=self._order)
+        else:
+            self._jobs.append(job)
         if len(self._jobs) > self.cores:
             self._preempt(job.name)
         self._dispatch()
@@ -251,9 +254,11 @@ class Processor:
             self._admit(job)
 
     def _finish(self, job: Job) -> None:
+        job.timer = None  # it has just fired
         self._stop(job)
         self._complete(job)
-        self._dispatch()
+        if self._jobs:
+            self._dispatch()
 
     def _complete(self, job: Job) -> None:
         self._jobs.remove(job)

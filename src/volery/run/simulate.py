@@ -14,6 +14,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.model.system import System
 from volery.model.system_loader import load
 from volery.requirements.verdicts import Observers
+from volery.ros.graph.embedded_graph import record_all, record_none
 from volery.run.assembly.component_builder import Builder, BuiltComponents
 from volery.run.assembly.computers import Platform, PowerFeed
 from volery.run.assembly.cpp import compile_all, has_cpp
@@ -131,7 +132,8 @@ class _Simulation:
         return setup_of(self._system, platform, self._options.seed, self._options.fidelity)
 
     def _build(self, platform: Platform) -> BuiltComponents:
-        builder = Builder(self._system, self._kernel, platform, self._fleet, self._ending)
+        records = record_none if self._options.out is None else record_all
+        builder = Builder(self._system, self._kernel, platform, self._fleet, self._ending, records=records)
         return builder.build(self._options.fidelity, self._options.seed, self._options.traces)
 
     def prepare(self) -> None:

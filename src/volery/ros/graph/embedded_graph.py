@@ -284,7 +284,8 @@ def record_all(topic_name: str) -> bool:
     return True
 
 
-def _record_none(topic_name: str) -> bool:
+def record_none(topic_name: str) -> bool:
+    """Record the content of no topic."""
     return False
 
 
@@ -318,7 +319,7 @@ class EmbeddedGraph:
             kernel,
             tariffs,
             route,
-            _record_none if unrecorded else records,
+            record_none if unrecorded else records,
             epoch,
             Signal(kernel, "the ROS graph"),
             unrecorded=unrecorded,

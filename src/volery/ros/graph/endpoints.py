@@ -95,7 +95,8 @@ class EmbeddedPublisher:
         self._latches = qos.durability == TRANSIENT_LOCAL
         self._latched: deque[tuple[Any, Ns, int]] = deque(maxlen=qos.depth)
         self._recorded = node.graph.records(topic.name)
-        self._sized = not node.graph.unrecorded  # whether the size of a message matters
+        self._checked = not node.graph.unrecorded  # whether messages are encoded, as real ROS does
+        self._sized = False  # whether the size of a message matters otherwise
         self._open = True
         topic.publishers.append(self)
         for subscription in topic.subscriptions:
@@ -139,14 +140,15 @@ class EmbeddedPublisher:
                 raise UsageError(f"topic {self.topic} carries {self.type}, not {kind}")
             sent = node.consume("publish", float(len(self._connections)))
             connections = self._connections
-            if not (connections or self._recorded or self._latches):
+            if not (connections or self._checked or self._latches):
                 return
             content = node.graph.copy(message) if node.graph.as_bytes else message.copy()
             size = 0
-            if self._recorded:
+            if self._checked:
                 data = copied_to_cdr(content)
                 size = len(data)
-                kernel.record(Published(sent, self.topic, self.type, node.name, data))
+                if self._recorded:
+                    kernel.record(Published(sent, self.topic, self.type, node.name, data))
             elif self._sized:
                 size = cdr_size(content)
             if self._latches:

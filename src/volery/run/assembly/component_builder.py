@@ -32,6 +32,8 @@ from volery.model.system import System
 from volery.ros.client_libraries.importable_modules import importable_modules
 from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
+from volery.ros.graph.embedded_graph import record_all
+from volery.ros.graph.graph_context import Records
 from volery.ros.messages import define_imported
 from volery.run.assembly.computers import Platform, commanded_by, is_node
 from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
@@ -149,7 +151,8 @@ class ProcessPart:
 class Builder:
     """Builder of the components of one run, or of the *part* of it in this process.
 
-    Without a *fleet* the vehicles are in another process.
+    Without a *fleet* the vehicles are in another process. *records* selects the topics whose messages are
+    recorded with their content.
     """
 
     def __init__(
@@ -161,6 +164,7 @@ class Builder:
         ending: Ending,
         *,
         part: ProcessPart | None = None,
+        records: Records = record_all,
     ) -> None:
         self._system = system
         self._kernel = kernel
@@ -171,7 +175,9 @@ class Builder:
         self._part = part
         self._truth = fleet.truth if fleet else part.truth if part else None
         self._models = part.instances if part else system.instances
-        self._graph: RosGraph = part.graph if part else EmbeddedGraph(kernel, platform.tariff, platform.route)
+        self._graph: RosGraph = (
+            part.graph if part else EmbeddedGraph(kernel, platform.tariff, platform.route, records=records)
+        )
         self._nodes: dict[str, Node] = dict(part.nodes) if part else {}
         self._landable: dict[str, Landable] = {}
         self._instances: dict[str, Instance] = {}

@@ -76,6 +76,17 @@ def test_the_sender_is_asked_to_carry_the_size_of_the_encoding(rig: Any) -> None
     ]
 
 
+def test_a_value_that_does_not_fit_is_an_error_also_where_contents_are_not_recorded(rig: Any) -> None:
+    graph = rig.new_graph(records=lambda topic: False)
+
+    def talker() -> None:
+        publisher = graph.node("talker").advertise("chat", STRING)
+        with pytest.raises(UsageError, match="data is 7, not a string"):
+            publisher.publish(messages.new(STRING, data=7))
+
+    rig.run(talker)
+
+
 def test_a_full_queue_drops_the_oldest(rig: Any) -> None:
     heard: list[str] = []
 
