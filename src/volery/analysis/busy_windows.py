@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from volery.base.time import Ns
-from volery.requirements.response_bounds import Demand
+from volery.requirements.response_bounds import Demand, ManyCores, OneCore
 
 MOST_ITERATIONS = 20_000
 """A search ends without a bound after so many steps: the processor is full, or nearly."""
@@ -82,13 +82,13 @@ class PeriodicReservation:
 
 @dataclass(frozen=True)
 class LeftOver:
-    """What more urgent tasks under preemptive fixed priorities leave of one core."""
+    """What more urgent tasks under preemptive fixed priorities leave to a thread that is always ready."""
 
-    urgent: Sequence[Demand]
+    others: OneCore | ManyCores
 
     def time_for(self, service: Ns) -> Ns | None:
         """See ``Supply``."""
-        return _least(service, lambda window: service + requested_by_all(self.urgent, window))
+        return _least(service, lambda window: service + self.others.interference(window, service))
 
 
 def _least(start: Ns, right_side: Callable[[Ns], Ns | None]) -> Ns | None:

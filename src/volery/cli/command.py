@@ -69,8 +69,10 @@ class Commands:
         """Add the commands to *app*."""
         target = app
         if self.group:
-            target = typer.Typer(help=self.summary, no_args_is_help=True)
-            app.add_typer(target, name=self.group, rich_help_panel=self.section)
+            known = (one.typer_instance for one in app.registered_groups if one.name == self.group)
+            target = next(known, None) or typer.Typer(help=self.summary, no_args_is_help=True)
+            if target not in [one.typer_instance for one in app.registered_groups]:
+                app.add_typer(target, name=self.group, rich_help_panel=self.section)
         for name, function in self.members:
             target.command(name, rich_help_panel=None if self.group else self.section)(function)
 

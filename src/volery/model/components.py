@@ -267,10 +267,7 @@ class Subscription:
     """A topic that a component subscribes to, by its name before remapping."""
 
     name: str
-    type: Annotated[str, TEXT, "Message type, such as `sensor_msgs/Image`."]
-    callback: Annotated[
-        tuple[Figure, ...], FIGURES, "What its callback takes, one figure for each kind of processor."
-    ] = ()
+    type: Annotated[str, TEXT, "Message type, such as `sensor_msgs/Image`; its callback is an activation."]
 
 
 CALLS = MapOf(MapOf(Whole(least=0), free=True))

@@ -31,7 +31,7 @@ SHORT = "x-short"
 """Marks, in the JSON Schema, a mapping that may be written as the value of this key alone."""
 
 _NAME = r"^[A-Za-z_][A-Za-z0-9_-]*$"
-_UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s|m|deg|coulomb|v|j)$")
+_UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s|m|deg|coulomb|v|j|b)$")
 
 
 class WrongValueError(ValueError):

@@ -15,7 +15,7 @@ from volery.analysis.busy_windows import (
     executor_bounds,
     fifo_bound,
 )
-from volery.requirements.response_bounds import Demand, response_bounds
+from volery.requirements.response_bounds import Demand, OneCore, response_bounds
 
 
 def demand(cost, period, jitter=0, name="t"):
@@ -111,6 +111,6 @@ def test_timers_come_before_subscriptions():
 
 
 def test_what_more_urgent_tasks_leave():
-    supply = LeftOver([demand(3, 7), demand(3, 12)])
+    supply = LeftOver(OneCore([demand(3, 7), demand(3, 12)], ()))
     assert supply.time_for(5) == 20
-    assert LeftOver([demand(7, 7)]).time_for(1) is None
+    assert LeftOver(OneCore([demand(7, 7)], ())).time_for(1) is None

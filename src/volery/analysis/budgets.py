@@ -1,0 +1,153 @@
+"""Budgets of a model without a run: memory of each process, energy of each computer, endurance of batteries.
+
+A drone draws most in hover among the states that it stays in, so its endurance is computed for hovering all
+the time, with all its computers at their static utilisation. Wind and manoeuvres are not included, and the
+result says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from volery.analysis.system_analysis import Utilisation
+from volery.base.errors import EstimateError
+from volery.base.time import to_seconds
+from volery.cost import ProcessorPrices, load_catalogue
+from volery.model.environment import Vehicle
+from volery.model.system import System
+from volery.run.assembly.simulated_fleet import body_of
+from volery.simulation.world.body_specs import Multirotor
+from volery.simulation.world.dynamics import battery_current, cell_voltage
+
+RESERVE_OBSERVABLE = "battery_min"
+_STEPS = 200
+"""Steps of the discharge; the voltage is a broken line with five corners."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """The memory of one process, bytes; ``why`` states what is missing."""
+
+    process: str
+    processor: str
+    bytes: float | None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Mean power and the energy over the duration of the run of one computer, with its relative error.
+
+    ``greatest_watts`` is with all cores busy, where the utilisation is not known (``at_least``).
+    """
+
+    processor: str
+    watts: float | None
+    greatest_watts: float | None
+    joules: float | None
+    error: float | None
+    at_least: bool
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Endurance:
+    """How long a drone can hover until its reserve, against the longest run.
+
+    ``seconds`` is None where there is no figure; ``feasible`` whether it lasts for all of the run.
+    """
+
+    vehicle: str
+    seconds: float | None
+    watts: float | None
+    reserve: float
+    feasible: bool | None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Budgets:
+    """All budgets of a system."""
+
+    memory: tuple[Memory, ...]
+    energy: tuple[Energy, ...]
+    endurance: tuple[Endurance, ...]
+
+
+def budgets(system: System, utilisations: Sequence[Utilisation]) -> Budgets:
+    """Return the budgets of *system*, whose processors have these static *utilisations*."""
+    catalogue = load_catalogue(*system.catalogues)
+    shares = {one.resource: one for one in utilisations}
+    energy = tuple(
+        _energy(system, ProcessorPrices(one.name, catalogue.processor(one.kind), one.frequency_hz),
+                shares[one.name], one.cores)
+        for one in system.processors
+    )  # fmt: skip
+    return Budgets(
+        tuple(_memory(system)), energy, tuple(_endurance(system, one, energy) for one in system.vehicles)
+    )
+
+
+def _memory(system: System) -> Iterator[Memory]:
+    """Yield the memory of each process: a component instance is deployed as one."""
+    for one in system.instances:
+        if one.processor is not None:
+            stated = one.component.memory_b
+            why = "" if stated is not None else f"state `memory` of {one.component.name}"
+            yield Memory(one.name, one.processor, stated, why)
+
+
+def _energy(system: System, prices: ProcessorPrices, used: Utilisation, cores: int) -> Energy:
+    try:
+        watts = prices.watts(min(used.share, 1.0) * cores)
+    except EstimateError as error:
+        return Energy(used.resource, None, None, None, None, bool(used.not_counted), str(error))
+    greatest = prices.watts(cores) if used.not_counted else watts
+    joules = watts * to_seconds(system.limits.duration_ns)
+    return Energy(
+        used.resource,
+        watts,
+        greatest,
+        joules,
+        prices.entry.power_law().band() or None,
+        bool(used.not_counted),
+    )
+
+
+def _endurance(system: System, vehicle: Vehicle, energy: Sequence[Energy]) -> Endurance:
+    reserve = max(
+        (one.bound for one in system.requirements
+         if one.observe == f"{vehicle.name}.{RESERVE_OBSERVABLE}" and one.relation == "min"),
+        default=0.0,
+    )  # fmt: skip
+    body = body_of(vehicle)
+    if not isinstance(body, Multirotor):
+        why = "the power of a rover depends on its way; simulate it"
+        return Endurance(vehicle.name, None, None, reserve, None, why)
+    fed = [one.name for one in system.processors if one.powered_by == vehicle.name]
+    drawn = [one.greatest_watts for one in energy if one.processor in fed]
+    if None in drawn:
+        return Endurance(vehicle.name, None, None, reserve, None, f"no power figures for {', '.join(fed)}")
+    watts = body.hover_power + sum(one for one in drawn if one is not None)
+    seconds = hover_time(body, watts, reserve)
+    longest = to_seconds(system.limits.duration_ns)
+    return Endurance(vehicle.name, seconds, watts, reserve, seconds >= longest)
+
+
+def hover_time(body: Multirotor, watts: float, reserve: float) -> float:
+    """Return the time in s until the charge of the battery has fallen to the share *reserve* at *watts*.
+
+    The current grows as the voltage falls, by the discharge curve of the simulated battery.
+    """
+    battery = body.battery
+    used = battery.left - reserve
+    if used <= 0.0:
+        return 0.0
+    charge = used * battery.capacity_ah * 3600.0 / _STEPS
+    seconds = 0.0
+    for number in range(_STEPS):
+        left = battery.left - used * (number + 0.5) / _STEPS
+        volts = battery.cells * cell_voltage(left)
+        seconds += charge / battery_current(volts, battery.resistance_ohm, watts)
+    return seconds
