@@ -171,7 +171,8 @@ def pid(
     error = _difference(gains, goal, measurement)
     proportional = _proportional(gains, error)
     derivative = _derivative(gains, state, error, measurement, sample_s)
-    increment = np.asarray(gains.ki * error * sample_s)
+    braking = np.abs(np.asarray(error)) > _joint(gains)  # the root limits the output, too
+    increment = np.where(braking, 0.0, gains.ki * error * sample_s)
     rest = np.asarray(proportional + derivative + feed_forward)
     excess = rest + state.integral + increment
     excess = excess - _limited(gains, state.output, excess, sample_s)
@@ -196,17 +197,23 @@ def _difference(gains: PidGains, goal: Value, measurement: Value) -> Value:
     return wrap(difference, gains.period) if gains.period is not None else _plain(difference)
 
 
+def _joint(gains: PidGains) -> Value:
+    """Return the error from which the stated deceleration bounds the output: ``deceleration / kp^2``."""
+    if np.all(np.isinf(gains.deceleration)) or not np.any(gains.kp):
+        return np.inf
+    return gains.deceleration / np.maximum(gains.kp, 1e-12) ** 2
+
+
 def _proportional(gains: PidGains, error: Value) -> Value:
     """Return ``kp error``, below the rate from which the stated deceleration stops at the goal.
 
-    The root joins the line where both have the same slope, at ``deceleration / kp^2`` (ArduPilot's
-    ``sqrt_controller`` in AP_Math has the same shape).
+    The root joins the line where both have the same slope (ArduPilot's ``sqrt_controller`` in AP_Math has the
+    same shape).
     """
     linear = gains.kp * np.asarray(error, dtype=float)
-    if np.all(np.isinf(gains.deceleration)) or not np.any(gains.kp):
+    joint = _joint(gains)
+    if np.all(np.isinf(joint)):
         return _plain(linear)
-    kp = np.maximum(gains.kp, 1e-12)
-    joint = gains.deceleration / kp**2
     size = np.abs(error)
     with np.errstate(invalid="ignore", over="ignore"):
         root = np.sqrt(np.maximum(2.0 * gains.deceleration * (size - joint / 2.0), 0.0))

@@ -52,9 +52,9 @@ REPLY_PORT = "uplink"
 """Option of a UDP address without a host: port for replies, if it differs from the sender's."""
 LAST_PORT = 65_535
 
-MAVLINK_OPTIONS = ("attitude", "baud", LOCAL_ADDRESS, "rate", SIGNING, "system", "texts")
-"""Options of MAVLink drivers: ``rate`` of the position and ``attitude`` in Hz, ``system`` id, and
-``texts=unrecorded`` if the autopilot records its texts itself, as a simulated one does.
+MAVLINK_OPTIONS = ("attitude", "baud", LOCAL_ADDRESS, "rate", "rc", SIGNING, "system", "texts")
+"""Options of MAVLink drivers: ``rate`` of the position, ``attitude`` and ``rc`` channels in Hz, ``system``
+id, and ``texts=unrecorded`` if the autopilot records its texts itself, as a simulated one does.
 """
 
 

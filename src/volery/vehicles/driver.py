@@ -232,6 +232,9 @@ class Driver(Protocol):
     def altitude_hold(self) -> Sequence[Step]:
         """Enter the mode in which manual control commands attitude and climb rate."""
 
+    def hand_over(self) -> Sequence[Step]:
+        """Stop all set-points and manual control, so that the pilot's transmitter flies the vehicle."""
+
     def manual(self) -> Sequence[Step]:
         """Enter the mode in which manual control commands the wheels of a rover."""
 

@@ -283,6 +283,15 @@ class Drone(Vehicle):
         self._connect(Capability.ALTITUDE_HOLD)
         self._enter_manual_mode("altitude_hold", "hold the altitude", self._driver.altitude_hold)
 
+    def hand_over(self) -> None:
+        """Stop all set-points and manual control at once, and let the pilot's transmitter fly the drone.
+
+        The operation of another task is aborted. Where the autopilot follows a computer, it changes to a mode
+        that the transmitter commands. Raises ``Refused`` if the autopilot receives no transmitter.
+        """
+        self._connect(Capability.MANUAL_CONTROL)
+        self._operate("hand_over", "hand over to the transmitter", self._driver.hand_over, policy=TO_SAFETY)
+
     # -- end of a program
 
     def come_to_rest(self) -> str:

@@ -102,6 +102,8 @@ class Telemetry:
         mission_item: the mission item in progress.
         mission_reached: the mission item reached last.
         answers: last acknowledgement by key.
+        rc: pulse widths of the RC channels as the autopilot reads them, µs; 0 or 65535 where there is none.
+        rc_ns: time of their last report; -1 before the first.
         detects_silence: whether a silence is one of the link, not of a node that does not run its loop.
         stream_lost: how a stream of this program was interrupted, so that a failsafe of the autopilot acts.
     """
@@ -144,6 +146,8 @@ class Telemetry:
         self.mission_ended = False
         self.texts: deque[StatusText] = deque(maxlen=KEPT_TEXTS)
         self.answers: dict[str, Answer] = {}
+        self.rc: tuple[int, ...] = ()
+        self.rc_ns: Ns = -1
         self.changed = Signal(kernel, f"telemetry of {name}")
 
     # -- age

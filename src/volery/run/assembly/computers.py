@@ -144,7 +144,7 @@ class Platform:
         self._languages = {instance.name: ros_language(instance) for instance in system.instances}
 
         self._tariffs: dict[tuple[str, str], Tariff] = {}
-        self.warnings: dict[str, None] = dict.fromkeys(system.warnings)  # an ordered set
+        self.warnings: dict[str, None] = dict.fromkeys(map(str, system.warnings))  # an ordered set
 
     def _processor(self, model: ProcessorModel) -> Processor:
         return Processor(

@@ -144,6 +144,22 @@ class SimulatedFleet:
 
         return position
 
+    def move_transmitter(self, vehicle: str, at: Ns, channel: int, pulse: int) -> None:
+        """Move a stick or switch of the pilot's transmitter.
+
+        Args:
+            vehicle: Name of the vehicle.
+            at: Time, ns.
+            channel: RC channel, from 1.
+            pulse: Pulse width, µs.
+        """
+        channels = self.autopilots[vehicle].vehicle.rc.transmitter
+
+        def move() -> None:
+            channels[channel - 1] = pulse
+
+        self._kernel.call_at(at, move)
+
     def sample(self, period: Ns = SAMPLING_PERIOD) -> None:
         """Record the state of every vehicle periodically, from now on."""
         self._kernel.every(period, self.record_states)
@@ -202,7 +218,11 @@ def fleet_of(kernel: Kernel, wanted: Sequence[SimulatedVehicle], seed: int) -> S
     first = wanted[0]
     vehicles = [_placed(one.vehicle, first.frame) for one in wanted]
     systems = {one.vehicle.name: one.system for one in wanted if one.system is not None}
-    return SimulatedFleet(kernel, vehicles, first.frame, first.wind, seed, systems=systems)
+    fleet = SimulatedFleet(kernel, vehicles, first.frame, first.wind, seed, systems=systems)
+    for one in wanted:
+        for at, channel, pulse in one.transmitter:
+            fleet.move_transmitter(one.vehicle.name, at, channel, pulse)
+    return fleet
 
 
 def _placed(vehicle: VehicleModel, frame: LocalFrame) -> VehicleModel:

@@ -5,18 +5,22 @@ This module describes them only and imports nothing of the simulation; see ``sim
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from volery.base.errors import UsageError, choices
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
-from volery.base.time import MS, Ns
+from volery.base.time import MS, Ns, from_seconds
 from volery.links.wire_faults import FAULT_OPTIONS, WireFaults, parse_wire_faults
 from volery.model.environment import SENSOR_SETS, STARTS, VEHICLE_KINDS, Place, Vehicle, Wind
 from volery.vehicles.address import Address
 
 HOME = Position(46.0825, -103.8995, AMSL(900))
 """Home of simulated vehicles unless an address or a mission states another."""
+
+RATE_OPTIONS = ("attitude", "rate", "rc")
+"""Rates that the driver of a simulated MAVLink autopilot requests, Hz."""
 
 OPTIONS = (
     "heading",
@@ -27,8 +31,10 @@ OPTIONS = (
     "sensors",
     "start",
     "system",
+    "transmitter",
     "wind",
     "wire",
+    *RATE_OPTIONS,
     *FAULT_OPTIONS,
 )
 """Options of ``sim:AUTOPILOT?``."""
@@ -50,6 +56,8 @@ class SimulatedVehicle:
         faults: Faults of the link, or None if frames travel as values and not as bytes.
         system: System id, or None for the next free one.
         names: Namespace of its ROS node, if the autopilot has one and offers several.
+        rates: Options of the driver: rates that it requests.
+        transmitter: Movements of the pilot's transmitter: time ns, channel from 1, pulse width µs.
     """
 
     vehicle: Vehicle
@@ -58,6 +66,8 @@ class SimulatedVehicle:
     faults: WireFaults | None = None
     system: int | None = None
     names: str = ""
+    rates: Mapping[str, str] = field(default_factory=dict)
+    transmitter: tuple[tuple[Ns, int, int], ...] = ()
 
     @property
     def home(self) -> Position:
@@ -73,7 +83,8 @@ def parse_simulated(
 
     Options: ``home=LAT,LON,AMSL``, ``heading=DEG``, ``kind=multirotor|rover``, ``sensors=consumer|rtk``,
     ``start=warm|cold``, ``system=ID``, ``wind=SPEED,FROM_DEG,GUSTS``, ``parameters=NAME:VALUE,...`` of the
-    autopilot, ``names`` of its ROS node, ``wire=values|bytes`` and, with bytes, the faults of
+    autopilot, ``names`` of its ROS node, ``transmitter=CHANNEL:PULSE@SECONDS,...``, ``rate``, ``attitude``
+    and ``rc`` in Hz, ``wire=values|bytes`` and, with bytes, the faults of
     ``volery.links.wire_faults``. Raises ``UsageError``.
     """
     address.only(*OPTIONS)
@@ -94,7 +105,35 @@ def parse_simulated(
     wind = Wind(*(address.numbers("wind", 3) or ()))
     frame = LocalFrame(latitude, longitude, amsl)
     names = address.options.get("names", "")
-    return SimulatedVehicle(vehicle, frame, wind, _faults(address), _system(address), names)
+    return SimulatedVehicle(
+        vehicle,
+        frame,
+        wind,
+        _faults(address),
+        _system(address),
+        names,
+        {name: value for name, value in address.options.items() if name in RATE_OPTIONS},
+        _transmitter(address),
+    )
+
+
+def _transmitter(address: Address) -> tuple[tuple[Ns, int, int], ...]:
+    """Return the movements that ``transmitter=6:1500,6:1800@30`` states; without a time at the start."""
+    found = []
+    for part in filter(None, address.options.get("transmitter", "").split(",")):
+        move, _, at = part.partition("@")
+        channel, _, pulse = move.partition(":")
+        try:
+            moved = from_seconds(float(at or "0")), int(channel), int(pulse)
+        except (ValueError, OverflowError):
+            moved = -1, 0, 0
+        if moved[0] < 0 or not 1 <= moved[1] <= 16 or not 0 <= moved[2] <= 3000:
+            raise UsageError(
+                f"{address}: transmitter={part!r} should be CHANNEL:PULSE or CHANNEL:PULSE@SECONDS, "
+                "separated by commas, with channels 1 to 16 and pulses in microseconds"
+            )
+        found.append(moved)
+    return tuple(found)
 
 
 def _parameters(address: Address) -> dict[str, float]:

@@ -218,5 +218,5 @@ def open_simulated_driver(
     open_on_link = drivers.load(wanted.vehicle.autopilot).on_link
     if open_on_link is not None and reached_over_links(fleet, wanted):
         link = fleet.link_for(wanted)
-        return open_on_link(kernel, link, wanted.vehicle.name, SIMULATED_LINK_OPTIONS)
+        return open_on_link(kernel, link, wanted.vehicle.name, {**SIMULATED_LINK_OPTIONS, **wanted.rates})
     return PrivateGraph(kernel, fleet, wanted, seed).open()

@@ -51,6 +51,9 @@ from volery.vehicles.telemetry import Velocity
 CONTROL_PERIOD: Ns = 200 * MS
 VELOCITY_PERIOD: Ns = 200 * MS
 
+RELEASED_TIMES = 3
+"""How often the release of the channels is sent: it is not acknowledged."""
+
 STILL = Velocity(0.0, 0.0, 0.0)
 
 
@@ -98,11 +101,20 @@ class ArduPilotSetpoints(SetpointRepeater):
             super().hold(control)
 
     def release(self) -> None:
-        """Give the channels back to the transmitter and stop repeating."""
+        """Give the channels back to the transmitter, and again, as messages may be lost; stop repeating."""
         if self.held is not None:
-            rover = self._telemetry.kind != DRONE_KIND
-            self._backend.override_channels([RELEASED, None, RELEASED, None] if rover else [RELEASED] * 4)
+            self._send_release()
+            for number in range(1, RELEASED_TIMES):
+                self._kernel.call_at(self._kernel.now() + number * CONTROL_PERIOD, self._release_again)
         super().release()
+
+    def _release_again(self) -> None:
+        if self.held is None:
+            self._send_release()
+
+    def _send_release(self) -> None:
+        rover = self._telemetry.kind != DRONE_KIND
+        self._backend.override_channels([RELEASED, None, RELEASED, None] if rover else [RELEASED] * 4)
 
     def is_commanded(self, mode: str) -> bool:
         """Return whether *mode* is the one commanded last."""
@@ -262,6 +274,13 @@ class ArduPilot(MavlinkDriver):
         """Enter ALT_HOLD with manual control repeated."""
         self._setpoints.hold_any()
         return (self._change_mode("ALT_HOLD"),)
+
+    def hand_over(self) -> Sequence[Step]:
+        """Release the channels; leave GUIDED for ALT_HOLD (a rover: MANUAL), which obeys the transmitter."""
+        release = immediate_step("give the channels back to the transmitter", self.stop)
+        if self.telemetry.mode != GUIDED:
+            return (release,)
+        return (release, self._change_mode("ALT_HOLD" if self.telemetry.kind == DRONE_KIND else "MANUAL"))
 
     def manual(self) -> Sequence[Step]:
         """Enter MANUAL with manual control repeated."""

@@ -166,6 +166,10 @@ class Dji:
         check_throttle(self.telemetry, self._stream.held or ManualControl(), LOW_THROTTLE)
         return self._enter_manual("fly stabilized", Manual(keeps_height=False))
 
+    def hand_over(self) -> Sequence[Step]:
+        """Stop sending; the switch of the transmitter chooses the mode."""
+        return (immediate_step("stop sending", self.stop),)
+
     def altitude_hold(self) -> Sequence[Step]:
         """Enter manual flight by tilt, yaw rate and climb rate."""
         return self._enter_manual("hold the altitude", Manual(keeps_height=True))

@@ -206,7 +206,7 @@ def stream_periods(firmware: Firmware, options: Mapping[str, str]) -> dict[str, 
 
     Args:
         firmware: firmware of the autopilot.
-        options: ``rate`` of the position and ``attitude`` in Hz (0 for none).
+        options: ``rate`` of the position, ``attitude`` and ``rc`` channels in Hz (0 for none).
     """
     attitude = rate_option("attitude", options, 0.0)
     periods = {
@@ -219,6 +219,9 @@ def stream_periods(firmware: Firmware, options: Mapping[str, str]) -> dict[str, 
     }
     if attitude:
         periods["ATTITUDE"] = round(S / attitude)
+    channels = rate_option("rc", options, 0.0)
+    if channels:
+        periods["RC_CHANNELS"] = round(S / channels)
     return periods
 
 

@@ -40,6 +40,8 @@ NO_POSITION = constant("ESTIMATOR_CONST_POS_MODE")
 """The same bits are used in ArduPilot's EKF_STATUS_REPORT and in PX4's ESTIMATOR_STATUS."""
 COMPLETE = constant("MISSION_STATE_COMPLETE")
 _UNKNOWN_16 = 65535
+RC_CHANNELS = 18
+"""Channels in RC_CHANNELS."""
 
 
 class TelemetryDecoder(ABC):
@@ -77,6 +79,7 @@ class TelemetryDecoder(ABC):
             "GPS_RAW_INT": self._gps,
             "ATTITUDE": self._attitude,
             "STATUSTEXT": self._texts.add,
+            "RC_CHANNELS": self._rc_channels,
             "MISSION_ITEM_REACHED": self._reached,
             "MISSION_CURRENT": self._mission_current,
         }
@@ -181,6 +184,11 @@ class TelemetryDecoder(ABC):
     def _attitude(self, fields: Fields) -> None:
         heading = degrees(fields["yaw"]) % 360.0
         self._telemetry.attitude = Attitude(degrees(fields["roll"]), degrees(fields["pitch"]), heading)
+
+    def _rc_channels(self, fields: Fields) -> None:
+        count = min(fields["chancount"], RC_CHANNELS)
+        self._telemetry.rc = tuple(fields[f"chan{number}_raw"] for number in range(1, count + 1))
+        self._telemetry.rc_ns = self._kernel.now()
 
     def _reached(self, fields: Fields) -> None:
         self._telemetry.mission_reached = fields["seq"]

@@ -211,6 +211,10 @@ class Paparazzi:
             self._steps.change_mode(ATTITUDE_MODE),
         )
 
+    def hand_over(self) -> Sequence[Step]:
+        """Stop sending; the switch of the transmitter chooses the mode."""
+        return (immediate_step("stop sending", self.stop),)
+
     def altitude_hold(self) -> Sequence[Step]:
         """Enter ATTITUDE_RC_CLIMB with manual control repeated."""
         self._setpoints.hold_any()

@@ -308,6 +308,13 @@ class PX4(MavlinkDriver):
         self._manual.hold_any()
         return (*self._taken_in(), self._change_mode(modes.ALTCTL))
 
+    def hand_over(self) -> Sequence[Step]:
+        """Enter POSCTL, which the transmitter commands, and only then stop: OFFBOARD needs its stream."""
+        release = immediate_step("stop the stream", self.stop)
+        if self.telemetry.mode in modes.MANUAL_MODES:
+            return (release,)
+        return (self._change_mode(modes.POSCTL), release)
+
     def manual(self) -> Sequence[Step]:
         """Enter MANUAL with manual control repeated."""
         self._manual.hold_any()

@@ -1,0 +1,237 @@
+"""How a command of a control law reaches an autopilot: by velocity set-points or by overridden RC channels.
+
+A law commands a velocity over ground and a turn rate. ``VelocitySetpoints`` passes both on where the
+autopilot follows a computer. ``RcOverride`` flies as the thesis did, by the sticks: it computes tilt angles
+from velocities, and pulse widths from tilt, climb rate and turn rate. ``RcAxis`` holds trim, dead band and
+scale of one channel; a law that is to overcome the dead band of the autopilot needs its true width.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import atan, cos, degrees, isnan, radians, sin
+from typing import NamedTuple, Protocol
+
+from volery.base.errors import UsageError
+from volery.control.laws import PidGains, PidLaw
+from volery.vehicles import Drone
+
+GRAVITY = 9.80665
+MIDDLE_US, HALF_US = 1500, 500
+"""Middle and half of the range of pulse widths that manual control has, µs."""
+
+
+class Command(NamedTuple):
+    """Velocity over ground in m/s and turn rate in degrees/s, clockwise positive."""
+
+    north: float = 0.0
+    east: float = 0.0
+    up: float = 0.0
+    yaw_rate: float = 0.0
+
+
+class Measured(NamedTuple):
+    """What a law sees: heading in degrees, position in m about home, velocity in m/s; NaN where unknown."""
+
+    heading: float
+    north: float
+    east: float
+    up: float
+    velocity_north: float
+    velocity_east: float
+    velocity_up: float
+
+
+class Actuation(Protocol):
+    """Applies commands to a drone."""
+
+    def take_off(self, height: float) -> None:
+        """Arm and climb to *height* m above home; blocks until it is there."""
+
+    def engage(self) -> None:
+        """Take control in the air."""
+
+    def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
+        """Send one command."""
+
+    def touch_down(self) -> None:
+        """Stop the motors on the ground."""
+
+
+class VelocitySetpoints:
+    """Velocity set-points in the mode in which the autopilot follows a computer.
+
+    Args:
+        drone: the drone.
+        lasting: time after which the drone stops if no command follows, s.
+    """
+
+    def __init__(self, drone: Drone, lasting: float = 1.0) -> None:
+        self._drone, self._lasting = drone, lasting
+
+    def take_off(self, height: float) -> None:
+        """Take off by the autopilot's own take-off."""
+        self._drone.takeoff(height)
+
+    def engage(self) -> None:
+        """Stop where it is."""
+        self._drone.hold()
+
+    def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
+        """Send a velocity and a turn rate."""
+        self._drone.set_velocity(*command, lasting=self._lasting)
+
+    def touch_down(self) -> None:
+        """Disarm."""
+        self._drone.disarm()
+
+
+@dataclass(frozen=True)
+class RcAxis:
+    """Trim, dead band and scale of one channel.
+
+    Attributes:
+        per_unit: µs per unit of the command beyond the dead band.
+        trim: pulse width that is meant to command nothing, µs.
+        dead: half of the dead band about the trim, which a command jumps over, µs.
+        least: least pulse width, µs.
+        greatest: greatest pulse width, µs.
+    """
+
+    per_unit: float
+    trim: float = MIDDLE_US
+    dead: float = 0.0
+    least: float = MIDDLE_US - HALF_US
+    greatest: float = MIDDLE_US + HALF_US
+
+    def __post_init__(self) -> None:
+        if not self.least < self.trim < self.greatest or self.dead < 0.0 or not self.per_unit > 0.0:
+            raise UsageError(
+                f"RC channel: trim {self.trim:g} us within {self.least:g} to {self.greatest:g} us, dead band "
+                f"{self.dead:g} us, {self.per_unit:g} us per unit: give a trim within, the others above 0"
+            )
+
+    def pulse(self, command: float) -> float:
+        """Return the pulse width of a command, µs."""
+        beyond = self.dead if command > 0.0 else -self.dead if command < 0.0 else 0.0
+        return min(self.greatest, max(self.least, self.trim + beyond + self.per_unit * command))
+
+    def position(self, command: float) -> float:
+        """Return the stick position -1..1 of a command."""
+        return (self.pulse(command) - MIDDLE_US) / HALF_US
+
+
+class RcScale(NamedTuple):
+    """The channels of an autopilot: commands in degrees of tilt, m/s of climb, degrees/s of turn."""
+
+    tilt: RcAxis
+    climb: RcAxis
+    turn: RcAxis
+    most_tilt: float
+    """Tilt angle that the laws use at most, degrees."""
+
+
+RC_SCALES: Mapping[str, RcScale] = {
+    # RCn_DZ 20 us, THR_DZ 100, ANGLE_MAX 30 degrees, PILOT_SPEED_UP 2.5 m/s, PILOT_Y_RATE 202.5 degrees/s
+    "ArduPilot": RcScale(
+        RcAxis(480.0 / 30.0, dead=20.0),
+        RcAxis(400.0 / 2.5, dead=100.0),
+        RcAxis(480.0 / 202.5, dead=20.0),
+        20.0,
+    ),
+    # MPC_HOLD_DZ 0.1, MPC_MAN_TILT_MAX 35 degrees, MPC_Z_VEL_MAX_UP 3 m/s, MPC_MAN_Y_MAX 150 degrees/s
+    "PX4": RcScale(
+        RcAxis(500.0 / 35.0), RcAxis(450.0 / 3.0, dead=50.0), RcAxis(450.0 / 150.0, dead=50.0), 20.0
+    ),
+}
+"""Scales by autopilot, from the defaults of its parameters."""
+
+VELOCITY_GAINS = PidGains(kp=1.2, ki=0.4, low=-3.0, high=3.0)
+"""From an error of velocity in m/s to an acceleration in m/s^2."""
+
+
+class RcOverride:
+    """RC channels overridden in altitude hold.
+
+    The velocity loop on this side turns velocities into tilt angles; the autopilot levels, holds the height
+    and turns at the commanded rate.
+
+    Args:
+        drone: the drone.
+        scale: channels of its autopilot; by default those of ``RC_SCALES``.
+        gains: gains of the velocity loop; ``None`` leaves the tilt at zero, as the thesis's rotation does.
+    """
+
+    def __init__(
+        self, drone: Drone, scale: RcScale | None = None, gains: PidGains | None = VELOCITY_GAINS
+    ) -> None:
+        self._drone = drone
+        self._scale = scale
+        self._gains = gains
+        self._laws = self._new_laws()
+
+    def _new_laws(self) -> tuple[PidLaw, PidLaw] | None:
+        return (PidLaw(self._gains), PidLaw(self._gains)) if self._gains is not None else None
+
+    @property
+    def scale(self) -> RcScale:
+        """Scale of the channels. Raises ``UsageError`` for an autopilot without one."""
+        if self._scale is None:
+            name = self._drone.telemetry.autopilot
+            if name not in RC_SCALES:
+                raise UsageError(
+                    f"the RC scale of {name or 'this autopilot'} is not known; fly by set-points"
+                )
+            self._scale = RC_SCALES[name]
+        return self._scale
+
+    def take_off(self, height: float) -> None:
+        """Take off by the autopilot's own take-off, then take the sticks."""
+        self._drone.takeoff(height)
+        self.engage()
+
+    def engage(self) -> None:
+        """Enter altitude hold with centred sticks."""
+        self._laws = self._new_laws()
+        self._drone.manual_control(0.0, 0.0, 0.5, 0.0)
+        self._drone.altitude_hold()
+
+    def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
+        """Send the stick positions of a command."""
+        forward, right = self._tilt(command, measured, sample_s)
+        scale = self.scale
+        throttle = (scale.climb.position(command.up) + 1.0) / 2.0
+        pitch, roll = scale.tilt.position(forward), scale.tilt.position(right)
+        self._drone.manual_control(pitch, roll, throttle, scale.turn.position(command.yaw_rate))
+
+    def _tilt(self, command: Command, measured: Measured, sample_s: float) -> tuple[float, float]:
+        """Return tilt forward and to the right in degrees."""
+        if self._laws is None or isnan(measured.velocity_north) or isnan(measured.heading):
+            return 0.0, 0.0
+        wanted = (command.north, command.east)
+        have = (measured.velocity_north, measured.velocity_east)
+        north, east = (
+            float(law(aim, seen, sample_s).output)
+            for law, aim, seen in zip(self._laws, wanted, have, strict=True)
+        )
+        c, s = cos(radians(measured.heading)), sin(radians(measured.heading))
+        most = self.scale.most_tilt
+        ahead, right = north * c + east * s, east * c - north * s
+        angles = (degrees(atan(acceleration / GRAVITY)) for acceleration in (ahead, right))
+        forward, sideways = (min(most, max(-most, angle)) for angle in angles)
+        return forward, sideways
+
+    def touch_down(self) -> None:
+        """Close the throttle and disarm."""
+        self._drone.manual_control(0.0, 0.0, 0.0, 0.0)
+        self._drone.disarm()
+
+
+def thesis_scale(trim: float = 1480.0) -> RcScale:
+    """Return the channels of the thesis's rotation: µs straight from the law, about a trim 20 µs too low.
+
+    Args:
+        trim: pulse width of the yaw channel at an output of 0, µs.
+    """
+    return RC_SCALES["ArduPilot"]._replace(turn=RcAxis(1.0, trim=trim))

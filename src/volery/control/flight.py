@@ -1,0 +1,301 @@
+"""A flight under a control law with the operator's switch on top.
+
+The loop runs at a fixed period. Each time it looks at the switch first, then executes the manoeuvre, applies
+its command and records the terms of its loops. One function, ``_look``, decides who has control; nothing is
+sent while the transmitter has it. During calls that block, such as the take-off, a second task looks at the
+switch and aborts them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from math import inf, isfinite, nan
+
+from volery.base.errors import NotArrived, Overridden, VehicleError, VoleryError
+from volery.base.frames import LocalFrame
+from volery.base.time import MS, Ns, S, from_seconds, to_seconds
+from volery.control.actuation import Actuation, Measured
+from volery.control.manoeuvres import Landing, LoopSample, Manoeuvre
+from volery.control.safety_switch import Authority, Received, SwitchSettings, SwitchState, decide
+from volery.kernel.task import ExecutionContext
+from volery.kernel.waiting import Rate, sleep
+from volery.trace.events import ControlSample, Text
+from volery.vehicles import Drone
+
+PERIOD: Ns = 50 * MS
+WATCH_PERIOD: Ns = 50 * MS
+SWITCH_WITHIN_S = 30.0
+"""Time within which the operator must move the switch to its middle position before a flight."""
+LANDED_WITHIN_S = 180.0
+STILL_SPEED = 0.15
+"""Speed in m/s below which a descending drone may stand on the ground."""
+STILL_FOR_S = 2.0
+NOTICE = 5
+"""Severity of the record's lines about who has control (syslog)."""
+
+
+class ControlledFlight:
+    """Flies a manoeuvre under a law.
+
+    Args:
+        drone: the drone.
+        manoeuvre: what to fly.
+        actuation: how commands are applied.
+        switch: the operator's switch; ``None`` flies without one.
+        period: sample time, ns.
+        height: height of the take-off, m above home.
+        lands: whether it lands at the end.
+        on_sample: called before each sample of the manoeuvre with the time in s since it began, for pushes
+            and changes of gains.
+    """
+
+    def __init__(
+        self,
+        drone: Drone,
+        manoeuvre: Manoeuvre,
+        actuation: Actuation,
+        *,
+        switch: SwitchSettings | None = None,
+        period: Ns = PERIOD,
+        height: float = 5.0,
+        lands: bool = True,
+        on_sample: Callable[[float], None] = lambda _: None,
+    ) -> None:
+        self._drone, self._manoeuvre, self._actuation = drone, manoeuvre, actuation
+        self._switch, self._period, self._height, self._lands = switch, period, height, lands
+        self._on_sample = on_sample
+        self._landing = Landing()
+        self._state = SwitchState()
+        self._frame: LocalFrame | None = None
+        self._engaged = False
+        self._watching = False
+
+    @property
+    def authority(self) -> Authority:
+        """Who has control."""
+        return self._state.authority
+
+    def run(self) -> None:
+        """Take off if the drone stands, fly the manoeuvre and land.
+
+        Raises:
+            VehicleError: the switch was not received in its middle position, or the drone cannot be flown.
+        """
+        self._await_switch()
+        if not self._drone.flying:
+            self._blocking(lambda: self._actuation.take_off(self._height))
+            self._engaged = self.authority is Authority.AUTONOMOUS
+        if self._fly(self._manoeuvre) and self._lands:
+            self._land()
+
+    # -- the switch
+
+    def _await_switch(self) -> None:
+        """Wait until the operator gives control."""
+        if self._switch is None:
+            self._state = SwitchState(Authority.AUTONOMOUS, 0, "there is no switch")
+            return
+        kernel = self._drone.kernel
+        until = kernel.now() + from_seconds(SWITCH_WITHIN_S)
+        while self._look() is not Authority.AUTONOMOUS:
+            if kernel.now() >= until:
+                pulse = self._received().pulse
+                channel = self._switch.channel
+                found = f"channel {channel} is at {pulse} us" if pulse else f"channel {channel} has no signal"
+                raise NotArrived(
+                    self._drone.name,
+                    "wait for the safety switch",
+                    f"{found}; move it to the middle ({self._switch.manual_below} to "
+                    f"{self._switch.landing_above} us), or fly without a switch",
+                )
+            sleep(kernel, WATCH_PERIOD)
+
+    def _received(self) -> Received:
+        assert self._switch is not None
+        telemetry, now = self._drone.telemetry, self._drone.kernel.now()
+        channels = telemetry.rc
+        index = self._switch.channel - 1
+        pulse = channels[index] if index < len(channels) else 0
+        age = to_seconds(now - telemetry.rc_ns) if telemetry.rc_ns >= 0 else inf
+        return Received(pulse, age, telemetry.silence(now))
+
+    def _look(self) -> Authority:
+        """Look at the switch and return who has control; a change is recorded."""
+        if self._switch is not None:
+            state = decide(self._switch, self._state, self._received())
+            if state.authority is not self._state.authority:
+                self._note(f"{state.authority.value}: {state.why}")
+            self._state = state
+        return self._state.authority
+
+    def _note(self, text: str) -> None:
+        kernel = self._drone.kernel
+        kernel.record(Text(kernel.now(), f"{self._drone.name} control", NOTICE, text))
+
+    # -- calls that block
+
+    def _blocking(self, call: Callable[[], None]) -> None:
+        """Make a call that blocks; the switch aborts it."""
+        with self._watched():
+            try:
+                call()
+            except Overridden:
+                if self.authority is Authority.AUTONOMOUS:
+                    raise
+
+    @contextmanager
+    def _watched(self) -> Iterator[None]:
+        """Look at the switch in a task of its own while the context lasts."""
+        if self._switch is None:
+            yield
+            return
+        self._watching = True
+        name = f"switch of {self._drone.name}"
+        task = self._drone.kernel.spawn(self._watch, name, ExecutionContext(name))
+        try:
+            yield
+        finally:
+            self._watching = False
+            kernel = self._drone.kernel
+            while not task.done:
+                sleep(kernel, WATCH_PERIOD)
+
+    def _watch(self) -> None:
+        while self._watching:
+            authority = self._look()
+            if authority is Authority.MANUAL:
+                self._release()
+                return
+            if authority is Authority.LANDING:
+                with suppress(VoleryError):  # the loop lands it, whatever came of this
+                    self._drone.hold()
+                return
+            sleep(self._drone.kernel, WATCH_PERIOD)
+
+    def _release(self) -> None:
+        self._engaged = False
+        try:
+            self._drone.hand_over()
+        except VoleryError as error:
+            self._note(f"it was released, but remains in {self._drone.mode}: {error}")
+
+    # -- the loop
+
+    def _fly(self, manoeuvre: Manoeuvre) -> bool:
+        """Fly *manoeuvre*; return whether it ended, and not the flight."""
+        kernel = self._drone.kernel
+        rate = Rate(kernel, self._period)
+        last = kernel.now()
+        begun = last
+        while not manoeuvre.done:
+            rate.sleep()
+            authority = self._look()
+            now = kernel.now()
+            sample_s, last = max(to_seconds(now - last), 1e-3), now
+            if authority is Authority.LANDING:
+                self._land()
+                return False
+            if authority is Authority.MANUAL:
+                if self._engaged:
+                    self._release()
+                if not self._drone.armed:
+                    self._note("the pilot has landed and disarmed")
+                    return False
+                continue
+            if not self._take_control(manoeuvre):
+                continue
+            self._on_sample(to_seconds(now - begun))
+            self._sample(manoeuvre, sample_s)
+        return True
+
+    def _take_control(self, manoeuvre: Manoeuvre) -> bool:
+        if not self._engaged:
+            self._blocking(self._actuation.engage)
+            if self.authority is Authority.MANUAL:
+                return False
+            manoeuvre.reset()
+            self._engaged = True
+        return True
+
+    def _sample(self, manoeuvre: Manoeuvre, sample_s: float) -> Measured:
+        measured = self._measure()
+        command, samples = manoeuvre.step(measured, sample_s)
+        self._actuation.apply(command, measured, sample_s)
+        for one in samples:
+            self._record(one)
+        return measured
+
+    def _measure(self) -> Measured:
+        """Return what telemetry reports; an old position is unknown."""
+        seen = self._drone.telemetry
+        north = east = nan
+        if seen.position is not None and seen.located:
+            if self._frame is None:
+                at = seen.home or seen.position
+                self._frame = LocalFrame(at.latitude, at.longitude, at.altitude.metres)
+            here = seen.position
+            east, north, _ = self._frame.to_enu(here.latitude, here.longitude, here.altitude.metres)
+        heading = seen.attitude.heading if not seen.stale else nan
+        return Measured(heading, north, east, seen.above_home, *seen.velocity)
+
+    def _record(self, one: LoopSample) -> None:
+        kernel, terms = self._drone.kernel, one.terms
+        figures = (terms.error, terms.proportional, terms.integral, terms.derivative, terms.output)
+        kernel.record(
+            ControlSample(
+                kernel.now(),
+                self._drone.name,
+                one.loop,
+                one.controller,
+                one.unit,
+                one.period,
+                one.goal,
+                one.measurement,
+                *map(float, figures),
+            )
+        )
+
+    # -- the landing
+
+    def _land(self) -> None:
+        """Descend under the landing law and disarm; without telemetry or measurement the autopilot lands."""
+        kernel = self._drone.kernel
+        landing, still_s = self._landing, 0.0
+        landing.reset()
+        rate = Rate(kernel, self._period)
+        last = kernel.now()
+        until = last + from_seconds(LANDED_WITHIN_S)
+        try:
+            while kernel.now() < until:
+                rate.sleep()
+                now = kernel.now()
+                sample_s, last = max(to_seconds(now - last), 1e-3), now
+                if self._look() is Authority.MANUAL:
+                    self._release()
+                    self._fly_on_by_pilot()
+                    return
+                if not self._drone.armed:
+                    return
+                if self._drone.telemetry.stale or not isfinite(self._drone.telemetry.above_home):
+                    break
+                if not self._take_control(landing):
+                    continue
+                measured = self._sample(landing, sample_s)
+                still = abs(measured.velocity_up) < STILL_SPEED and measured.up < 1.0
+                still_s = still_s + sample_s if still else 0.0
+                if self._drone.landed or still_s >= STILL_FOR_S:
+                    self._actuation.touch_down()
+                    return
+        except VehicleError as error:
+            if isinstance(error, Overridden):
+                raise
+            self._note(f"the autopilot lands: {error}")
+        self._blocking(self._drone.land)
+
+    def _fly_on_by_pilot(self) -> None:
+        """Wait until the pilot has landed, or gives control back."""
+        while self._drone.armed and self._look() is Authority.MANUAL:
+            sleep(self._drone.kernel, S // 10)
+        if self._drone.armed:
+            self._land()

@@ -1,0 +1,160 @@
+"""The operator's safety switch: who has control, as a pure function of what is received.
+
+One RC channel decides (by default channel 6): low is manual takeover, the middle lets the program fly, high
+is an emergency landing. The transmitter always wins: a low switch takes over from everything, at once and in
+every state. The emergency landing is final, but for the takeover. A program that starts, or that lost
+control, flies only after the switch has been received in its middle position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from math import isnan
+from typing import NamedTuple
+
+from volery.base.errors import UsageError, choices
+
+
+class Authority(Enum):
+    """Who has control, and for what."""
+
+    MANUAL = "manual"
+    AUTONOMOUS = "autonomous"
+    LANDING = "emergency landing"
+
+
+class Reaction(Enum):
+    """What happens when something is lost in the air."""
+
+    LAND = "land"
+    RELEASE = "release"
+    CONTINUE = "continue"
+
+
+AFTER: Mapping[Reaction, Authority] = {
+    Reaction.LAND: Authority.LANDING,
+    Reaction.RELEASE: Authority.MANUAL,
+    Reaction.CONTINUE: Authority.AUTONOMOUS,
+}
+LEAST_PULSE, GREATEST_PULSE = 800, 2200
+"""Range of valid pulse widths, µs; autopilots report 0 or 65535 for a channel without a signal."""
+CONFIRMED = 2
+"""Reports in a row that begin an emergency landing: a single wrong one must not."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SwitchSettings:
+    """Which channel is the switch, where its positions end, and the reactions to losses.
+
+    Attributes:
+        channel: RC channel, from 1.
+        manual_below: pulse width below which the transmitter takes over, µs.
+        landing_above: pulse width above which the emergency landing begins, µs.
+        missing_s: age of the last report from which the transmitter counts as lost, s.
+        silent_s: silence of the autopilot from which telemetry counts as lost, s.
+        on_rc_loss: reaction to the loss of the transmitter.
+        on_telemetry_loss: reaction to the loss of telemetry.
+    """
+
+    channel: int = 6
+    manual_below: int = 1200
+    landing_above: int = 1700
+    missing_s: float = 1.0
+    silent_s: float = 2.0
+    on_rc_loss: Reaction = Reaction.LAND
+    on_telemetry_loss: Reaction = Reaction.LAND
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.channel <= 18:
+            raise UsageError(f"channel {self.channel} of the safety switch; give one from 1 to 18")
+        if not LEAST_PULSE < self.manual_below < self.landing_above < GREATEST_PULSE:
+            raise UsageError(
+                f"safety switch: manual below {self.manual_below} and landing above {self.landing_above}; "
+                f"give rising pulse widths between {LEAST_PULSE} and {GREATEST_PULSE} us"
+            )
+        for name in ("missing_s", "silent_s"):
+            if isnan(getattr(self, name)) or getattr(self, name) <= 0.0:
+                raise UsageError(f"safety switch: {name}={getattr(self, name)}; give seconds above 0")
+        if self.on_telemetry_loss is Reaction.CONTINUE:
+            raise UsageError("safety switch: no law can continue without telemetry; give land or release")
+
+
+def parse_reaction(text: str) -> Reaction:
+    """Return the reaction called *text*; ``UsageError`` names the valid ones."""
+    for one in Reaction:
+        if one.value == text:
+            return one
+    raise UsageError(f"reaction {text!r}; there is {choices([one.value for one in Reaction])}")
+
+
+class SwitchState(NamedTuple):
+    """State between two decisions.
+
+    Attributes:
+        authority: who has control.
+        confirmed: reports of the landing position in a row.
+        why: what led to the authority.
+    """
+
+    authority: Authority = Authority.MANUAL
+    confirmed: int = 0
+    why: str = "the switch was not received in its middle position yet"
+
+
+class Received(NamedTuple):
+    """What is known at one moment.
+
+    Attributes:
+        pulse: pulse width of the switch, µs; 0 if the receiver reports none.
+        age_s: age of that report, s; infinite before the first.
+        silent_s: time since the last message of the autopilot, s.
+    """
+
+    pulse: int
+    age_s: float
+    silent_s: float
+
+    @property
+    def valid(self) -> bool:
+        """Whether the pulse width is one of a transmitter."""
+        return LEAST_PULSE <= self.pulse <= GREATEST_PULSE
+
+
+def decide(settings: SwitchSettings, state: SwitchState, received: Received) -> SwitchState:
+    """Return the state after one look at what is received.
+
+    Args:
+        settings: positions and reactions.
+        state: state after the last look.
+        received: the present switch and silences.
+    """
+    if received.silent_s > settings.silent_s:
+        return _lost(state, settings.on_telemetry_loss, "telemetry is lost")
+    if received.age_s > settings.missing_s:
+        return _lost(state, settings.on_rc_loss, "the transmitter is lost")
+    if not received.valid:
+        return _lost(state, settings.on_rc_loss, f"channel {settings.channel} has no signal")
+    return _by_position(settings, state, received.pulse)
+
+
+def _by_position(settings: SwitchSettings, state: SwitchState, pulse: int) -> SwitchState:
+    if pulse < settings.manual_below:
+        return SwitchState(Authority.MANUAL, 0, f"the switch is at {pulse} us: manual takeover")
+    if pulse > settings.landing_above:
+        confirmed = state.confirmed + 1
+        if state.authority is Authority.AUTONOMOUS and confirmed >= CONFIRMED:
+            why = f"the switch is at {pulse} us: emergency landing"
+            return SwitchState(Authority.LANDING, confirmed, why)
+        return state._replace(confirmed=confirmed)
+    if state.authority is Authority.MANUAL:
+        return SwitchState(Authority.AUTONOMOUS, 0, f"the switch is at {pulse} us: autonomous")
+    return state._replace(confirmed=0)
+
+
+def _lost(state: SwitchState, reaction: Reaction, why: str) -> SwitchState:
+    """Return the state after a loss: it ends autonomous flight only, and never begins one."""
+    if state.authority is not Authority.AUTONOMOUS or reaction is Reaction.CONTINUE:
+        return state._replace(confirmed=0)
+    return SwitchState(AFTER[reaction], 0, f"{why}: {reaction.value}")

@@ -1,0 +1,135 @@
+"""The safety switch over random sequences of what is received."""
+
+from math import inf, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from volery.base.errors import UsageError
+from volery.control.safety_switch import (
+    Authority,
+    Reaction,
+    Received,
+    SwitchSettings,
+    SwitchState,
+    decide,
+    parse_reaction,
+)
+
+MANUAL, AUTONOMOUS, LANDING = Authority
+pulses = st.one_of(st.integers(800, 2200), st.sampled_from([0, 65535, 1199, 1200, 1700, 1701]))
+looks = st.builds(
+    Received, pulses, st.sampled_from([0.0, 0.1, 0.99, 1.5, inf]), st.sampled_from([0.0, 0.5, 3.0])
+)
+settings_of = st.builds(
+    SwitchSettings,
+    on_rc_loss=st.sampled_from(Reaction),
+    on_telemetry_loss=st.sampled_from([Reaction.LAND, Reaction.RELEASE]),
+)
+
+
+def at(pulse: int) -> Received:
+    return Received(pulse, 0.05, 0.05)
+
+
+DEFAULT = SwitchSettings()
+
+
+def after(*received: Received, settings: SwitchSettings = DEFAULT) -> SwitchState:
+    state = SwitchState()
+    for one in received:
+        state = decide(settings, state, one)
+    return state
+
+
+@given(settings_of, st.lists(looks, max_size=40))
+def test_a_received_low_switch_takes_over_from_every_state(settings, sequence):
+    assert after(*sequence, at(1000), settings=settings).authority is MANUAL
+
+
+@given(settings_of, st.lists(looks, max_size=40))
+def test_the_program_gets_control_only_by_a_fresh_middle_position(settings, sequence):
+    state = SwitchState()
+    for one in sequence:
+        before, state = state, decide(settings, state, one)
+        if state.authority is AUTONOMOUS and before.authority is not AUTONOMOUS:
+            assert 1200 <= one.pulse <= 1700
+            assert one.age_s <= settings.missing_s
+            assert one.silent_s <= settings.silent_s
+
+
+@given(settings_of, st.lists(looks, max_size=40))
+def test_an_emergency_landing_ends_by_a_takeover_only(settings, sequence):
+    state = SwitchState()
+    for one in sequence:
+        before, state = state, decide(settings, state, one)
+        if before.authority is LANDING and state.authority is not LANDING:
+            assert state.authority is MANUAL
+            assert one.valid
+            assert one.pulse < settings.manual_below
+
+
+@given(settings_of, st.lists(looks, max_size=40))
+def test_after_a_takeover_nothing_but_the_switch_gives_control_back(settings, sequence):
+    """Neither a loss nor the landing position begins anything that the transmitter has ended."""
+    state = after(at(1500), at(1000))
+    for one in sequence:
+        state = decide(settings, state, one)
+        if state.authority is AUTONOMOUS:
+            assert one.valid
+            break
+        assert state.authority is MANUAL
+
+
+def test_the_positions_of_the_thesis():
+    assert [after(at(1500), at(one), at(one)).authority for one in (1199, 1200, 1450, 1700, 1701)] == [
+        MANUAL, AUTONOMOUS, AUTONOMOUS, AUTONOMOUS, LANDING,
+    ]  # fmt: skip
+
+
+def test_one_wrong_report_does_not_land():
+    assert after(at(1500), at(1900), at(1500)).authority is AUTONOMOUS
+    assert after(at(1500), at(1900), at(1500), at(1900)).authority is AUTONOMOUS
+
+
+@pytest.mark.parametrize(
+    ("reaction", "expected"),
+    [(Reaction.LAND, LANDING), (Reaction.RELEASE, MANUAL), (Reaction.CONTINUE, AUTONOMOUS)],
+)
+@pytest.mark.parametrize("lost", [Received(1500, 1.1, 0.0), Received(0, 0.1, 0.0), Received(65535, 0.1, 0.0)])
+def test_a_lost_transmitter_has_the_configured_reaction(reaction, expected, lost):
+    state = after(at(1500), lost, settings=SwitchSettings(on_rc_loss=reaction))
+    assert state.authority is expected
+
+
+@pytest.mark.parametrize(("reaction", "expected"), [(Reaction.LAND, LANDING), (Reaction.RELEASE, MANUAL)])
+def test_lost_telemetry_has_the_configured_reaction(reaction, expected):
+    state = after(at(1500), Received(1500, 2.5, 2.5), settings=SwitchSettings(on_telemetry_loss=reaction))
+    assert state.authority is expected
+    assert "telemetry" in state.why
+
+
+def test_a_switch_that_is_stuck_high_at_the_start_never_flies():
+    assert after(*[at(1900)] * 20).authority is MANUAL
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"channel": 0},
+        {"manual_below": 1800},
+        {"missing_s": nan},
+        {"silent_s": 0.0},
+        {"on_telemetry_loss": Reaction.CONTINUE},
+    ],
+)
+def test_wrong_settings_are_refused(wrong):
+    with pytest.raises(UsageError, match="switch"):
+        SwitchSettings(**wrong)
+
+
+def test_an_unknown_reaction_is_named():
+    assert parse_reaction("release") is Reaction.RELEASE
+    with pytest.raises(UsageError, match="'fly'; there is continue, land or release"):
+        parse_reaction("fly")
