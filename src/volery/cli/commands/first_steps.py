@@ -8,7 +8,6 @@ and how to install it.
 
 from __future__ import annotations
 
-import ctypes
 import multiprocessing
 import os
 import platform
@@ -45,7 +44,6 @@ if TYPE_CHECKING:
 commands = Commands("First steps")
 
 DEMO_MODEL, STARTER_MODEL = "delivery", "starter"
-PR_SET_PDEATHSIG = 1
 
 POLL_PERIOD_S = 0.1
 """Wall seconds between two reads of the progress that the processes send."""
@@ -156,9 +154,7 @@ def run_all(output: Output, jobs: Mapping[str, Job]) -> dict[str, JobOutcome]:
     reports = context.SimpleQueue()
     with (
         live_progress(output) as drawings,
-        ProcessPoolExecutor(
-            len(jobs), context, _begin_process, (reports if drawings else None, os.getpid())
-        ) as pool,
+        ProcessPoolExecutor(len(jobs), context, _begin_process, (reports if drawings else None,)) as pool,
         _signals_left_to_processes(),
     ):
         futures = {name: pool.submit(_run, name, job) for name, job in jobs.items()}
@@ -200,26 +196,26 @@ def _signals_left_to_processes() -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _begin_process(queue: Any, parent: int) -> None:
-    """Begin a process that runs simulations: where it reports, and its end with *parent*."""
-    _Reports.open(queue, parent)
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-    if os.getppid() != parent:  # it died before
+def _begin_process(queue: Any) -> None:
+    """Begin a process that runs simulations: its queue for progress, and SIGTERM when its parent ends.
+
+    The kernel's own parent-death signal does not serve here: it is sent again for each thread of the parent,
+    and a second signal would stop the run at once.
+    """
+    _Reports.queue = queue
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    if parent := multiprocessing.parent_process():
+        parent.join()
         os.kill(os.getpid(), signal.SIGTERM)
 
 
 class _Reports:
-    """The queue for progress and the process that reads it.
-
-    Both are set once when a process starts: a queue cannot be sent later.
-    """
+    """The queue for progress. It is set once when a process starts: a queue cannot be sent later."""
 
     queue: Any = None
-    parent = 0
-
-    @classmethod
-    def open(cls, queue: Any, parent: int) -> None:
-        cls.queue, cls.parent = queue, parent
 
     @classmethod
     def sender(cls, name: str) -> Callable[[Progress], None] | None:
@@ -236,7 +232,8 @@ def _run(name: str, job: Job) -> JobOutcome:
 
     options = Options(fidelity="code", seed=job.seed, out=job.out, show=_Reports.sender(name))
     run = simulate(job.model, options, allocation=job.allocation)
-    if os.getppid() != _Reports.parent:  # it was killed: nothing would end this process
+    parent = multiprocessing.parent_process()
+    if parent is not None and not parent.is_alive():  # nothing would end this process
         os._exit(FAILED)
     problems = [] if run.completed else [f"{run.record.outcome.status}: {run.record.outcome.reason}"]
     return JobOutcome(run.record, job.out, (*problems, *run.problems))
