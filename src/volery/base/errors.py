@@ -47,10 +47,13 @@ class Location(NamedTuple):
 
 
 class ModelError(VoleryError):
-    """The model is wrong. The message names file, line, path in the model, fault and valid choices."""
+    """The model is wrong. The message names file, line, path in the model, fault and valid choices.
 
-    def __init__(self, what: str, path: str = "", where: Location | None = None) -> None:
-        self.what, self.path, self.where = what, path, where
+    ``code`` is that of the rule that the model breaks, such as ``V103``; empty if it is of none.
+    """
+
+    def __init__(self, what: str, path: str = "", where: Location | None = None, code: str = "") -> None:
+        self.what, self.path, self.where, self.code = what, path, where, code
         super().__init__(": ".join(part for part in (str(where) if where else "", path, what) if part))
 
 

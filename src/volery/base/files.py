@@ -58,13 +58,27 @@ def read_text(path: Path) -> str:
         OSError: The file cannot be read, is no regular file, or is larger than ``MAX_TEXT``.
         UnicodeDecodeError: It is not UTF-8.
     """
+    data = read_bytes(path, MAX_TEXT)
+    return data.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """Return the bytes of a regular file.
+
+    Args:
+        path: The file.
+        most: Largest size that is read, bytes.
+
+    Raises:
+        OSError: The file cannot be read, is no regular file, or is larger than *most*.
+    """
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     with os.fdopen(descriptor, "rb") as file:
         _check_regular(descriptor, path)
-        data = file.read(MAX_TEXT + 1)
-    if len(data) > MAX_TEXT:
-        raise OSError(errno.EFBIG, f"it is larger than {MAX_TEXT} bytes", str(path))
-    return data.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise OSError(errno.EFBIG, f"it is larger than {most} bytes", str(path))
+    return data
 
 
 def _check_regular(descriptor: int, path: Path) -> None:

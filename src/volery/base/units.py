@@ -105,11 +105,12 @@ SPEED = Kind("speed", "m/s", "3 m/s or 18 km/h")
 ANGLE = Kind("angle", "deg", "30 deg or 0.5 rad")
 ENERGY = Kind("energy", "J", "3 mJ or 0.2 Wh")
 CHARGE = Kind("battery capacity", "C", "5 Ah or 5200 mAh")
+POWER = Kind("power", "W", "2.7 W or 300 mW")
 VOLTAGE = Kind("voltage", "V", "14.8 V")
 BANDWIDTH = Kind("bandwidth", "bit/s", "57600 bit/s or 20 Mbit/s")
 DATA_SIZE = Kind("size", "B", "96 B or 12 kB")
 RATIO = Kind("ratio", "1", "0.5 % or 0.005")
-KINDS = (TIME, FREQUENCY, LENGTH, SPEED, ANGLE, ENERGY, CHARGE, VOLTAGE, BANDWIDTH, DATA_SIZE, RATIO)
+KINDS = (TIME, FREQUENCY, LENGTH, SPEED, ANGLE, ENERGY, POWER, CHARGE, VOLTAGE, BANDWIDTH, DATA_SIZE, RATIO)
 
 
 def unit(text: str) -> Quantity:

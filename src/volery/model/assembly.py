@@ -13,9 +13,21 @@ from pathlib import Path as FilePath
 
 from volery.base import files
 from volery.base.errors import Location, ModelError, UsageError
+from volery.model import rules
 from volery.model.document import GEOGRAPHY, keys_at, names_are_free, short_key
 from volery.model.system import Source
-from volery.model.text import Node, Path, Problems, no_such, parse, parse_value, written
+from volery.model.text import (
+    Node,
+    Path,
+    Problems,
+    is_inside,
+    no_such,
+    outside,
+    parse,
+    parse_value,
+    stated_texts,
+    written,
+)
 
 
 @dataclass(frozen=True)
@@ -66,7 +78,7 @@ def apply_changes(root: Node, changes: Iterable[Change], problems: Problems) -> 
         if change.path[0] == "run":  # a scenario's own `duration` and `until` are copied there
             problems.copied(change.path, change.stated_at or None)
         if complaint:
-            problems.add(change.stated_at or change.path, complaint, change.where)
+            problems.add(change.stated_at or change.path, complaint, change.where, rules.BAD_CHANGE)
 
 
 def _apply(root: Node, change: Change) -> str:
@@ -169,7 +181,7 @@ def read_text(path: FilePath, name: str, where: Location | None = None, at: Path
         what = f"{name!r} is not text"
     except OSError as error:
         what = f"{name!r} cannot be read: {error.strerror}"
-    raise ModelError(what, written(at), where)
+    raise ModelError(what, written(at), where, rules.MISSING_FILE.code)
 
 
 def _near(path: FilePath) -> str:
@@ -177,14 +189,88 @@ def _near(path: FilePath) -> str:
     return f"; in that folder there is {', '.join(models[:5])}" if models else ""
 
 
-def assemble(file: FilePath, selection: Selection) -> tuple[Assembly, Problems]:
-    """Read *file* and the files that it names, and apply the selection. Return the tree and its problems."""
-    text = read_text(file, str(file))
-    root = parse(text, str(file))
-    if not isinstance(root.value, dict):
-        raise ModelError("a model is a mapping that starts with `volery: 1`", "", root.where)
+DEFAULT_FILE = "model.yaml"
+"""The file that a folder stands for."""
+
+
+def read_tree(file: FilePath) -> Node:
+    """Return the tree of a model as its files state it, without an allocation or a scenario.
+
+    Raises:
+        ModelError: a file cannot be read, or is no YAML of a model.
+    """
+    made, problems = _read_files(file)
+    problems.raise_if_any()
+    return made.root
+
+
+def _read_files(file: FilePath) -> tuple[Assembly, Problems]:
+    """Read *file* and the files that it includes, as one tree."""
+    root, text = _read_mapping(file, str(file), "a model is a mapping that starts with `volery: 1`")
     made = Assembly(root, (Source(file.name, text),))
     problems = Problems(root.locate)
+    _include(made, root, file.parent, problems, (file.resolve(),))
+    return made, problems
+
+
+def _read_mapping(
+    file: FilePath, name: str, expected: str, where: Location | None = None, at: Path = ()
+) -> tuple[Node, str]:
+    text = read_text(file, name, where, at)
+    root = parse(text, str(file))
+    if not isinstance(root.value, dict):
+        raise ModelError(expected, "", root.where, rules.NOT_A_MODEL.code)
+    return root, text
+
+
+def _include(
+    made: Assembly, part: Node, folder: FilePath, problems: Problems, open_: tuple[FilePath, ...]
+) -> None:
+    """Add the files that *part* includes to the tree; *open_* are the files that are being read."""
+    node = part.items.pop("include", None)
+    listed = node.value if node is not None and isinstance(node.value, list) else [node] if node else []
+    for one in listed:
+        if not isinstance(one, Node) or not isinstance(one.value, str):
+            problems.add(("include",), "a file name is expected", node.where if node else None)
+            continue
+        file = folder / one.value
+        if not _allowed(made.root, folder, file):
+            problems.add(("include",), outside(one.value), one.where, rules.OUTSIDE)
+            continue
+        if file.resolve() in open_:
+            problems.add(("include",), f"{one.value!r} includes itself", one.where, rules.CIRCULAR)
+            continue
+        included, text = _read_mapping(
+            file, one.value, "an included file is a mapping", one.where, ("include",)
+        )
+        made.sources = (*made.sources, Source(one.value, text))
+        _include(made, included, folder, problems, (*open_, file.resolve()))
+        _add_entries(made.root, included, (), problems)
+
+
+def _add_entries(root: Node, included: Node, path: Path, problems: Problems) -> None:
+    """Add the entries of *included* to *root*; what both state must be mappings of different entries."""
+    for key, below in included.items.items():
+        own = root.items.get(key)
+        if own is None or own.value is None:
+            root.items[key] = below
+        elif (*path, key) == ("volery",):
+            continue
+        elif len(path) < 2 and isinstance(own.value, dict) and isinstance(below.value, dict):
+            _add_entries(own, below, (*path, key), problems)
+        else:
+            what = f"{below.where} states it, too"
+            problems.add((*path, key), what, own.where, rules.DUPLICATE_KEY)
+
+
+def _allowed(root: Node, folder: FilePath, file: FilePath) -> bool:
+    return is_inside(file, [folder, *(folder / one for one in stated_texts(root, "files_from"))])
+
+
+def assemble(file: FilePath, selection: Selection) -> tuple[Assembly, Problems]:
+    """Read *file* and the files that it names, and apply the selection. Return the tree and its problems."""
+    made, problems = _read_files(file)
+    root = made.root
     early, late = _parted(selection.options)
     apply_changes(root, early, problems)
     all_changes = [
@@ -265,11 +351,11 @@ def _chain(root: Node, section: str, name: str, problems: Problems) -> list[str]
         if said is None or not isinstance(said.value, str):
             return chain[::-1]
         if said.value not in names:
-            problems.add((section, chain[-1], "extends"), no_such(said.value, section[:-1], names))
+            problems.unknown((section, chain[-1], "extends"), said.value, section[:-1], names)
             return chain[::-1]
         if said.value in chain:
             around = " -> ".join([*chain, said.value])
-            problems.add((section, chain[-1], "extends"), f"a circle: {around}")
+            problems.add((section, chain[-1], "extends"), f"a circle: {around}", rule=rules.CIRCULAR)
             return chain[::-1]
         chain.append(said.value)
 
@@ -281,10 +367,10 @@ def _merge_world(made: Assembly, folder: FilePath, all_changes: list[Change], pr
     if said is None or not isinstance(said.value, str) or not said.value:
         return
     name = said.value
-    text = read_text(folder / name, name, said.where, WORLD)
-    world = parse(text, str(folder / name))
-    if not isinstance(world.value, dict):
-        raise ModelError("a world file is a mapping", "", world.where)
+    if not _allowed(made.root, folder, folder / name):
+        problems.add(WORLD, outside(name), said.where, rules.OUTSIDE)
+        return
+    world, text = _read_mapping(folder / name, name, "a world file is a mapping", said.where, WORLD)
     made.sources = (*made.sources, Source(name, text))
     environment = made.root.at(("environment",))
     if environment is None or not isinstance(environment.value, dict):
@@ -294,7 +380,8 @@ def _merge_world(made: Assembly, folder: FilePath, all_changes: list[Change], pr
         if key == "volery":
             continue
         if key not in known:
-            problems.add(("environment", key), f"a world file has no such key; {_listed(known)}", node.where)
+            what = f"a world file has no such key; {_listed(known)}"
+            problems.add(("environment", key), what, node.where, rules.UNKNOWN_KEY)
             continue
         environment.value[key] = _under(environment.value.get(key), node)
 

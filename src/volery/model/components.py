@@ -13,6 +13,8 @@ from typing import Annotated
 
 from volery.base.errors import Location
 from volery.base.time import Ns
+from volery.model import rules
+from volery.model.data_types import check_type
 from volery.model.fields import (
     ANYTHING,
     DATA_SIZE,
@@ -20,6 +22,7 @@ from volery.model.fields import (
     FREQUENCY,
     PERIOD,
     PROCESSOR_KIND,
+    SHARE,
     TEXT,
     TIME,
     Key,
@@ -35,8 +38,8 @@ from volery.model.fields import (
     WrongValueError,
     expected,
 )
-from volery.model.reading import Reading
-from volery.model.text import Node, Path
+from volery.model.reading import PROVENANCES, Reading
+from volery.model.text import Node, Path, is_inside, outside, stated_texts
 
 Value = bool | int | float | str | None | Sequence["Value"] | Mapping[str, "Value"]
 """A parameter: what YAML can state. A number with a unit (``6 / h``) arrives as an SI number."""
@@ -59,11 +62,11 @@ CPP_LANGUAGES = ("c++", "roscpp", "rclcpp")
 ROS_LANGUAGES = ("rospy", "rclpy", "roscpp", "rclcpp")
 """Languages whose components are ROS nodes."""
 
+QUEUE_POLICIES = ("discard", "remove-first", "remove-last", "flush")
+"""What a full queue does: refuse the new call, drop the oldest or the newest one that waits, or drop all."""
+
 ROS_CALLS = ("publish", "sleep", "spin_once", "call_service")
 """Calls into ROS that ``calls`` may state by their bare names."""
-
-PROVENANCES = ("estimated", "measured", "calculated", "required")
-"""Where a figure comes from (MARTE's NFP source)."""
 
 LIBRARY: Path = ("components",)
 _MANY = "[]"
@@ -87,6 +90,8 @@ class _Arguments(Syntax):
         """See ``Syntax``."""
         types = MapOf(TEXT).read(node, path, reading)
         assert isinstance(types, dict)
+        for name, type_ in types.items():
+            check_type(reading, (*path, name), type_)
         return tuple(Argument(name, type_) for name, type_ in types.items())
 
     def schema(self, definitions: Schema) -> Schema:
@@ -129,7 +134,9 @@ class _Interface(Syntax):
         """See ``Syntax``."""
         name = str(path[-1])
         if name in SPECIAL_INTERFACES:
-            reading.problems.add(path, f"{name} is there in every model; choose another name")
+            reading.problems.add(
+                path, f"{name} is there in every model; choose another name", rule=rules.DUPLICATE_NAME
+            )
         return Interface(name, OPERATIONS.read(node, path, reading), node.where)
 
     def schema(self, definitions: Schema) -> Schema:
@@ -176,6 +183,7 @@ def check_frequency(reading: Reading, path: Path, kind: str, frequency_hz: float
             (*path, "frequency"),
             f"{frequency_hz / 1e6:g} MHz is outside what is known of {kind}: "
             f"{known.least_hz / 1e6:g} to {known.greatest_hz / 1e6:g} MHz",
+            rule=rules.FREQUENCY_RANGE,
         )
 
 
@@ -190,7 +198,17 @@ class Figure:
     at: Annotated[Reference, REFERENCE, "Where it was taken; that of the component if it is not given."]
     energy_j: Annotated[float | None, ENERGY, "Energy; by the processor's law if it is not given."] = None
     provenance: Annotated[str, OneOf(PROVENANCES), "Where the figure comes from."] = "estimated"
+    best_ns: Annotated[Ns | None, TIME, "Shortest time; `time`, the mean, if it is not given."] = None
+    worst_ns: Annotated[
+        Ns | None, TIME, "Longest time, for static analysis; `time`, the mean, if it is not given."
+    ] = None
+    uncertainty: Annotated[float | None, SHARE, "Relative standard uncertainty of the time."] = None
     where: Location | None = field(default=None, compare=False)
+
+    @property
+    def longest_ns(self) -> Ns:
+        """The time that static analysis counts."""
+        return self.time_ns if self.worst_ns is None else self.worst_ns
 
     @property
     def processor(self) -> str:
@@ -210,13 +228,26 @@ def _with_reference(node: Node, path: Path, reading: Reading) -> Node:
     default = reading.root.at((*path[:2], "at"))
     if default is None:
         what = "a time means nothing without where it was taken: add `at: {processor: ..., frequency: ...}`"
-        reading.problems.add(path, what)
+        reading.problems.add(path, what, rule=rules.NO_REFERENCE)
         raise WrongValueError("")
     reading.problems.copied((*path, "at"), (*path[:2], "at"))
     return replace(node, value={**node.items, "at": default})
 
 
-FIGURES = ListOf(Record(Figure, prepare=_with_reference, supplied=("at",)), bare=True)
+class _Figure(Record):
+    """A figure whose times are in order."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Figure:
+        """See ``Syntax``."""
+        made: Figure = super().read(node, path, reading)
+        best = made.time_ns if made.best_ns is None else made.best_ns
+        if not best <= made.time_ns <= made.longest_ns:
+            what = "its times are out of order: best is at most time, and time at most worst"
+            reading.problems.add(path, what, rule=rules.TIME_ORDER)
+        return made
+
+
+FIGURES = ListOf(_Figure(Figure, prepare=_with_reference, supplied=("at",)), bare=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,6 +301,37 @@ class Subscription:
     type: Annotated[str, TEXT, "Message type, such as `sensor_msgs/Image`; its callback is an activation."]
 
 
+@dataclass(frozen=True, slots=True)
+class Queue:
+    """What a port does with calls that wait (S3D's ClientServerQueuePort)."""
+
+    size: Annotated[int | None, Whole(least=1), "Calls that may wait; any number if it is not given."] = None
+    full: Annotated[str, OneOf(QUEUE_POLICIES), "What happens to a call when the queue is full."] = "discard"
+    timeout_ns: Annotated[Ns | None, PERIOD, "Time after which a call fails; never if it is not given."] = (
+        None
+    )
+    retries: Annotated[int, Whole(least=0), "How often a failed call is repeated."] = 0
+
+
+class _Queues(Syntax):
+    """Queues by the names of the component's ports."""
+
+    below = MapOf(Record(Queue))
+
+    def read(self, node: Node, path: Path, reading: Reading) -> dict[str, Queue]:
+        """See ``Syntax``."""
+        made = self.below.read(node, path, reading)
+        assert isinstance(made, dict)
+        ports = reading.names((*path[:-1], "provides"), (*path[:-1], "requires"))
+        return {
+            name: queue for name, queue in made.items() if reading.known((*path, name), name, "port", ports)
+        }
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return self.below.schema(definitions)
+
+
 CALLS = MapOf(MapOf(Whole(least=0), free=True))
 ACTIVATION = "activation"
 """What ``calls`` are stated for, beside operations."""
@@ -298,7 +360,7 @@ class _RequiredPort(Syntax):
         reading.known(path, interface, "interface", [*reading.names(("interfaces",)), *SPECIAL_INTERFACES])
         if port in INSTANCE_KEYS:
             what = f"a required port cannot be called {port!r}: instances have a key of that name"
-            reading.problems.add(path, what)
+            reading.problems.add(path, what, rule=rules.DUPLICATE_NAME)
         return RequiredPort(port, interface, node.value.endswith(_MANY))
 
     def schema(self, definitions: Schema) -> Schema:
@@ -320,7 +382,8 @@ class _ProvidedPort(Syntax):
         interface = node.value
         if interface in SPECIAL_INTERFACES:
             provider = "the environment" if interface == ENVIRONMENT_INTERFACE else "a vehicle"
-            reading.problems.add(path, f"{interface} is provided by {provider}, not by a component")
+            what = f"{interface} is provided by {provider}, not by a component"
+            reading.problems.add(path, what, rule=rules.INTERFACE_MISMATCH)
         else:
             reading.known(path, interface, "interface", reading.names(("interfaces",)))
         return interface
@@ -330,6 +393,13 @@ class _ProvidedPort(Syntax):
         return {"type": "string"}
 
 
+def check_inside(reading: Reading, path: Path, name: str) -> None:
+    """Report a file outside the model's folder and the folders of ``files_from``."""
+    allowed = [reading.folder, *(reading.folder / one for one in stated_texts(reading.root, "files_from"))]
+    if not is_inside(reading.folder / name, allowed):
+        reading.problems.add(path, outside(name), rule=rules.OUTSIDE)
+
+
 class _File(Syntax):
     """A file beside the model; a folder, too, for C++."""
 
@@ -337,13 +407,15 @@ class _File(Syntax):
         """See ``Syntax``."""
         if not isinstance(node.value, str):
             raise expected("text", node)
+        check_inside(reading, path, node.value)
         file = reading.folder / node.value
         language = reading.root.at((*path[:-1], "language"))
         folder = language is not None and language.value in CPP_LANGUAGES and file.is_dir()
         if node.value and not file.is_file() and not folder:
             there = sorted(found.name for found in file.parent.glob("*") if found.is_file())
             beside = f"; in that folder there is {', '.join(there[:8])}" if there else ""
-            reading.problems.add(path, f"there is no file {node.value!r} beside the model{beside}")
+            what = f"there is no file {node.value!r} beside the model{beside}"
+            reading.problems.add(path, what, rule=rules.MISSING_FILE)
         return node.value
 
     def schema(self, definitions: Schema) -> Schema:
@@ -377,6 +449,12 @@ class Component:
         str, Key("class"), TEXT, "Class in the file; by default, the name of the component in camel case."
     ] = ""
     build: Annotated[Build, Record(Build), "How C++ is compiled."] = Build()
+    files: Annotated[
+        Mapping[str, str],
+        MapOf(TEXT, free=True),
+        "Files of the same component in other languages, by language; a scenario selects one by setting "
+        "`language` and `path`.",
+    ] = field(default_factory=dict)
     provides: Annotated[
         Mapping[str, str], MapOf(_ProvidedPort()), "Provided ports, and the interface of each."
     ] = field(default_factory=dict)
@@ -403,6 +481,9 @@ class Component:
     activation: Annotated[
         tuple[Figure, ...], FIGURES, "What an activation takes, one figure for each kind of processor."
     ] = ()
+    queues: Annotated[Mapping[str, Queue], _Queues(), "What a port does with calls that wait, by port."] = (
+        field(default_factory=dict)
+    )
     calls: Annotated[
         Mapping[str, Mapping[str, int]],
         CALLS,

@@ -9,11 +9,12 @@ from typing import Annotated, Any
 
 from volery.base.time import Ns
 from volery.model.components import COMPONENTS, INTERFACES, Component, Interface
+from volery.model.data_types import DATA_TYPES, DataType
+from volery.model.design import DESIGN_PARAMETERS, SUPPRESSIONS, DesignParameter, Suppression
 from volery.model.environment import Environment
 from volery.model.fields import (
     ANYTHING,
     PERIOD,
-    PROCESSOR,
     SHORT,
     TEXT,
     ListOf,
@@ -25,6 +26,14 @@ from volery.model.fields import (
     Schema,
 )
 from volery.model.instances import INSTANCES, Instance
+from volery.model.resources import (
+    DEVICES,
+    MEMORY_SPACES,
+    OPERATING_SYSTEMS,
+    Device,
+    MemorySpace,
+    OperatingSystem,
+)
 from volery.model.system import (
     BOUNDS,
     CHAINS,
@@ -41,6 +50,12 @@ from volery.model.text import Path
 
 ALLOCATION = Reference("allocation", lambda reading: reading.names(("allocations",)))
 SCENARIO = Reference("scenario", lambda reading: reading.names(("scenarios",)))
+PLACE = Reference(
+    "processor, operating system or memory space",
+    lambda reading: reading.names(
+        ("platform", "processors"), ("platform", "operating_systems"), ("memory_spaces",)
+    ),
+)
 _CHANGES = MapOf(ANYTHING, free=True)
 
 
@@ -56,11 +71,15 @@ class Platform:
     ] = ()
     processors: Annotated[tuple[Processor, ...], PROCESSORS, "Computers, by name."] = ()
     networks: Annotated[tuple[Network, ...], NETWORKS, "What joins the computers, by name."] = ()
+    operating_systems: Annotated[
+        tuple[OperatingSystem, ...], OPERATING_SYSTEMS, "Operating systems, by name."
+    ] = ()
+    devices: Annotated[tuple[Device, ...], DEVICES, "Sensors, actuators and other devices, by name."] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class AllocationText:
-    """Which instance runs on which processor.
+    """Which instance runs on which processor, directly or through a memory space and an operating system.
 
     A vehicle's name states where the node runs that serves it.
     """
@@ -69,8 +88,12 @@ class AllocationText:
     set: Annotated[Mapping[str, Any], _CHANGES, "Changes to the model: paths and values."] = field(
         default_factory=dict
     )
-    processors: Annotated[
-        Mapping[str, str], Others(), MapOf(PROCESSOR, free=True), "An instance or a vehicle: its processor."
+    places: Annotated[
+        Mapping[str, str],
+        Others(),
+        MapOf(PLACE, free=True),
+        "An instance or a vehicle: its processor, operating system or memory space. A memory space or an "
+        "operating system: what it is on.",
     ] = field(default_factory=dict)
 
 
@@ -120,8 +143,16 @@ class Document:
     components: Annotated[Mapping[str, Component], COMPONENTS, "The library: kinds of components."] = field(
         default_factory=dict
     )
+    types: Annotated[
+        Mapping[str, DataType],
+        DATA_TYPES,
+        "Data types of arguments and messages. If there are any, arguments have these types only.",
+    ] = field(default_factory=dict)
     application: Annotated[
         tuple[Instance, ...], INSTANCES, "Component instances of the system, by name."
+    ] = ()
+    memory_spaces: Annotated[
+        tuple[MemorySpace, ...], MEMORY_SPACES, "Processes that instances are allocated to, by name."
     ] = ()
     platform: Annotated[Platform, Record(Platform), "The computers and what joins them."] = Platform()
     allocations: Annotated[
@@ -144,6 +175,22 @@ class Document:
         tuple[Bound, ...], BOUNDS, "Bounds on observed quantities, judged at the end of each run."
     ] = ()
     run: Annotated[RunLimits, Record(RunLimits), "How long a run lasts."] = field(default_factory=RunLimits)
+    design_parameters: Annotated[
+        tuple[DesignParameter, ...], DESIGN_PARAMETERS, "Values that a design may vary, and their choices."
+    ] = ()
+    include: Annotated[
+        tuple[str, ...],
+        ListOf(TEXT, bare=True),
+        "Files with further sections or entries of sections, relative to the model.",
+    ] = ()
+    files_from: Annotated[
+        tuple[str, ...],
+        ListOf(TEXT, bare=True),
+        "Folders outside the folder of the model that its files may be in.",
+    ] = ()
+    suppress: Annotated[
+        tuple[Suppression, ...], SUPPRESSIONS, "Rules of level warning that are not reported, with reasons."
+    ] = ()
 
 
 DOCUMENT = Record(Document)

@@ -16,6 +16,7 @@ from typing import Annotated, Any, TypeVar
 
 from volery.base.errors import Location
 from volery.base.time import Ns
+from volery.model import rules
 from volery.model.fields import (
     HEADING,
     NETWORK,
@@ -33,7 +34,7 @@ from volery.model.fields import (
     expected,
 )
 from volery.model.reading import Reading
-from volery.model.text import Node, Path, no_such
+from volery.model.text import Node, Path
 
 ONLY_TRIALS = "Only in fault trials: a model cannot state it."
 
@@ -290,10 +291,11 @@ class _AnyFault(Syntax):
         kind = node.items.get("kind")
         if kind is None or not isinstance(kind.value, str):
             what = "this key is missing" if kind is None else str(expected("text", kind))
-            reading.problems.add((*path, "kind"), what, (kind or node).where)
+            rule = rules.MISSING_KEY if kind is None else rules.WRONG_VALUE
+            reading.problems.add((*path, "kind"), what, (kind or node).where, rule)
             raise WrongValueError("")
         if kind.value not in FAULTS:
-            reading.problems.add((*path, "kind"), no_such(kind.value, "kind of fault", FAULTS), kind.where)
+            reading.problems.unknown((*path, "kind"), kind.value, "kind of fault", FAULTS)
             raise WrongValueError("")
         return Record(FAULTS[kind.value], kind=kind.value).read(node, path, reading)
 

@@ -22,7 +22,9 @@ from volery.base import units
 from volery.base.errors import choices, did_you_mean
 from volery.base.time import Ns, S
 from volery.base.units import Kind, QuantityError
-from volery.model.reading import Reading
+from volery.model import rules
+from volery.model.reading import PROVENANCES, Provenance, Reading
+from volery.model.rules import Rule
 from volery.model.text import Node, Path, Quoted
 
 Schema = dict[str, Any]
@@ -31,11 +33,15 @@ SHORT = "x-short"
 """Marks, in the JSON Schema, a mapping that may be written as the value of this key alone."""
 
 _NAME = r"^[A-Za-z_][A-Za-z0-9_-]*$"
-_UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s|m|deg|coulomb|v|j|b)$")
+_UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s|m|deg|coulomb|v|w|j|b)$")
 
 
 class WrongValueError(ValueError):
     """The written value does not fit its field. An empty message: the problem has been reported already."""
+
+    def __init__(self, message: str, rule: Rule = rules.WRONG_VALUE) -> None:
+        super().__init__(message)
+        self.rule = rule
 
 
 def expected(what: str, node: Node) -> WrongValueError:
@@ -78,7 +84,8 @@ def read_child(syntax: Syntax, node: Node, path: Path, reading: Reading) -> tupl
         return True, syntax.read(node, path, reading)
     except (WrongValueError, QuantityError) as error:
         if str(error):
-            reading.problems.add(path, str(error), node.where)
+            rule = error.rule if isinstance(error, WrongValueError) else rules.WRONG_QUANTITY
+            reading.problems.add(path, str(error), node.where, rule)
         return False, None
 
 
@@ -161,9 +168,50 @@ class OneOf(Syntax):
         return {"enum": list(self.values)}
 
 
+_STATED = ("value", "provenance", "uncertainty", "source")
+
+
+def _bare_value(node: Node, path: Path, reading: Reading) -> object:
+    """Return what is written for a quantity; record its provenance if it is written as a mapping."""
+    if not isinstance(node.value, dict):
+        return node.value
+    for key in node.items:
+        if key not in _STATED:
+            what = f"unknown key{did_you_mean(key, _STATED)}; valid here: {choices(_STATED)}"
+            reading.problems.add((*path, key), what, node.where, rules.UNKNOWN_KEY)
+    if "value" not in node.items:
+        reading.problems.add((*path, "value"), "this key is missing", node.where, rules.MISSING_KEY)
+        raise WrongValueError("")
+    provenance, uncertainty, source = (node.child(key) for key in _STATED[1:])
+    reading.provenances[path] = Provenance(
+        str(OneOf(PROVENANCES).read(provenance, path, reading)) if provenance else "estimated",
+        units.read(uncertainty.value, units.RATIO) if uncertainty else None,
+        str(source.value) if source else "",
+    )
+    return node.items["value"].value
+
+
+def _quantity_schema() -> Schema:
+    described = {
+        "value": {"type": ["string", "number"], "description": "The quantity."},
+        "provenance": {"enum": list(PROVENANCES), "description": "Where it comes from."},
+        "uncertainty": {"type": ["string", "number"], "description": "Relative standard uncertainty."},
+        "source": {"type": "string", "description": "The publication, the data sheet or the measurement."},
+    }
+    return {
+        "type": ["string", "number", "object"],
+        "properties": described,
+        "required": ["value"],
+        "additionalProperties": False,
+    }
+
+
 @dataclass(frozen=True)
 class Quantity(Syntax):
-    """A number with a unit, such as ``3 m/s``. The bounds are in the unit of its ``kind``."""
+    """A number with a unit, such as ``3 m/s``, or a mapping of it with its provenance.
+
+    The bounds are in the unit of its ``kind``.
+    """
 
     kind: Kind
     least: float | None = None
@@ -172,7 +220,10 @@ class Quantity(Syntax):
 
     def read(self, node: Node, path: Path, reading: Reading) -> float:
         """See ``Syntax``. The value is in the unit of its kind."""
-        written, unit = node.value, "" if self.kind.unit == "1" else f" {self.kind.unit}"
+        return self._checked(_bare_value(node, path, reading))
+
+    def _checked(self, written: object) -> float:
+        unit = "" if self.kind.unit == "1" else f" {self.kind.unit}"
         value = units.read(written, self.kind)
         if self.least is not None and value < self.least:
             raise QuantityError(f"{written} is too little: at least {self.least:g}{unit}")
@@ -186,7 +237,7 @@ class Quantity(Syntax):
         """See ``Syntax``."""
         bounds = {"x-minimum": self.least, "x-above": self.above, "x-maximum": self.most}
         stated = {key: value for key, value in bounds.items() if value is not None}
-        return {"type": ["string", "number"], "x-unit": self.kind.unit, "x-quantity": self.hint(), **stated}
+        return {**_quantity_schema(), "x-unit": self.kind.unit, "x-quantity": self.hint(), **stated}
 
     def hint(self) -> str:
         """Return what is to be written, with examples."""
@@ -202,8 +253,9 @@ class Duration(Quantity):
 
     def read(self, node: Node, path: Path, reading: Reading) -> Ns:
         """See ``Syntax``. The value is in nanoseconds."""
-        super().read(node, path, reading)
-        return units.read_ns(node.value)
+        written = _bare_value(node, path, reading)
+        self._checked(written)
+        return units.read_ns(written)
 
     def written(self, value: Any) -> Any:
         """See ``Syntax``."""
@@ -339,7 +391,7 @@ class MapOf(Syntax):
         for name, one in node.items.items():
             if not self.free and re.search(_NAME, name) is None:
                 what = f"{name!r} is no name: letters, digits, _ and -, starting with a letter"
-                reading.problems.add((*path, name), what, one.where)
+                reading.problems.add((*path, name), what, one.where, rules.BAD_NAME)
                 continue
             right, value = read_child(self.item, one, (*path, name), reading)
             if right:
@@ -505,7 +557,7 @@ class Record(Syntax):
     def _misses_keys(self, keys: Mapping[str, Entry], node: Node, path: Path, reading: Reading) -> bool:
         missing = [key for key, entry in keys.items() if entry.required and key not in node.items]
         for key in missing:
-            reading.problems.add((*path, key), "this key is missing", node.where)
+            reading.problems.add((*path, key), "this key is missing", node.where, rules.MISSING_KEY)
         return bool(missing)
 
     def _has_unknown_keys(
@@ -515,7 +567,7 @@ class Record(Syntax):
         unknown = {key: node for key, node in rest.items() if key not in known}
         for key, node in unknown.items():
             what = f"unknown key{did_you_mean(key, known)}; valid here: {choices(known)}"
-            reading.problems.add((*path, key), what, node.where)
+            reading.problems.add((*path, key), what, node.where, rules.UNKNOWN_KEY)
         return bool(unknown)
 
     def schema(self, definitions: Schema) -> Schema:

@@ -9,6 +9,7 @@ from graphlib import CycleError, TopologicalSorter
 from typing import Annotated, Any
 
 from volery.base.errors import Location
+from volery.model import rules
 from volery.model.components import (
     ACTIVITY,
     ENVIRONMENT_INTERFACE,
@@ -127,7 +128,7 @@ class _Connections(Syntax):
                 texts = TARGETS.read(below, at, reading)
             except WrongValueError as error:
                 if str(error):
-                    reading.problems.add(at, str(error), below.where)
+                    reading.problems.add(at, str(error), below.where, error.rule)
                 continue
             connection = _connection(reading, at, component.requires[name], texts)
             if connection is not None:
@@ -136,7 +137,7 @@ class _Connections(Syntax):
             if port.name not in node.items and not _is_topic(reading, port.interface):
                 candidates = _candidates(reading, port.interface)
                 what = f"the required port {port.name!r} is not connected; {candidates}"
-                reading.problems.add(path, what)
+                reading.problems.add(path, what, rule=rules.UNCONNECTED)
         return found
 
     def schema(self, definitions: Schema) -> Schema:
@@ -149,11 +150,11 @@ def _connection(
 ) -> Connection | None:
     if _is_topic(reading, port.interface):
         what = f"{port.interface} has no operations: it is publish and subscribe, nothing is connected"
-        reading.problems.add(path, what)
+        reading.problems.add(path, what, rule=rules.TOPIC_CONNECTED)
         return None
     if not port.many and len(texts) != 1:
         what = f"one {port.interface} is required here; for a list, require {port.interface}[]"
-        reading.problems.add(path, what)
+        reading.problems.add(path, what, rule=rules.DOUBLY_CONNECTED)
         return None
     targets = [_target(reading, path, port.interface, text) for text in texts]
     if any(target is None for target in targets):
@@ -175,7 +176,8 @@ def _vehicle_target(reading: Reading, path: Path, interface: str, text: str) -> 
         return None
     kind = _kind_of_vehicle(reading, text)
     if kind != VEHICLE_INTERFACES[interface]:
-        reading.problems.add(path, f"{text} is a {kind}; {_candidates(reading, interface)}")
+        what = f"{text} is a {kind}; {_candidates(reading, interface)}"
+        reading.problems.add(path, what, rule=rules.INTERFACE_MISMATCH)
         return None
     return Target(TargetKind.VEHICLE, text)
 
@@ -225,7 +227,8 @@ class Instance:
     """A component that exists, in the application or in the environment.
 
     ``parameters`` and ``activity`` are the component's with the instance's own on top. ``processor`` is None
-    for the environment's components: their computing costs nothing.
+    for the environment's components: their computing costs nothing. ``memory_space`` is the process that
+    it is allocated to; None for one of its own.
     """
 
     name: str
@@ -243,6 +246,7 @@ class Instance:
         Activity | None, Key("active"), ACTIVITY, "Its flow of control, on top of the component's."
     ] = None
     processor: str | None = None
+    memory_space: str | None = None
     namespace: Annotated[str, TEXT, "Its ROS namespace."] = "/"
     remap: Annotated[
         Mapping[str, str], MapOf(TEXT, free=True), "Names of ROS topics and services, and their replacements."
@@ -284,7 +288,7 @@ class _Instance(Record):
         for name in made.parameters:
             if name in made.component.requires:
                 what = f"{name!r} is a required port of {made.component.name}; a parameter needs another name"
-                reading.problems.add((*path, "parameters", name), what)
+                reading.problems.add((*path, "parameters", name), what, rule=rules.DUPLICATE_NAME)
         return made
 
 
@@ -311,4 +315,5 @@ def check_cycles(reading: Reading, instances: tuple[Instance, ...]) -> None:
             (*section, around[0]),
             f"a cycle of required ports: {' -> '.join(around)}; a call would wait for itself. "
             "Replace one of the calls by a topic (an interface without operations)",
+            rule=rules.SYNCHRONOUS_CYCLE,
         )

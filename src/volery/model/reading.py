@@ -7,13 +7,15 @@ once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any, TypeVar
 
 from volery.base.errors import Location
-from volery.model.text import Node, Path, Problems
+from volery.model import rules
+from volery.model.rules import Rule
+from volery.model.text import Node, Path, Problems, no_such
 
 T = TypeVar("T")
 
@@ -71,14 +73,34 @@ class Vocabulary:
     read_catalogue: Callable[[FilePath], Kinds] = _no_catalogue
 
 
+PROVENANCES = ("estimated", "measured", "calculated", "required")
+"""Where a figure comes from (MARTE's NFP source)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Where a figure comes from: one of ``PROVENANCES``, its relative standard uncertainty, and the source.
+
+    ``uncertainty`` is None where none is stated.
+    """
+
+    provenance: str = "estimated"
+    uncertainty: float | None = None
+    source: str = ""
+
+
 @dataclass
 class Reading:
-    """The tree that is read, what it is checked against, and the problems found so far."""
+    """The tree that is read, what it is checked against, and the problems found so far.
+
+    ``provenances`` are those of quantities that state one, by their paths.
+    """
 
     root: Node
     problems: Problems
     vocabulary: Vocabulary
     folder: FilePath
+    provenances: dict[Path, Provenance] = field(default_factory=dict)
     _results: dict[Callable[[Any], Any], Any] = field(default_factory=dict)
 
     def names(self, *sections: Path) -> list[str]:
@@ -97,9 +119,11 @@ class Reading:
         """Return the file and line of *path*."""
         return self.problems.where(path)
 
-    def known(self, path: Path, name: str, noun: str, valid: Iterable[str]) -> bool:
+    def known(
+        self, path: Path, name: str, noun: str, valid: Iterable[str], rule: Rule = rules.UNKNOWN_NAME
+    ) -> bool:
         """Return whether *name* is one of the *valid* names; report a problem at *path* if it is not."""
-        names = list(valid)
+        names = valid if isinstance(valid, Collection) else list(valid)
         if name not in names:
-            self.problems.unknown(path, name, noun, names)
+            self.problems.add(path, no_such(name, noun, names), rule=rule)
         return name in names

@@ -16,10 +16,14 @@ from volery.base import units
 from volery.base.errors import Location, UsageError, choices, did_you_mean
 from volery.base.time import MINUTE, Ns
 from volery.base.units import Kind, QuantityError
+from volery.model import rules
 from volery.model.components import ROS_LANGUAGES, Component, Interface, check_frequency
+from volery.model.data_types import DataType
+from volery.model.design import DesignParameter, Suppression
 from volery.model.environment import Environment, Vehicle
 from volery.model.fields import (
     BANDWIDTH,
+    DATA_SIZE,
     FREQUENCY,
     LOSS,
     PERIOD,
@@ -40,7 +44,17 @@ from volery.model.fields import (
     WrongValueError,
 )
 from volery.model.instances import Instance
-from volery.model.reading import NOTE_PREFIX, Observable, Reading
+from volery.model.reading import NOTE_PREFIX, Observable, Provenance, Reading
+from volery.model.resources import (
+    CACHES,
+    POWER_STATES,
+    Cache,
+    Device,
+    MemorySpace,
+    OperatingSystem,
+    PowerState,
+)
+from volery.model.rules import Finding
 from volery.model.text import Node, Path
 
 SCHEDULERS = ("fixed-priority", "round-robin", "fifo", "edf")
@@ -55,7 +69,7 @@ MAINS = "mains"
 
 @dataclass(frozen=True, slots=True)
 class Processor:
-    """A computer.
+    """A computer. ``operating_system`` is what is allocated to it, None where the model states none.
 
     ``powered_by`` names the vehicle whose battery it drains, None for mains. ``quantum_ns`` is None for the
     kernel's default.
@@ -77,6 +91,12 @@ class Processor:
     ] = None
     context_switch_ns: Annotated[Ns, TIME, "Time that a core needs to go on with another task."] = 0
     load: Annotated[float, LOSS, "Share of each core that something else takes before all components."] = 0.0
+    memory_b: Annotated[float | None, DATA_SIZE, "Memory that its processes may take."] = None
+    caches: Annotated[Mapping[str, Cache], CACHES, "Its caches, by name."] = field(default_factory=dict)
+    power_states: Annotated[
+        Mapping[str, PowerState], POWER_STATES, "States it can be in, and what it draws in each."
+    ] = field(default_factory=dict)
+    operating_system: str | None = None
     where: Location | None = field(default=None, compare=False)
 
     @property
@@ -108,7 +128,8 @@ class _Processor(Record):
         if kind is None:
             return made
         if made.cores > kind.cores:
-            reading.problems.add((*path, "cores"), f"{made.kind} has {kind.cores} cores, not {made.cores}")
+            what = f"{made.kind} has {kind.cores} cores, not {made.cores}"
+            reading.problems.add((*path, "cores"), what, rule=rules.TOO_MANY_CORES)
         below = [one for one in kind.settings_hz if one < made.frequency_hz]
         above = [one for one in kind.settings_hz if one > made.frequency_hz]
         if made.frequency_hz not in kind.settings_hz and below and above:
@@ -116,6 +137,7 @@ class _Processor(Record):
                 (*path, "frequency"),
                 f"{made.kind} cannot be set to {made.frequency_hz / 1e6:g} MHz; "
                 f"the nearest settings are {below[-1] / 1e6:g} and {above[0] / 1e6:g} MHz",
+                rules.FREQUENCY_SETTING,
             )
         return made
 
@@ -139,7 +161,9 @@ class _Network(Record):
         """See ``Syntax``."""
         made: Network = super().read(node, path, reading)
         if len(set(made.between)) != len(made.between):
-            reading.problems.add((*path, "between"), "a processor stands here twice")
+            reading.problems.add(
+                (*path, "between"), "a processor stands here twice", rule=rules.DUPLICATE_NAME
+            )
         return made
 
 
@@ -169,7 +193,7 @@ class _Chain(Syntax):
         for place, topic in enumerate(topics):
             if not topic.startswith("/"):
                 what = f"{topic!r}: write a topic's full name, such as '/{topic}'"
-                reading.problems.add((*path, place), what)
+                reading.problems.add((*path, place), what, rule=rules.BAD_ROS_NAME)
         return Chain(str(path[-1]), topics)
 
     def schema(self, definitions: Schema) -> Schema:
@@ -233,7 +257,7 @@ class _Bound(Syntax):
         observable = _observable(reading, (*path, "observe"), text.observe)
         stated = [one for one in (("max", text.max), ("min", text.min)) if one[1] is not None]
         if len(stated) != 1:
-            raise WrongValueError("give exactly one of max and min")
+            raise WrongValueError("give exactly one of max and min", rules.BAD_BOUND)
         if observable is None:
             raise WrongValueError("")
         (relation, value), unit = stated[0], observable.unit
@@ -241,7 +265,8 @@ class _Bound(Syntax):
             number = units.read(value, Kind("bound", unit or "1", f"0.5 {unit}" if unit else "3"))
         except QuantityError as error:
             measured = f"measured in {unit}" if unit else "a plain number"
-            reading.problems.add((*path, relation), f"{text.observe} is {measured}: {error}")
+            what = f"{text.observe} is {measured}: {error}"
+            reading.problems.add((*path, relation), what, rule=rules.WRONG_QUANTITY)
             raise WrongValueError("") from None
         return Bound(str(path[-1]), text.observe, relation, number, unit, text.description, node.where)
 
@@ -261,11 +286,14 @@ def _observable(reading: Reading, path: Path, text: str) -> Observable | None:
         **dict.fromkeys(reading.names(("environment", "vehicles")), "vehicle"),
         **dict.fromkeys(reading.names(("chains",)), "chain"),
     }
-    if not reading.known(path, subject, "subject to observe", kinds):
+    if not reading.known(path, subject, "subject to observe", kinds, rules.UNKNOWN_OBSERVABLE):
         return None
     kind = kinds[subject]
     offered = {one.quantity: one for one in reading.vocabulary.observables if one.subject == kind}
-    return offered[quantity] if reading.known(path, quantity, f"quantity of a {kind}", offered) else None
+    noun = f"quantity of a {kind}"
+    return (
+        offered[quantity] if reading.known(path, quantity, noun, offered, rules.UNKNOWN_OBSERVABLE) else None
+    )
 
 
 def _noted(reading: Reading, path: Path, text: str) -> Observable | None:
@@ -274,7 +302,7 @@ def _noted(reading: Reading, path: Path, text: str) -> Observable | None:
     if kind and state:
         return Observable(NOTE_PREFIX, text, "", "number of noted things")
     what = f"{text!r}: write {NOTE_PREFIX}.<kind>.<state>, as in volery.note(kind, subject, state)"
-    reading.problems.add(path, what)
+    reading.problems.add(path, what, rule=rules.UNKNOWN_OBSERVABLE)
     return None
 
 
@@ -309,7 +337,9 @@ class System:
     ``instances`` holds the application's components, then the environment's. ``allocation`` and ``scenario``
     name what was chosen (``scenario`` empty: none), ``allocations`` and ``scenarios`` the choices.
     ``overrides`` are the ``path=value`` texts that were applied. ``folder`` is where relative paths start.
-    ``catalogues`` are the files of processors that the model refers to. ``warnings`` state what is doubtful.
+    ``catalogues`` are the files of processors that the model refers to. ``warnings`` state what is
+    doubtful, ``suppressions`` which rules the model suppresses. ``provenances`` are those of quantities, by
+    their paths in the model.
     """
 
     name: str
@@ -319,6 +349,13 @@ class System:
     environment: Environment = field(default_factory=Environment)
     chains: tuple[Chain, ...] = ()
     requirements: tuple[Bound, ...] = ()
+    memory_spaces: tuple[MemorySpace, ...] = ()
+    operating_systems: tuple[OperatingSystem, ...] = ()
+    devices: tuple[Device, ...] = ()
+    types: Mapping[str, DataType] = field(default_factory=dict)
+    design_parameters: tuple[DesignParameter, ...] = ()
+    provenances: Mapping[str, Provenance] = field(default_factory=dict)
+    suppressions: tuple[Suppression, ...] = ()
     limits: RunLimits = RunLimits()
     components: Mapping[str, Component] = field(default_factory=dict)
     interfaces: Mapping[str, Interface] = field(default_factory=dict)
@@ -331,7 +368,7 @@ class System:
     sources: tuple[Source, ...] = ()
     folder: FilePath = field(default=FilePath(), compare=False)
     catalogues: tuple[FilePath, ...] = ()
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Finding, ...] = ()
 
     @property
     def vehicles(self) -> tuple[Vehicle, ...]:

@@ -11,7 +11,8 @@ from dataclasses import fields, replace
 from pathlib import Path as FilePath
 
 from volery.base.errors import ModelError, choices
-from volery.model.assembly import NOT_PLACES, Assembly, Selection, assemble, change_from_option
+from volery.model import rules
+from volery.model.assembly import DEFAULT_FILE, NOT_PLACES, Assembly, Selection, assemble, change_from_option
 from volery.model.components import Figure
 from volery.model.document import DOCUMENT, Document
 from volery.model.environment import Environment, Vehicle
@@ -19,7 +20,7 @@ from volery.model.fields import TEXT, ListOf, read_child
 from volery.model.instances import Instance, TargetKind, check_cycles
 from volery.model.reading import NOTE_PREFIX, Reading, Vocabulary
 from volery.model.system import Network, System
-from volery.model.text import CollectedModelError, Path
+from volery.model.text import CollectedModelError, Path, written
 
 FIDELITIES = ("times", "code", "firmware", "hardware")
 """Constant times · real component code · real autopilot firmware in the loop · real vehicles."""
@@ -44,10 +45,11 @@ def gaps(system: System, fidelity: str, vocabulary: Vocabulary) -> Iterator[Mode
     for component in used.values():
         if fidelity == "code" and not component.path:
             what = "it has no code: fidelity `code` needs a `path`; `times` runs without"
-            yield ModelError(what, f"components.{component.name}", component.where)
+            yield ModelError(what, f"components.{component.name}", component.where, rules.NO_CODE.code)
         if component.path and component.language not in vocabulary.languages:
             what = f"{component.language} components do not run yet; {choices(vocabulary.languages)} do"
-            yield ModelError(what, f"components.{component.name}.language", component.where)
+            code = rules.LANGUAGE_UNSUPPORTED.code
+            yield ModelError(what, f"components.{component.name}.language", component.where, code)
     if fidelity == "times":
         for instance in system.instances:
             yield from _missing_figures(system, instance)
@@ -74,11 +76,9 @@ def _missing(instance: Instance, what: str, figures: tuple[Figure, ...], kind: s
         f"no time is stated at {kind}, where {instance.name} runs{stated}; fidelity `times` needs one",
         f"components.{instance.component.name}.{what}",
         instance.component.where,
+        rules.MISSING_TIMES.code,
     )
 
-
-DEFAULT_FILE = "model.yaml"
-"""The file that a folder stands for."""
 
 RESERVED = ("application", "environment", NOTE_PREFIX)
 """Names that messages, observables and ports use for the whole."""
@@ -168,17 +168,29 @@ def _resolve(reading: Reading, document: Document, made: Assembly) -> System:
     """Put the sections of a document together, and check what concerns several of them."""
     _check_names(reading)
     _check_allocations(reading)
-    places = {name: str(node.value) for name, node in (made.places or {}).items()}
+    stated = {name: str(node.value) for name, node in (made.places or {}).items()}
+    places = _processors_of(reading, stated, made.allocation)
     for name in reading.names(("application",)):
-        if name not in places:
+        if name not in stated:
             path: Path = ("allocations", made.allocation) if made.allocation else ("application", name)
             which = (
                 f"allocation {made.allocation!r}" if made.allocation else "this model has no allocation and"
             )
-            reading.problems.add(path, f"{which} does not say where {name} runs")
+            reading.problems.add(path, f"{which} does not say where {name} runs", rule=rules.UNALLOCATED)
     surroundings = document.environment
+    spaces = {one.name for one in document.memory_spaces}
+    systems = {
+        places[one.name]: one.name for one in document.platform.operating_systems if one.name in places
+    }
     instances = (
-        *(replace(one, processor=places.get(one.name)) for one in document.application),
+        *(
+            replace(
+                one,
+                processor=places.get(one.name),
+                memory_space=stated[one.name] if stated.get(one.name) in spaces else None,
+            )
+            for one in document.application
+        ),
         *surroundings.components,
     )
     vehicles = [
@@ -194,11 +206,20 @@ def _resolve(reading: Reading, document: Document, made: Assembly) -> System:
     return System(
         name=document.name,
         instances=instances,
-        processors=document.platform.processors,
+        processors=tuple(
+            replace(one, operating_system=systems.get(one.name)) for one in document.platform.processors
+        ),
         networks=document.platform.networks,
         environment=environment,
         chains=document.chains,
         requirements=document.requirements,
+        memory_spaces=document.memory_spaces,
+        operating_systems=document.platform.operating_systems,
+        devices=document.platform.devices,
+        types=document.types,
+        design_parameters=document.design_parameters,
+        provenances={written(path): one for path, one in reading.provenances.items()},
+        suppressions=document.suppress,
         limits=document.run,
         components=document.components,
         interfaces=document.interfaces,
@@ -212,6 +233,33 @@ def _resolve(reading: Reading, document: Document, made: Assembly) -> System:
     )
 
 
+def _processors_of(reading: Reading, stated: dict[str, str], allocation: str) -> dict[str, str]:
+    """Return the processor that each allocated thing leads to; report those that lead to none."""
+    processors = set(reading.names(("platform", "processors")))
+    heights = dict.fromkeys(reading.names(("memory_spaces",)), 1)
+    heights |= dict.fromkeys(reading.names(("platform", "operating_systems")), 2)
+    heights |= dict.fromkeys(processors, 3)
+    found: dict[str, str] = {}
+    for name, first in stated.items():
+        place, below = first, heights.get(name, 0)
+        while place not in processors and heights.get(place, 0) > below and place in stated:
+            place, below = stated[place], heights[place]
+        if place in processors and heights[place] > below:
+            found[name] = place
+        elif place in heights:
+            what = (
+                (
+                    f"{place} is on no processor in allocation {allocation!r}"
+                    if place not in stated
+                    else f"{place} cannot be on {stated[place]}"
+                )
+                if heights[place] > below
+                else f"{name} cannot be on {place}"
+            )
+            reading.problems.add(("allocations", allocation, name), what, rule=rules.BROKEN_CHAIN)
+    return found
+
+
 def _check_names(reading: Reading) -> None:
     """Report names that two things share: observables and allocations refer to things by their name."""
     taken: dict[str, str] = dict.fromkeys(RESERVED, "a word of the model")
@@ -220,26 +268,31 @@ def _check_names(reading: Reading) -> None:
         (("environment", "components"), "a component instance"),
         (("environment", "vehicles"), "a vehicle"),
         (("platform", "processors"), "a processor"),
+        (("platform", "operating_systems"), "an operating system"),
+        (("memory_spaces",), "a memory space"),
         (("chains",), "a chain"),
     )
     for section, what in sections:
         for name in reading.names(section):
             if name in taken:
                 reading.problems.add(
-                    (*section, name), f"{name!r} is already {taken[name]}; choose another name"
+                    (*section, name),
+                    f"{name!r} is already {taken[name]}; choose another name",
+                    rule=rules.DUPLICATE_NAME,
                 )
             taken.setdefault(name, what)
 
 
 def _check_allocations(reading: Reading) -> None:
     """Report allocations, chosen or not, of instances and vehicles that do not exist."""
-    placeable = reading.names(("application",), ("environment", "vehicles"))
+    sections: tuple[Path, ...] = (("application",), ("environment", "vehicles"), ("memory_spaces",))
+    placeable = reading.names(*sections, ("platform", "operating_systems"))
     for allocation in reading.names(("allocations",)):
         for name in reading.names(("allocations", allocation)):
             path: Path = ("allocations", allocation, name)
             if name in reading.names(("environment", "components")):
                 what = f"{name} belongs to the environment: it runs nowhere and costs nothing"
-                reading.problems.add(path, what)
+                reading.problems.add(path, what, rule=rules.ALLOCATED_ENVIRONMENT)
             elif name not in NOT_PLACES:
                 reading.known(path, name, "component instance or vehicle", placeable)
 
@@ -257,6 +310,7 @@ def _carried_processor(reading: Reading, vehicle: Vehicle) -> str | None:
             ("environment", "vehicles", vehicle.name),
             f"it carries {' and '.join(carried)}: the allocation must say where its node runs, "
             f"such as `{vehicle.name}: {carried[0]}`",
+            rule=rules.AMBIGUOUS_NODE,
         )
     return carried[0] if len(carried) == 1 else None
 
@@ -274,4 +328,5 @@ def _check_reach(reading: Reading, instances: tuple[Instance, ...], networks: tu
                     reading.problems.add(
                         ("application", instance.name, connection.port),
                         f"{instance.name} on {here} calls {target.name} on {there}: no network joins them",
+                        rule=rules.NO_NETWORK,
                     )

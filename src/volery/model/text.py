@@ -10,10 +10,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path as FilePath
 from typing import Any
 
 from volery.base.errors import Location, ModelError, choices, did_you_mean
 from volery.base.installed import require_extra
+from volery.model import rules
+from volery.model.rules import Finding, Rule
 
 try:
     from ruamel.yaml import YAML
@@ -53,21 +56,22 @@ class Problems:
 
     def __init__(self, locate: Locate) -> None:
         self._locate = locate
-        self._found: list[ModelError] = []
-        self._warnings: dict[str, None] = {}  # an ordered set
+        self._found: dict[str, ModelError] = {}
+        self._warnings: dict[Finding, None] = {}  # an ordered set
         self._origins: dict[Path, Path] = {}
 
     def __bool__(self) -> bool:
         return bool(self._found)
 
-    def add(self, path: Path, what: str, where: Location | None = None) -> None:
+    def add(
+        self, path: Path, what: str, where: Location | None = None, rule: Rule = rules.WRONG_VALUE
+    ) -> None:
         """Report that *what* is wrong at *path*, which stands at *where*; the same problem counts once."""
         for copy, origin in self._origins.items():
             if path[: len(copy)] == copy:
                 path = origin + path[len(copy) :]
-        error = ModelError(what, written(path), where or self._locate(path))
-        if str(error) not in {str(known) for known in self._found}:
-            self._found.append(error)
+        error = ModelError(what, written(path), where or self._locate(path), rule.code)
+        self._found.setdefault(str(error), error)
 
     def copied(self, path: Path, origin: Path | None) -> None:
         """Report problems at *path* as problems at *origin*, from which its value was copied.
@@ -80,14 +84,14 @@ class Problems:
 
     def unknown(self, path: Path, name: object, noun: str, valid: Iterable[str]) -> None:
         """Report an unknown *name* at *path*; *valid* are the known names."""
-        self.add(path, no_such(name, noun, valid))
+        self.add(path, no_such(name, noun, valid), rule=rules.UNKNOWN_NAME)
 
-    def warn(self, path: Path, what: str) -> None:
+    def warn(self, path: Path, what: str, rule: Rule) -> None:
         """Report that *what* is doubtful at *path*; the model is valid nevertheless."""
-        self._warnings[f"{written(path)}: {what}"] = None
+        self._warnings[Finding(rule, what, written(path), self._locate(path))] = None
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Finding, ...]:
         """The warnings, once each."""
         return tuple(self._warnings)
 
@@ -98,9 +102,9 @@ class Problems:
     def raise_if_any(self) -> None:
         """Raise the problems, if any: a ``ModelError``, or one ``CollectedModelError`` for several."""
         if len(self._found) == 1:
-            raise self._found[0]
+            raise next(iter(self._found.values()))
         if self._found:
-            raise CollectedModelError(sorted(self._found, key=_order))
+            raise CollectedModelError(sorted(self._found.values(), key=_order))
 
 
 def no_such(name: object, noun: str, valid: Iterable[str]) -> str:
@@ -112,6 +116,8 @@ def no_such(name: object, noun: str, valid: Iterable[str]) -> str:
 def _order(error: ModelError) -> tuple[str, int]:
     return (error.where.file, error.where.line) if error.where else ("", 0)
 
+
+_NO_MODEL = rules.NOT_A_MODEL.code
 
 MOST_NODES = 100_000
 """More than any model needs. Without a limit, a file of nested aliases would fill the memory."""
@@ -183,6 +189,24 @@ class Node:
         return Node(self.value, where, self.quoted)
 
 
+def stated_texts(root: Node, key: str) -> list[str]:
+    """Return the texts of a key of the model: one text, or a list of them."""
+    node = root.child(key)
+    listed = node.value if node is not None and isinstance(node.value, list) else [node] if node else []
+    return [one.value for one in listed if isinstance(one, Node) and isinstance(one.value, str)]
+
+
+def is_inside(file: FilePath, folders: Iterable[FilePath]) -> bool:
+    """Return whether *file*, with its symbolic links followed, is in one of the *folders*."""
+    real = file.resolve()
+    return any(real.is_relative_to(folder.resolve()) for folder in folders)
+
+
+def outside(name: str) -> str:
+    """Return what is wrong with a file that is in none of the folders that a model may use."""
+    return f"{name!r} is outside the folder of the model; list its folder under `files_from` to allow it"
+
+
 class Quoted(str):
     """A text that was written in quotation marks."""
 
@@ -200,14 +224,18 @@ def parse(text: str, name: str) -> Node:
         with warnings.catch_warnings(action="ignore", category=ReusedAnchorWarning):
             root = yaml.compose(text)
     except MarkedYAMLError as error:
-        raise ModelError(_complaint(error, text), "", _mark(error, name)) from None
+        raise ModelError(_complaint(error, text), "", _mark(error, name), _NO_MODEL) from None
     except RecursionError:
-        raise ModelError("nested too deeply to be a model", "", Location(name, 1)) from None
+        raise ModelError("nested too deeply to be a model", "", Location(name, 1), _NO_MODEL) from None
     except (YAMLError, ValueError) as error:
-        raise ModelError(f"this is not YAML: {_first_line(error)}", "", Location(name, 1)) from None
+        what = f"this is not YAML: {_first_line(error)}"
+        raise ModelError(what, "", Location(name, 1), _NO_MODEL) from None
     if root is None:
         raise ModelError(
-            "the file is empty; `volery new DIR` writes a model to start from", "", Location(name, 1)
+            "the file is empty; `volery new DIR` writes a model to start from",
+            "",
+            Location(name, 1),
+            _NO_MODEL,
         )
     return _Reading(name, yaml).node(root, ())
 
@@ -219,7 +247,7 @@ def parse_value(text: str, where: Location) -> Node:
     try:
         return parse(text, where.file).moved(where)
     except ModelError as error:
-        raise ModelError(f"{text!r}: {error.what}", error.path, where) from None
+        raise ModelError(f"{text!r}: {error.what}", error.path, where, error.code) from None
 
 
 @dataclass
@@ -236,11 +264,12 @@ class _Reading:
         where = Location(self.name, raw.start_mark.line + 1)
         self.count += 1
         if self.count > MOST_NODES:
-            raise ModelError(f"more than {MOST_NODES} values; is it a model?", _dotted(path), where)
+            what = f"more than {MOST_NODES} values; is it a model?"
+            raise ModelError(what, _dotted(path), where, rules.TOO_LARGE.code)
         if isinstance(raw, ScalarNode):
             return Node(self._scalar(raw, path, where), where, quoted=raw.style in ("'", '"'))
         if id(raw) in self.open:
-            raise ModelError("an alias that contains itself", _dotted(path), where)
+            raise ModelError("an alias that contains itself", _dotted(path), where, rules.TOO_LARGE.code)
         self.open.append(id(raw))
         value: dict[str, Node] | list[Node]
         if isinstance(raw, SequenceNode):
@@ -255,13 +284,15 @@ class _Reading:
         for key, value in raw.value:
             where = Location(self.name, key.start_mark.line + 1)
             if not isinstance(key, ScalarNode):
-                raise ModelError("a key must be a word", _dotted(path), where)
+                raise ModelError("a key must be a word", _dotted(path), where, _NO_MODEL)
             name = str(key.value)
             if name == "<<":
-                raise ModelError("merge keys (<<) are not read; repeat the entries", _dotted(path), where)
+                what = "merge keys (<<) are not read; repeat the entries"
+                raise ModelError(what, _dotted(path), where, _NO_MODEL)
             if name in lines:
                 here = _dotted((*path, name))
-                raise ModelError(f"this key is here twice; first in line {lines[name]}", here, where)
+                what = f"this key is here twice; first in line {lines[name]}"
+                raise ModelError(what, here, where, rules.DUPLICATE_KEY.code)
             lines[name] = where.line
             node = self.node(value, (*path, name))
             yield name, Node(node.value, where, node.quoted)
@@ -273,7 +304,8 @@ class _Reading:
         try:
             value: Scalar = getattr(self.yaml.constructor, f"construct_yaml_{kind}")(raw)
         except ValueError:
-            raise ModelError(f"{raw.value!r} is no number", _dotted(path), where) from None
+            what = f"{raw.value!r} is no number"
+            raise ModelError(what, _dotted(path), where, _NO_MODEL) from None
         return value
 
 

@@ -263,10 +263,11 @@ def test_a_frequency_that_can_be_set_is_not_warned_of(workshop, mhz):
 def test_a_frequency_between_two_settings_is_a_warning_that_names_them(workshop):
     system = workshop.load(None, None, BOARD % 1450)
     assert system.processor("ground").frequency_mhz == 1450
-    assert system.warnings == (
+    assert [str(one) for one in system.warnings] == [
         "platform.processors.ground.frequency: rpi4-cortex-a72 cannot be set to 1450 MHz; "
         "the nearest settings are 1400 and 1500 MHz",
-    )
+    ]
+    assert system.warnings[0].rule.code == "V404"
 
 
 def test_a_processor_whose_settings_are_not_known_is_not_warned_of(workshop):

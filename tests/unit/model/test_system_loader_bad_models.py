@@ -263,7 +263,10 @@ SPOILT = {
         ("control: onboard}", "control: onbord}"),
         "control: onbord",
         "allocations.fast.control",
-        ["no processor named 'onbord' (did you mean 'onboard'?); there is ground or onboard"],
+        [
+            "no processor, operating system or memory space named 'onbord' (did you mean 'onboard'?)",
+            "there is ground or onboard",
+        ],
     ),
     "allocating something unknown": (
         ("control: onboard}", "control: onboard, centrall: ground}"),

@@ -1,0 +1,106 @@
+"""From a file of another tool to a model's file, and back: the functions behind the command line."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path, PurePath
+
+from volery.base.errors import Location, ModelError, UsageError, choices
+from volery.base.files import read_bytes, write_text
+from volery.exchange.aadl import aadl_text
+from volery.exchange.sysml import sysml_text
+from volery.exchange.uml.context import Note
+from volery.exchange.uml.document import Imported, export_uml, import_uml
+from volery.exchange.uml.xmi import MOST_BYTES
+from volery.model.assembly import DEFAULT_FILE, read_tree
+from volery.model.writing import model_text
+
+FORMATS = {".uml": "UML with MARTE and S3D", ".aadl": "AADL", ".sysml": "SysML v2"}
+"""Formats of an export by the ending of the file."""
+
+_BESIDE = (".di", ".notation", ".aird")
+
+
+def read_uml(
+    source: Path, folder: Path, catalogue: Iterable[str], processors: Mapping[str, str] | None = None
+) -> Imported:
+    """Return the model of a .uml file, with its paths relative to *folder*.
+
+    Args:
+        source: The .uml file.
+        folder: The folder that the model will be in.
+        catalogue: Names of the processors of the catalogue.
+        processors: The processor of the catalogue that each processor of the file is, by its name there.
+
+    Raises:
+        ModelError: the file cannot be read, or is no UML model with MARTE or S3D.
+    """
+    if source.suffix in _BESIDE:
+        what = f"a {source.suffix} file has diagrams and no model in it; give {source.stem}.uml beside it"
+        raise ModelError(what, "", Location(str(source), 0))
+    try:
+        data = read_bytes(source, MOST_BYTES)
+    except OSError as error:
+        raise ModelError(f"cannot read it: {error.strerror or error}", "", Location(str(source), 0)) from None
+    return import_uml(data, str(source), _path(source.parent, folder), catalogue, processors)
+
+
+def import_model(
+    source: Path,
+    out: Path,
+    catalogue: Iterable[str],
+    processors: Mapping[str, str] | None = None,
+    *,
+    replace: bool = False,
+) -> Imported:
+    """Write the model of a .uml file to *out*, as YAML; see ``read_uml``.
+
+    Raises:
+        ModelError: *source* is no UML model.
+        UsageError: *out* exists and is not to be replaced, or cannot be written.
+    """
+    if out.exists() and not replace:
+        raise UsageError(f"{out} exists; --replace writes over it")
+    imported = read_uml(source, out.parent, catalogue, processors)
+    _write(out, model_text(imported.tree))
+    return imported
+
+
+def export_model(model: Path, target: Path, catalogue: Iterable[str]) -> tuple[Note, ...]:
+    """Write a model to *target* in the format of its ending; return what has no place in it.
+
+    A .uml file that exists is updated: ids, diagrams and what volery does not know stay valid.
+
+    Args:
+        model: The model's file, or its folder.
+        target: The new file.
+        catalogue: Names of the processors of the catalogue.
+
+    Raises:
+        ModelError: the model, or the existing .uml file, cannot be read.
+        UsageError: the ending of *target* is of no known format, or it cannot be written.
+    """
+    if target.suffix not in FORMATS:
+        listed = choices([f"{ending} ({what})" for ending, what in FORMATS.items()])
+        raise UsageError(f"{target}: its ending chooses the format: {listed}")
+    file = model / DEFAULT_FILE if model.is_dir() else model
+    tree = read_tree(file).plain()
+    if target.suffix == ".uml":
+        base = read_uml(target, file.parent, catalogue) if target.exists() else None
+        text, notes = export_uml(tree, str(target), _path(file.parent, target.parent), base)
+    else:
+        text, notes = (aadl_text if target.suffix == ".aadl" else sysml_text)(tree)
+    _write(target, text)
+    return notes
+
+
+def _path(of: Path, start: Path) -> PurePath:
+    return PurePath(os.path.relpath(of.resolve(), start.resolve()))
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        write_text(path, text)
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror or error}") from None

@@ -1,0 +1,71 @@
+"""What a format has no place for: one note for each part of a model, shared by AADL and SysML v2."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+
+class Unmapped:
+    """Collects what was not exported: the kind of thing, and how many or which."""
+
+    def __init__(self) -> None:
+        self._found: dict[str, dict[str, None]] = {}
+
+    def add(self, what: str, *names: str) -> None:
+        """Record that *what* has no place in the format, at *names*."""
+        self._found.setdefault(what, {}).update(dict.fromkeys(names))
+
+    def lines(self) -> Iterator[str]:
+        """Yield one line for each kind of thing."""
+        for what, names in self._found.items():
+            yield f"{what}: {', '.join(names)}" if names else what
+
+
+def instances(tree: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Return the instances of the application, then those of the environment."""
+    around = (tree.get("environment") or {}).get("components") or {}
+    return {**(tree.get("application") or {}), **around}
+
+
+def connections(tree: Mapping[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Yield each connection: the instance, its required port, and what it is connected to."""
+    components = tree.get("components") or {}
+    for name, stated in instances(tree).items():
+        for port in components.get(stated.get("is"), {}).get("requires") or {}:
+            listed = stated.get(port)
+            for target in listed if isinstance(listed, list) else [listed]:
+                if target is not None:
+                    yield name, port, str(target)
+
+
+def default_allocation(tree: Mapping[str, Any]) -> dict[str, str]:
+    """Return the places of the first allocation, with those of what it extends."""
+    allocations = tree.get("allocations") or {}
+    chain = [next(iter(allocations), "")]
+    while (above := (allocations.get(chain[-1]) or {}).get("extends")) and above not in chain:
+        chain.append(above)
+    places: dict[str, str] = {}
+    for one in reversed(chain):
+        stated = allocations.get(one) or {}
+        places |= {key: str(value) for key, value in stated.items() if key not in ("extends", "set")}
+    return places
+
+
+def note_rest(unmapped: Unmapped, tree: Mapping[str, Any], mapped: Iterable[str]) -> None:
+    """Record the sections of a model that the format has no place for, and all but the default allocation."""
+    for section, stated in tree.items():
+        if stated and section not in mapped:
+            unmapped.add(f"section `{section}`", *(stated if isinstance(stated, Mapping) else ()))
+    others = list(tree.get("allocations") or {})[1:]
+    if others:
+        unmapped.add("allocations but the default one", *others)
+    for name, component in (tree.get("components") or {}).items():
+        for key in ("parameters", "calls", "files", "build", "queues"):
+            if component.get(key):
+                unmapped.add(f"`{key}` of components", name)
+    for name, stated in ((tree.get("environment") or {}).get("vehicles") or {}).items():
+        rest = [key for key in stated if key != "kind"]
+        unmapped.add("vehicles but for their kind", *(f"{name}.{key}" for key in rest))
+    for key in (tree.get("environment") or {}).keys() - {"vehicles", "components"}:
+        unmapped.add("environment", key)

@@ -1,0 +1,288 @@
+"""An XMI file: read without executing anything in it, indexed by ids and stereotypes, and written.
+
+Plain XML with an index, not pyecore: that library fails on most real MARTE models and on S3D's versioned
+namespaces. Namespaces are matched by pattern, because each release of Papyrus, MARTE and S3D has its own.
+What volery does not understand stays in the tree, so that it is still there after writing.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from lxml import etree
+
+from volery.base.errors import Location, ModelError
+
+MOST_BYTES = 32 << 20
+"""Largest .uml file that is read. The complete profile of S3D with its history has 2.6 MB."""
+
+XMI = "http://www.omg.org/spec/XMI/20131001"
+UML = "http://www.eclipse.org/uml2/5.0.0/UML"
+ECORE = "http://www.eclipse.org/emf/2002/Ecore"
+XSI = "http://www.w3.org/2001/XMLSchema-instance"
+
+_XMI_URI = re.compile(r"^http://(schema\.omg\.org/spec/XMI|www\.omg\.org/(spec/)?XMI)\b")
+_UML_URI = re.compile(
+    r"^http://(www\.eclipse\.org/uml2/\d+\.\d+\.\d+/UML|(schema|www)\.omg\.org/spec/UML\b.*)$"
+)
+_PROFILES = (
+    re.compile(r"^http:///schemas/(?P<name>essyn_Profile|PHARAON_Profile)/_[A-Za-z0-9_-]+/\d+$"),
+    re.compile(r"^http://(?P<name>essyn_Profile|PHARAON_Profile)\.UTP_Stereotypes/schemas/UTP/"),
+    re.compile(r"^http:///(?P<name>essyn_Profile|PHARAON_Profile)/.*\.ecore$"),
+    re.compile(r"^http://www\.eclipse\.org/papyrus/(?P<name>\w+)/\d+$"),
+    re.compile(r"^http:///(?:MARTE/)(?:\w+/)*(?P<name>\w+)\.ecore$"),
+    re.compile(r"^http:///schemas/(?P<name>\w+)/_[A-Za-z0-9_-]+/\d+$"),
+    re.compile(r"^http://www\.eclipse\.org/uml2/\d+\.\d+\.\d+/UML/Profile/(?P<name>\w+)$"),
+)
+_OTHER_FILES = {
+    "SashWindowsMngr": ".di",
+    "Diagram": ".notation",
+    "EPackage": ".ecore",
+    "Profile": ".profile.uml",
+}
+
+Element: TypeAlias = Any
+"""An element of lxml, which carries no types."""
+
+
+def local(element: Element) -> str:
+    """Return the name of an element without its namespace."""
+    return etree.QName(element).localname if isinstance(element.tag, str) else ""
+
+
+def _profile_of(uri: str) -> str:
+    """Return the profile of a namespace, empty if it is none of MARTE, S3D or the standard one."""
+    for pattern in _PROFILES:
+        found = pattern.match(uri)
+        if found:
+            name = found.group("name")
+            return "S3D" if name in ("essyn_Profile", "PHARAON_Profile") else name
+    return ""
+
+
+@dataclass(frozen=True)
+class Application:
+    """A stereotype that is applied: its name, its profile, and the element that holds its tags."""
+
+    name: str
+    profile: str
+    element: Element
+
+
+class XmiFile:
+    """The tree of a .uml file with an index of its ids and its stereotypes.
+
+    ``strange`` are applications of stereotypes whose profile is not known. ``dangling`` are pairs of an
+    element and an id that it refers to and that does not exist.
+    """
+
+    def __init__(self, root: Element, name: str) -> None:
+        self.root, self.name = root, name
+        self.ids: dict[str, Element] = {}
+        for element in root.iter(etree.Element):
+            found = xmi_id(element)
+            if found:
+                self.ids.setdefault(found, element)
+        self.applied: dict[Element, list[Application]] = {}
+        self.bases: dict[Element, Element] = {}
+        self.strange: list[Element] = []
+        self.dangling: list[tuple[Element, str]] = []
+        for element in root:
+            if isinstance(element.tag, str) and element is not self.model:
+                self._index(element)
+
+    @property
+    def model(self) -> Element:
+        """The ``uml:Model``, or the root package."""
+        if _is_uml(self.root):
+            return self.root
+        return next(each for each in self.root if isinstance(each.tag, str) and _is_uml(each))
+
+    def _index(self, element: Element) -> None:
+        uri = etree.QName(element).namespace or ""
+        profile = _profile_of(uri)
+        bases = [(name, value) for name, value in element.attrib.items() if name.startswith("base_")]
+        bases += [(local(each), _idref(each)) for each in element if local(each).startswith("base_")]
+        if not bases:
+            return
+        if not profile:
+            self.strange.append(element)
+            return
+        application = Application(local(element), profile, element)
+        for _, target in bases:
+            found = self.ids.get(target)
+            if found is None:
+                self.dangling.append((element, target))
+                continue
+            self.bases[element] = found
+            known = self.applied.setdefault(found, [])
+            if application not in known:
+                known.append(application)
+
+    def register(self, element: Element, stereotype: str, profile: str, application: Element) -> None:
+        """Add an application of a stereotype that has been put into the tree."""
+        self.applied.setdefault(element, []).append(Application(stereotype, profile, application))
+
+    def unregister(self, element: Element, stereotype: str = "") -> None:
+        """Remove the applications of *stereotype*, or of all stereotypes, to *element* from the tree."""
+        applied = self.applied.get(element, [])
+        for one in [each for each in applied if stereotype in ("", each.name)]:
+            applied.remove(one)
+            if one.element.getparent() is not None:
+                one.element.getparent().remove(one.element)
+
+    def stereotype(self, element: Element, *names: str) -> Element | None:
+        """Return the application of the first of the stereotypes *names* to *element*."""
+        for name in names:
+            for one in self.applied.get(element, ()):
+                if one.name == name:
+                    return one.element
+        return None
+
+    def has(self, element: Element, *names: str) -> bool:
+        """Return whether one of the stereotypes *names* is applied to *element*."""
+        return self.stereotype(element, *names) is not None
+
+    def with_stereotype(self, *names: str) -> list[Element]:
+        """Return the elements with one of the stereotypes, in the order of the file."""
+        return [each for each in self.model.iter(etree.Element) if self.has(each, *names)]
+
+    def elements(self, *types: str) -> Iterator[Element]:
+        """Yield the UML elements of some types, such as ``Component``, in the order of the file."""
+        for element in self.model.iter(etree.Element):
+            if uml_type(element) in types:
+                yield element
+
+    def references(self, element: Element, feature: str) -> list[Element]:
+        """Return what a feature refers to, as an attribute or as child elements.
+
+        An applied stereotype stands for the element that it is applied to. References to other files are
+        left out; ids that do not exist are added to ``dangling``.
+        """
+        found = []
+        for target in targets(element, feature):
+            if target in self.ids:
+                one = self.ids[target]
+                found.append(self.bases.get(one, one))
+            elif (element, target) not in self.dangling:
+                self.dangling.append((element, target))
+        return found
+
+    def reference(self, element: Element, feature: str) -> Element | None:
+        """Return the first of ``references``."""
+        return next(iter(self.references(element, feature)), None)
+
+    def where(self, element: Element) -> Location:
+        """Return the file and the line of an element."""
+        return Location(self.name, min(element.sourceline or 0, 2**31))
+
+    def text(self, namespaces: Mapping[str, str]) -> str:
+        """Return the file as Papyrus would store it, with these prefixes of *namespaces* that are in use."""
+        etree.indent(self.root, "  ")
+        kept = dict(self.root.nsmap)
+        added = {key: uri for key, uri in namespaces.items() if key not in kept and uri not in kept.values()}
+        etree.cleanup_namespaces(self.root, top_nsmap=added, keep_ns_prefixes=["xmi", "uml", "ecore"])
+        body = etree.tostring(self.root, encoding="unicode")
+        return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}\n'
+
+
+def _is_uml(element: Element) -> bool:
+    return local(element) in ("Model", "Package") and bool(
+        _UML_URI.match(etree.QName(element).namespace or "")
+    )
+
+
+def xmi_id(element: Element) -> str:
+    """Return the id of an element, empty if it has none."""
+    return _xmi_attribute(element, "id")
+
+
+def uml_type(element: Element) -> str:
+    """Return the UML metaclass of an element without its prefix, empty if it is not stated."""
+    stated = _xmi_attribute(element, "type") or str(element.get(f"{{{XSI}}}type", ""))
+    return stated.rpartition(":")[2]
+
+
+def _xmi_attribute(element: Element, name: str) -> str:
+    for key, value in element.attrib.items():
+        if key.endswith(f"}}{name}") and _XMI_URI.match(key[1:]):
+            return str(value)
+    return ""
+
+
+def _idref(element: Element) -> str:
+    return _xmi_attribute(element, "idref") or str(element.get("href", ""))
+
+
+def targets(element: Element, feature: str) -> list[str]:
+    """Return the ids that a feature states. References to other files are left out."""
+    found = str(element.get(feature, "")).split()
+    found += [_idref(each) for each in element if local(each) == feature and _idref(each)]
+    return [one.removeprefix("#") for one in found if "#" not in one[1:]]
+
+
+def tag(application: Element | None, *names: str) -> str:
+    """Return the value of the first tag that is stated, as an attribute or as a child element."""
+    return next(iter(tags(application, *names)), "")
+
+
+def tags(application: Element | None, *names: str) -> list[str]:
+    """Return all values of the first tag that is stated; empty texts and ``null`` count as none."""
+    if application is None:
+        return []
+    for name in names:
+        found = [str(application.get(name, ""))]
+        found += [each.text or str(each.get("value", "")) for each in application if local(each) == name]
+        stated = [one.strip() for one in found if one and one.strip().lower() not in ("", "null")]
+        if stated:
+            return stated
+    return []
+
+
+def parse(data: bytes, name: str) -> XmiFile:
+    """Return the tree of a .uml file.
+
+    Entities, document types, other files and the network are out of reach of the text.
+
+    Args:
+        data: The bytes of the file.
+        name: Its name in messages.
+
+    Raises:
+        ModelError: it is too large, no XML, not safe, or no UML model.
+    """
+    if len(data) > MOST_BYTES:
+        what = f"{len(data) / 1e6:.0f} MB; a UML model has at most {MOST_BYTES >> 20} MiB"
+        raise ModelError(what, "", Location(name, 0))
+    if re.search(rb"<!\s*(DOCTYPE|ENTITY)", data[: 1 << 16], re.IGNORECASE) or b"<!ENTITY" in data:
+        what = "a document type or an entity is declared; models have none: remove the declaration"
+        raise ModelError(what, "", Location(name, 1))
+    parser = etree.XMLParser(
+        resolve_entities=False, load_dtd=False, no_network=True, huge_tree=False, remove_blank_text=True
+    )
+    try:
+        root = etree.fromstring(data, parser)
+    except etree.XMLSyntaxError as error:
+        line = error.lineno or 1
+        raise ModelError(f"this is not XML: {error.msg}", "", Location(name, line)) from None
+    if root.getroottree().docinfo.doctype:  # in an encoding in which the search above finds nothing
+        raise ModelError("a document type is declared; models have none", "", Location(name, 1))
+    return XmiFile(_model_root(root, name), name)
+
+
+def _model_root(root: Element, name: str) -> Element:
+    candidates = [root, *(each for each in root if isinstance(each.tag, str))]
+    if any(map(_is_uml, candidates)):
+        return root
+    for each in candidates:
+        if local(each) in _OTHER_FILES:
+            kind = _OTHER_FILES[local(each)]
+            uml = f"{Path(name).name.partition('.')[0]}.uml"
+            what = f"this is a {kind} file, which has no model in it; give the {uml} beside it"
+            raise ModelError(what, "", Location(name, each.sourceline or 1))
+    what = f"there is no uml:Model in it; its root is {local(root)!r}"
+    raise ModelError(what, "", Location(name, root.sourceline or 1))
