@@ -30,6 +30,8 @@ STANDS_S = 1.0
 REACTION = 0.05
 """Share of the step at which the delay ends."""
 LEAST_SAMPLES = 5
+CALM = 0.3
+"""Share of the settling band within which the error counts as small."""
 HALF_TURN = 170.0 / 360.0
 """Share of a turn from which a step counts as a half turn: either direction is right."""
 
@@ -336,8 +338,8 @@ def _settling_time(times: Array, error: Array, band: float) -> float:
 def _disturbance(times: Array, error: Array, band: float) -> tuple[float, float, float] | None:
     """Return begin, recovery time and greatest error of the largest disturbance after settling.
 
-    It begins when the error leaves *band*, after it has been within *band* for ``STANDS_S``, and jumps to
-    more than twice the band.
+    The error leaves *band* after it has been within it for ``STANDS_S``, and reaches more than twice the
+    band. It began where the error was last small.
     """
     inside = np.abs(error) <= band
     worst: tuple[float, float, float] | None = None
@@ -349,8 +351,10 @@ def _disturbance(times: Array, error: Array, band: float) -> tuple[float, float,
         back = end + int(np.argmin(left)) if not left.all() else len(times)
         peak = float(np.max(np.abs(error[end:back])))
         if peak > 2.0 * band and (worst is None or peak > worst[2]):
-            recovery = _settling_time(times[end:] - times[end], error[end:], band)
-            worst = (float(times[end]), recovery, peak)
+            calm = np.flatnonzero(np.abs(error[begin:end]) <= band * CALM)
+            start = begin + int(calm[-1]) if len(calm) else end
+            recovery = _settling_time(times[start:] - times[start], error[start:], band)
+            worst = (float(times[start]), recovery, peak)
     return worst
 
 

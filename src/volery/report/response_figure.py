@@ -63,41 +63,34 @@ def draw_records(judged: Sequence[Judged], path: Path) -> None:
 
 
 def draw_comparison(judged: Sequence[Judged], path: Path) -> None:
-    """Draw the responses of several controllers above each other, one plot for each size of a step.
+    """Draw the responses of several controllers above each other, one plot for each step in order.
 
     Args:
         judged: signals and their responses; the name is the signal's controller.
         path: figure to write.
     """
-    sizes = sorted({_nominal(one) for _, responses in judged for one in responses})
-    if not sizes:
+    count = max((len(responses) for _, responses in judged), default=0)
+    if not count:
         raise UsageError("there is no step to compare; --step gives the least size of one")
-    figure, rows = _figure(len(sizes), path)
+    figure, rows = _figure(count, path)
     names = list(dict.fromkeys(signal.controller or signal.name for signal, _ in judged))
-    for axes, size in zip(rows, sizes, strict=True):
-        shown: set[str] = set()
+    for number, axes in enumerate(rows):
+        longest = 0.0
         for signal, responses in judged:
-            name = signal.controller or signal.name
+            if number >= len(responses):
+                continue
+            name, one = signal.controller or signal.name, responses[number]
+            part = signal.between(one.start, one.end)
+            values, _ = _continuous(part)
+            left = (values - values[0] - one.size) * np.sign(one.size)
             colour = COLOURS[names.index(name) % len(COLOURS)]
-            for one in responses:
-                if _nominal(one) != size:
-                    continue
-                part = signal.between(one.start, one.end)
-                values, _ = _continuous(part)
-                moved = (values - values[0]) * np.sign(one.size)
-                label = None if name in shown else name
-                axes.plot(part.times - one.start, moved, color=colour, linewidth=1.3, label=label)
-                shown.add(name)
-        axes.axhline(size, color=GOAL, linestyle="--", linewidth=1.0)
-        axes.axhspan(size * 0.9, size * 1.1, color=BAND, alpha=0.25, linewidth=0)
-        _label(axes, f"moved [{judged[0][0].unit}]", f"step of {size:g} {judged[0][0].unit}")
+            axes.plot(part.times - one.start, left, color=colour, linewidth=1.4, label=name)
+            longest = max(longest, abs(one.size))
+        axes.axhline(0.0, color=GOAL, linestyle="--", linewidth=1.0)
+        axes.axhspan(-0.1 * longest, 0.1 * longest, color=BAND, alpha=0.25, linewidth=0)
+        _label(axes, f"from set-point [{judged[0][0].unit}]", f"step {number + 1}, with ±10 % of it")
     rows[-1].set_xlabel("time after the step [s]")
     figure.savefig(path)
-
-
-def _nominal(response: StepResponse) -> float:
-    """Return the size of a step without its sign, rounded to two digits so that repeated steps are one."""
-    return float(f"{abs(response.size):.2g}")
 
 
 def _figure(rows: int, path: Path) -> tuple[Figure, list[Any]]:

@@ -11,6 +11,7 @@ import typer
 from volery.base.errors import UsageError
 from volery.cli.command import OK, Commands
 from volery.cli.console import Output, make_table, number_column
+from volery.cli.options import Out
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,12 +29,19 @@ NOTHING = "–"
 def response(
     output: Output,
     files: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
             metavar="FILE...",
             help="Run folder, rosbag, tlog, DataFlash log (.bin) or ULog (.ulg); several are compared.",
         ),
-    ],
+    ] = None,
+    thesis: Annotated[
+        bool,
+        typer.Option(
+            help="Fly the thesis's On/Off, P and PID laws and ours on a simulated ArduCopter, and compare."
+        ),
+    ] = False,
+    out: Out = None,
     signal: Annotated[
         list[str] | None, typer.Option(help="Only this signal, such as yaw; may be repeated.")
     ] = None,
@@ -59,6 +67,10 @@ def response(
 
     if plot is not None:
         check_format(plot)
+    if thesis:
+        return _thesis(output, out, plot)
+    if not files:
+        raise UsageError("give the record of a flight, or --thesis")
     if goal is not None and measured is None:
         raise UsageError(f"--goal {goal}: state --measured, too")
     judged = []
@@ -137,3 +149,43 @@ def _cell(found: StepResponse, field: str) -> str:
         case "iae" | "itae":
             return f"{value:.3g}"
     return f"{value:.1f}" if field == "start" else f"{value:.2f}"
+
+
+def _thesis(output: Output, out: Path | None, plot: Path | None) -> int:
+    from volery.cli.run_display import run_folder
+    from volery.control.step_response import as_record
+    from volery.report.response_figure import draw_comparison
+    from volery.run.thesis_comparison import OFFSET, STEPS, THESIS, fly_thesis_comparison
+
+    with run_folder(out, "thesis") as folder:
+        flown = fly_thesis_comparison(folder)
+    headings = (number_column(one) for one in ("step", "10 %", "3 %", "over", "steady", "push", "recovery"))
+    table = make_table(
+        "law", *headings, title="yaw in deg, times in s, on a simulated ArduCopter by RC override"
+    )
+    table.padding = (0, 1, 0, 0)
+    for row in THESIS:
+        table.add_row(
+            "thesis's PID", row.steps, row.settled_10, row.settled_3, row.overshoot, NOTHING, "hand", NOTHING
+        )
+    for one in flown:
+        for step, found in zip(STEPS, one.responses, strict=True):
+            pushed = NOTHING if isnan(found.pushed) else f"{found.pushed:.0f}"
+            over = f"{found.overshoot:.1f} ({_cell(found, 'overshoot')})"
+            shown = (_cell(found, name) for name in ("settled_10", "settled_3"))
+            table.add_row(
+                one.law,
+                f"{step:g}",
+                *shown,
+                over,
+                _cell(found, "steady_error"),
+                pushed,
+                _cell(found, "recovery"),
+            )
+    output.show(table, OFFSET)
+    output.give([as_record(one.signal, one.responses) for one in flown])
+    if plot is not None:
+        draw_comparison([(one.signal, one.responses) for one in flown], plot)
+        output.note(f"plot: {plot}")
+    output.note(f"runs: {folder}")
+    return OK

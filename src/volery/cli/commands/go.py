@@ -1,0 +1,209 @@
+"""``volery go``: flights under control laws of this program, with the operator's safety switch on top."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from volery.base.errors import UsageError
+from volery.cli.command import Commands
+from volery.cli.console import Output
+from volery.cli.options import Out, Seed, Speed, parse_speed
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from volery.control.manoeuvres import Manoeuvre
+    from volery.control.safety_switch import SwitchSettings
+
+commands = Commands("Fly", group="go", summary="Fly under a control law on this side of the link.")
+
+On = Annotated[str, typer.Option(metavar="URL", help="Address of the vehicle, such as sim:ardupilot.")]
+By = Annotated[
+    str,
+    typer.Option(metavar="setpoints|rc", help="Apply commands as velocity set-points or by RC override."),
+]
+Switch = Annotated[
+    str,
+    typer.Option(
+        metavar="CHANNEL|none",
+        help="RC channel of the safety switch: below 1200 us manual, to 1700 us autonomous, above land.",
+    ),
+]
+OnRcLoss = Annotated[
+    str, typer.Option(metavar="land|release|continue", help="Reaction to the loss of the transmitter.")
+]
+OnTelemetryLoss = Annotated[
+    str, typer.Option(metavar="land|release", help="Reaction to the loss of telemetry.")
+]
+Gains = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Gains by loop in TOML; read again while the vehicle flies."),
+]
+Height = Annotated[float, typer.Option(metavar="METRES", help="Height of the take-off above home.")]
+Hold = Annotated[float, typer.Option(metavar="SECONDS", help="Time for each set-point.")]
+
+
+@commands.add("quiet", "json", "debug")
+def rotation(
+    output: Output,
+    on: On,
+    angle: Annotated[
+        list[float], typer.Option(help="Heading in degrees, clockwise from north; may be repeated.")
+    ],
+    hold: Hold = 15.0,
+    by: By = "setpoints",
+    height: Height = 5.0,
+    gains: Gains = None,
+    switch: Switch = "6",
+    on_rc_loss: OnRcLoss = "land",
+    on_telemetry_loss: OnTelemetryLoss = "land",
+    seed: Seed = 1,
+    speed: Speed = "max",
+    out: Out = None,
+) -> int:
+    """Take off, turn to one heading after the other, and land."""
+    from volery.control.manoeuvres import Rotation
+
+    settings = _switch(switch, on_rc_loss, on_telemetry_loss)
+    return _go(
+        output, "rotation", lambda: Rotation(angle, hold), on, by, height, gains, settings, seed, speed, out
+    )
+
+
+@commands.add("quiet", "json", "debug")
+def altitude(
+    output: Output,
+    on: On,
+    to: Annotated[list[float], typer.Option(help="Height above home in metres; may be repeated.")],
+    hold: Hold = 15.0,
+    by: By = "setpoints",
+    height: Height = 3.0,
+    gains: Gains = None,
+    switch: Switch = "6",
+    on_rc_loss: OnRcLoss = "land",
+    on_telemetry_loss: OnTelemetryLoss = "land",
+    seed: Seed = 1,
+    speed: Speed = "max",
+    out: Out = None,
+) -> int:
+    """Take off, climb or descend to one height after the other, and land."""
+    from volery.control.manoeuvres import Altitude
+
+    settings = _switch(switch, on_rc_loss, on_telemetry_loss)
+    return _go(
+        output, "altitude", lambda: Altitude(to, hold), on, by, height, gains, settings, seed, speed, out
+    )
+
+
+@commands.add("quiet", "json", "debug")
+def waypoints(
+    output: Output,
+    on: On,
+    point: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NORTH,EAST,UP", help="Way point in metres about home; may be repeated."),
+    ] = None,
+    cube: Annotated[
+        float | None, typer.Option(metavar="METRES", help="Fly the corners of a cube of this side instead.")
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option(help="Distance within which a point counts as reached, m.")
+    ] = 0.1,
+    hold: Annotated[float, typer.Option(help="Time within the tolerance before the next point, s.")] = 1.0,
+    rounds: Annotated[int, typer.Option(help="How often the sequence is flown.")] = 1,
+    by: By = "setpoints",
+    height: Height = 5.0,
+    gains: Gains = None,
+    switch: Switch = "6",
+    on_rc_loss: OnRcLoss = "land",
+    on_telemetry_loss: OnTelemetryLoss = "land",
+    seed: Seed = 1,
+    speed: Speed = "max",
+    out: Out = None,
+) -> int:
+    """Take off, fly to way points one after the other, and land."""
+    from volery.control import manoeuvres
+
+    if (cube is None) == (not point):
+        raise UsageError("give --point NORTH,EAST,UP once or more, or --cube METRES")
+    if cube is not None and not cube > 0.0:
+        raise UsageError(f"--cube {cube:g}: give a side above 0 m")
+    points = [_point(one) for one in point or []] if cube is None else manoeuvres.cube(cube, height)
+
+    def make() -> Manoeuvre:
+        return manoeuvres.Waypoints(points, tolerance=tolerance, hold_s=hold, rounds=rounds)
+
+    settings = _switch(switch, on_rc_loss, on_telemetry_loss)
+    return _go(output, "waypoints", make, on, by, height, gains, settings, seed, speed, out)
+
+
+@commands.add("quiet", "json", "debug")
+def land(
+    output: Output,
+    on: On,
+    by: By = "setpoints",
+    height: Height = 10.0,
+    gains: Gains = None,
+    switch: Switch = "6",
+    on_rc_loss: OnRcLoss = "land",
+    on_telemetry_loss: OnTelemetryLoss = "land",
+    seed: Seed = 1,
+    speed: Speed = "max",
+    out: Out = None,
+) -> int:
+    """Land in steps of descent with the heading kept, and disarm; take off first if the vehicle stands."""
+    from volery.control.manoeuvres import Altitude
+
+    settings = _switch(switch, on_rc_loss, on_telemetry_loss)
+    return _go(
+        output, "land", lambda: Altitude([height], 0.1), on, by, height, gains, settings, seed, speed, out
+    )
+
+
+def _switch(text: str, on_rc_loss: str, on_telemetry_loss: str) -> SwitchSettings | None:
+    from volery.control.safety_switch import SwitchSettings, parse_reaction
+
+    rc, telemetry = parse_reaction(on_rc_loss), parse_reaction(on_telemetry_loss)
+    if text == "none":
+        return None
+    if not text.isdecimal():
+        raise UsageError(f"--switch {text}: give the number of an RC channel, or none")
+    return SwitchSettings(channel=int(text), on_rc_loss=rc, on_telemetry_loss=telemetry)
+
+
+def _point(text: str) -> tuple[float, float, float]:
+    try:
+        north, east, up = (float(part) for part in text.split(","))
+    except ValueError:
+        raise UsageError(f"--point {text}: give NORTH,EAST,UP in metres, as in 5,0,10") from None
+    return north, east, up
+
+
+def _go(
+    output: Output,
+    name: str,
+    make: Callable[[], Manoeuvre],
+    on: str,
+    by: str,
+    height: float,
+    gains: Path | None,
+    switch: SwitchSettings | None,
+    seed: int,
+    speed: str,
+    out: Path | None,
+) -> int:
+    from volery.cli.run_display import run_folder, run_progress, show_outcome
+    from volery.run.go import GoSettings, go
+    from volery.run.result import Options
+
+    pace = parse_speed(speed)
+    settings = GoSettings(by=by, switch=switch, height=height, gains=gains)
+    with run_folder(out, f"go-{name}") as folder, run_progress(output, f"{name} on {on}") as show:
+        options = Options(fidelity="hardware", seed=seed, pace=pace, out=folder, show=show, tell=output.note)
+        run = go(make, on, settings, options)
+    status = show_outcome(output, run)
+    output.note(f"volery response {run.folder} judges its loops")
+    return status
