@@ -140,6 +140,7 @@ class Options:
         tell: Receives single lines that the user should read at once.
         graph: ``ros1`` or ``ros2`` to run the components as processes on that graph, at a pace of 1 unless
             ``pace`` is given; empty for the embedded graph.
+        deployed: The components on ``graph`` are started by others, from the packages of ``volery deploy``.
         log: File into which the run writes what happens, line by line, or None.
         traces: Folder in which C++ components record the basic blocks that they enter, without being charged.
     """
@@ -151,6 +152,7 @@ class Options:
     show: Show | None = None
     tell: Tell | None = None
     graph: str = ""
+    deployed: bool = False
     traces: Path | None = None
     log: LogOptions | None = None
 

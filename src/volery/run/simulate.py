@@ -21,7 +21,14 @@ from volery.run.assembly.cpp import compile_all, has_cpp
 from volery.run.assembly.fault_effects import Affected, FleetLinks, inject, with_faulty_links
 from volery.run.assembly.model_checks import vocabulary
 from volery.run.assembly.simulated_fleet import SimulatedFleet
-from volery.run.distributed import DistributedRun, GraphSettings, HostPlatform, unallocated, without_computers
+from volery.run.distributed import (
+    DistributedRun,
+    GraphSettings,
+    HostPlatform,
+    unallocated,
+    without_computers,
+    without_truth,
+)
 from volery.run.ending import Ending
 from volery.run.recording import Recording
 from volery.run.result import DEFAULT_OPTIONS, Options, ProgressReporter, Run
@@ -36,6 +43,8 @@ WHO, WARNING = "volery", 4
 """Source and severity of the warnings of a run."""
 
 NOT_MODELLED = "its components compute on this machine and not on the model's processors"
+
+NO_TRUTH = "its components are started by others, which cannot see the true state of vehicles"
 
 PATIENCE_S = 30.0
 """Wall seconds that a component may compute without letting virtual time pass."""
@@ -224,16 +233,23 @@ class _OnGraph(_Simulation):
 
     def __init__(self, system: System, options: Options) -> None:
         pace = options.pace or 1.0
-        system, self._unjudged = without_computers(system)
+        system, unjudged = without_computers(system)
+        self._unjudged = dict.fromkeys(unjudged, NOT_MODELLED)
+        if options.deployed:
+            system, unjudged = without_truth(system)
+            self._unjudged |= dict.fromkeys(unjudged, NO_TRUTH)
         super().__init__(system, options, pace)
         self._distributed = DistributedRun(
-            system, self._kernel, self._ending, GraphSettings(options.graph, pace, options.seed)
+            system,
+            self._kernel,
+            self._ending,
+            GraphSettings(options.graph, pace, options.seed, options.deployed),
         )
 
     def _platform(self) -> Platform:
         host = HostPlatform(self._system, self._kernel, self._options.seed, self._options.fidelity)
-        for name in self._unjudged:
-            host.warnings[f"the requirement {name!r} is not judged: {NOT_MODELLED}"] = None
+        for name, why in self._unjudged.items():
+            host.warnings[f"the requirement {name!r} is not judged: {why}"] = None
         return host
 
     def _setup(self, platform: Platform) -> RunSetup:

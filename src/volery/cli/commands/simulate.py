@@ -61,7 +61,7 @@ def check(output: Output, model: Model, overrides: Overrides = None) -> int:
             "instances": {one.name: one.component.name for one in system.instances},
             "requirements": [one.name for one in system.requirements],
             "missing": missing,
-            "warnings": list(system.warnings),
+            "warnings": [str(one) for one in system.warnings],
         }
     )
     return OK
@@ -245,6 +245,10 @@ def simulate(
             metavar="ros1|ros2", help="Run each component as a process on that ROS graph, in real time."
         ),
     ] = "",
+    deployed: Annotated[
+        bool,
+        typer.Option(help="With --graph: others start the components, from packages of `volery deploy`."),
+    ] = False,
     out: Out = None,
     log_file: LogFile = None,
     log_level: LogLevel = "info",
@@ -261,6 +265,8 @@ def simulate(
     from volery.run.simulate import simulate as run_simulation
 
     pace = parse_speed(speed)
+    if deployed and not graph:
+        raise UsageError("--deployed: name the graph of the components, too: --graph ros1 or --graph ros2")
     system = load(model, vocabulary(), scenario, allocation, overrides or ())
     title = " · ".join(filter(None, (system.name, system.allocation, system.scenario)))
     with run_folder(out, system.name) as folder, run_progress(output, title) as show:
@@ -272,6 +278,7 @@ def simulate(
             show=show,
             tell=output.note,
             graph=graph,
+            deployed=deployed,
             log=read_log_options(log_file, log_level),
         )
         run = run_simulation(system, options)

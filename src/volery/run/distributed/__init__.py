@@ -10,7 +10,15 @@ Computing takes the time of this machine and is not accounted for; ``without_com
 meaning then.
 """
 
-from volery.run.distributed.plan import NODE, HostPlatform, unallocated, without_computers
+from volery.run.distributed.plan import NODE, HostPlatform, unallocated, without_computers, without_truth
 from volery.run.distributed.processes import DistributedRun, GraphSettings
 
-__all__ = ["NODE", "DistributedRun", "GraphSettings", "HostPlatform", "unallocated", "without_computers"]
+__all__ = [
+    "NODE",
+    "DistributedRun",
+    "GraphSettings",
+    "HostPlatform",
+    "unallocated",
+    "without_computers",
+    "without_truth",
+]

@@ -6,7 +6,7 @@ import os
 import pickle
 import threading
 from contextlib import suppress
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 from volery.base.position import Position
 from volery.model.system import System
@@ -58,6 +58,16 @@ class EndingBegun(NamedTuple):
 
     status: str
     why: str
+
+
+class RunSide(Protocol):
+    """The run, as a component's process sees it."""
+
+    def send(self, thing: object) -> bool:
+        """Send a message or an event. Return False if the run is gone."""
+
+    def receive(self) -> Any:
+        """Block until the next message. Raises ``EOFError`` if the run is gone."""
 
 
 class Pipe:

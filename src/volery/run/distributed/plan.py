@@ -37,6 +37,9 @@ COMPUTING = frozenset(
 )
 """Observables of the model's processors, which are not used here."""
 
+BY_TRUTH = frozenset(("landing_offset",))
+"""Observables of operations by the true state."""
+
 
 def worker_instances(system: System) -> tuple[Instance, ...]:
     """Return the instances of the application, which get their own processes.
@@ -69,6 +72,16 @@ def without_computers(system: System) -> tuple[System, tuple[str, ...]]:
         requirements=tuple(one for one in system.requirements if one.name not in left_out),
     )
     return made, left_out
+
+
+def without_truth(system: System) -> tuple[System, tuple[str, ...]]:
+    """Return *system* without the requirements that compare operations with the true state.
+
+    Processes that others started have no access to it. The names of those requirements are returned, too.
+    """
+    left_out = tuple(one.name for one in system.requirements if one.observe.rpartition(".")[2] in BY_TRUTH)
+    kept = tuple(one for one in system.requirements if one.name not in left_out)
+    return replace(system, requirements=kept), left_out
 
 
 def unallocated(system: System) -> System:

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from types import ModuleType
@@ -24,6 +24,7 @@ from volery.run.assembly.component_builder import Builder, BuiltComponents, Proc
 from volery.run.assembly.computers import Platform
 from volery.run.assembly.ros_graphs import open_graph
 from volery.run.distributed import pipe, plan
+from volery.run.distributed.deployed import DeployedComponent, DeployedRun
 from volery.run.distributed.pipe import Pipe
 from volery.run.distributed.remote_ports import PortClients, PortServer, ValueCodec
 from volery.run.ending import Ending
@@ -150,11 +151,12 @@ def _how(code: int) -> str:
 
 
 class GraphSettings(NamedTuple):
-    """Graph, pace and seed of the run."""
+    """Graph, pace and seed of the run; whether its components are started by others."""
 
     graph: str
     pace: float
     seed: int
+    deployed: bool = False
 
 
 class DistributedRun:
@@ -169,7 +171,7 @@ class DistributedRun:
     ) -> None:
         self._apart = plan.worker_instances(system)
         self._kernel, self._ending, self._system, self._settings = kernel, ending, system, settings
-        self._processes: list[WorkerProcess] = []
+        self._processes: Sequence[WorkerProcess | DeployedComponent] = ()
         self._closed = False
         self._built: BuiltComponents
         self._truth: Callable[[str], Truth]
@@ -205,9 +207,18 @@ class DistributedRun:
             desk.serve(model, self._built.instances[model.name])
         period = round(CLOCK_PERIOD * max(1.0, self._settings.pace))  # the same rate in wall time at any pace
         self.graph.publish_clock(self._node, period)
-        for model in self._apart:
-            order = pipe.WorkerOrder(self._system, model.name, self._settings.graph, self._settings.seed)
-            self._processes.append(WorkerProcess(self._kernel, self._ending, order, self._truth))
+        settings = self._settings
+        if settings.deployed:
+            deployed = DeployedRun(self._kernel, self._ending, self.graph, self._system)
+            deployed.open(self._node)
+            self._processes = tuple(deployed.components.values())
+        else:
+            orders = [
+                pipe.WorkerOrder(self._system, one.name, settings.graph, settings.seed) for one in self._apart
+            ]
+            self._processes = [
+                WorkerProcess(self._kernel, self._ending, order, self._truth) for order in orders
+            ]
         self._ending.vehicles = self._processes
         end = time.monotonic() + JOIN_WITHIN_S
         while late := [one for one in self._processes if not one.ready]:
@@ -217,6 +228,8 @@ class DistributedRun:
                 names = choices([one.name for one in late])
                 raise LinkSilent(f"not on the graph within {JOIN_WITHIN_S:g} s: {names}")
             time.sleep(POLL_S)
+            if settings.deployed:  # their messages are callbacks
+                self._kernel.run(0)
 
     def go(self) -> None:
         """Let the nodes of this process join the graph while time stands still, then start the processes.

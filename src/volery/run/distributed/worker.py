@@ -18,12 +18,12 @@ from types import ModuleType
 from volery.base.errors import VoleryError
 from volery.base.position import Position
 from volery.components.loader import Loader
-from volery.kernel.wall import FollowingKernel
+from volery.kernel.wall import FollowingKernel, WallKernel
 from volery.requirements.record import Status
 from volery.run.assembly.component_builder import Builder, BuiltComponents, ProcessPart
 from volery.run.assembly.ros_graphs import open_graph
 from volery.run.distributed import pipe, plan
-from volery.run.distributed.pipe import Pipe
+from volery.run.distributed.pipe import Pipe, RunSide
 from volery.run.distributed.remote_ports import PortClients, PortServer, ValueCodec
 from volery.run.ending import FOREVER, Ending
 from volery.trace.events import Activation, Charge, Event
@@ -38,7 +38,7 @@ ORPHAN_S = 10.0
 class _ReportedEnding(Ending):
     """Ending that is reported to the run as soon as it begins."""
 
-    def __init__(self, kernel: FollowingKernel, run: Pipe) -> None:
+    def __init__(self, kernel: WallKernel, run: RunSide) -> None:
         super().__init__(kernel)
         self._run = run
 
@@ -50,17 +50,18 @@ class _ReportedEnding(Ending):
 
 
 class Worker:
-    """One component on a real graph."""
+    """One component on a real graph, in the time of ``/clock`` or in real time."""
 
-    def __init__(self, order: pipe.WorkerOrder, run: Pipe) -> None:
+    def __init__(self, order: pipe.WorkerOrder, run: RunSide, *, real_time: bool = False) -> None:
         self._order, self._run = order, run
         self._system = order.system
         self._model = order.system.instance(order.name)
-        self._kernel = FollowingKernel(self._record)
+        self._real_time = real_time
+        self._kernel = WallKernel(self._record) if real_time else FollowingKernel(self._record)
         self._ending = _ReportedEnding(self._kernel, run)
         self._answers: SimpleQueue[Position] = SimpleQueue()
         self._loader: Loader | None = None
-        self.graph = open_graph(self._kernel, order.graph, epoch=0)
+        self.graph = open_graph(self._kernel, order.graph, epoch=None if real_time else 0)
 
     def _record(self, event: Event) -> None:
         if not isinstance(event, UNREPORTED):
@@ -70,10 +71,11 @@ class Worker:
         """Join the graph and load the component, ready to be called."""
         model, kernel = self._model, self._kernel
         node = self.graph.node(plan.node_label(model), model.namespace, remaps=model.remap)
-        self.graph.follow_clock(node)
+        if isinstance(kernel, FollowingKernel):
+            self.graph.follow_clock(node)
         values = ValueCodec(self._beside)
         reach = PortClients(kernel, self._system, node, values)
-        part = ProcessPart(self.graph, (model,), reach, {model.name: node}, self._truth)
+        part = ProcessPart(self.graph, (model,), reach, {model.name: node}, self._truth_source())
         platform = plan.HostPlatform(self._system, kernel, self._order.seed, "times")
         builder = Builder(self._system, kernel, platform, None, self._ending, part=part)
         built = builder.build("times", self._order.seed)
@@ -89,9 +91,15 @@ class Worker:
         """Run the component to its end."""
         threading.Thread(target=self._listen, name="run", daemon=True).start()
         built.start()
+        self._pass_time()
+
+    def _pass_time(self) -> None:
         self._kernel.call_at(FOREVER, lambda: None)  # keeps a passive component running until Stop
         self._ending.pass_time()
         self.graph.close()
+
+    def _truth_source(self) -> Callable[[str], Callable[[], Position]] | None:
+        return self._truth
 
     def _truth(self, vehicle: str) -> Callable[[], Position]:
         def position() -> Position:
