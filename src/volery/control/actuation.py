@@ -55,9 +55,6 @@ class Actuation(Protocol):
     def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
         """Send one command."""
 
-    def touch_down(self) -> None:
-        """Stop the motors on the ground."""
-
 
 class VelocitySetpoints:
     """Velocity set-points in the mode in which the autopilot follows a computer.
@@ -81,10 +78,6 @@ class VelocitySetpoints:
     def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
         """Send a velocity and a turn rate."""
         self._drone.set_velocity(*command, lasting=self._lasting)
-
-    def touch_down(self) -> None:
-        """Disarm."""
-        self._drone.disarm()
 
 
 @dataclass(frozen=True)
@@ -221,11 +214,6 @@ class RcOverride:
         angles = (degrees(atan(acceleration / GRAVITY)) for acceleration in (ahead, right))
         forward, sideways = (min(most, max(-most, angle)) for angle in angles)
         return forward, sideways
-
-    def touch_down(self) -> None:
-        """Close the throttle and disarm."""
-        self._drone.manual_control(0.0, 0.0, 0.0, 0.0)
-        self._drone.disarm()
 
 
 def thesis_scale(trim: float = 1480.0) -> RcScale:

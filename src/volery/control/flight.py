@@ -70,6 +70,7 @@ class ControlledFlight:
         self._frame: LocalFrame | None = None
         self._engaged = False
         self._watching = False
+        self._watched_from = Authority.MANUAL
 
     @property
     def authority(self) -> Authority:
@@ -151,6 +152,7 @@ class ControlledFlight:
             yield
             return
         self._watching = True
+        self._watched_from = self.authority
         name = f"switch of {self._drone.name}"
         task = self._drone.kernel.spawn(self._watch, name, ExecutionContext(name))
         try:
@@ -167,9 +169,12 @@ class ControlledFlight:
             if authority is Authority.MANUAL:
                 self._release()
                 return
-            if authority is Authority.LANDING:
-                with suppress(VoleryError):  # the loop lands it, whatever came of this
-                    self._drone.hold()
+            if authority is Authority.LANDING and self._watched_from is Authority.AUTONOMOUS:
+                with suppress(VoleryError):  # the flight lands, whatever came of this
+                    if self._drone.flying:
+                        self._drone.hold()
+                    else:
+                        self._drone.land()
                 return
             sleep(self._drone.kernel, WATCH_PERIOD)
 
@@ -259,7 +264,10 @@ class ControlledFlight:
     # -- the landing
 
     def _land(self) -> None:
-        """Descend under the landing law and disarm; without telemetry or measurement the autopilot lands."""
+        """Descend under the landing law to the ground, where the autopilot detects it and disarms.
+
+        The autopilot lands all the way where the law cannot: without telemetry, a height or control.
+        """
         kernel = self._drone.kernel
         landing, still_s = self._landing, 0.0
         landing.reset()
@@ -285,13 +293,14 @@ class ControlledFlight:
                 still = abs(measured.velocity_up) < STILL_SPEED and measured.up < 1.0
                 still_s = still_s + sample_s if still else 0.0
                 if self._drone.landed or still_s >= STILL_FOR_S:
-                    self._actuation.touch_down()
-                    return
+                    break
         except VehicleError as error:
             if isinstance(error, Overridden):
                 raise
             self._note(f"the autopilot lands: {error}")
         self._blocking(self._drone.land)
+        if self.authority is Authority.MANUAL:
+            self._fly_on_by_pilot()
 
     def _fly_on_by_pilot(self) -> None:
         """Wait until the pilot has landed, or gives control back."""

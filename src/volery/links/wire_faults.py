@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import isfinite
 from random import Random
 
 from volery.base.errors import UsageError, choices, did_you_mean
-from volery.base.time import MS, Ns, from_seconds
+from volery.base.time import MS, Ns, S, from_seconds
 from volery.kernel.api import Kernel
 from volery.links.coded_link import CodedLink
 from volery.links.link import Codec
@@ -22,6 +23,11 @@ BURST_LENGTH = 40
 
 REORDER_DELAY: Ns = 60 * MS
 """Delay of a reordered frame: longer than the period of a fast stream, so that later frames overtake it."""
+
+BUFFER = 2048
+"""Bytes that a radio keeps for sending; a Holybro or RFD radio has some 2 KiB."""
+BITS_PER_BYTE = 10
+"""Start bit, eight bits of data, stop bit."""
 
 PROBABILITIES = ("burst", "drop", "duplicate", "flip", "reorder", "truncate")
 
@@ -38,6 +44,8 @@ class WireFaults:
         duplicate: Probability that a frame arrives twice.
         reorder: Probability that a frame is delayed by ``REORDER_DELAY``, so that later ones overtake it.
         jitter: Largest additional delay in ns; the order of frames is kept.
+        baud: Bits per second that a radio or serial line carries, ten for each byte; 0 for no limit. A frame
+            that finds ``BUFFER`` bytes waiting is lost.
         cuts: Intervals (from, to) in ns in which nothing passes in either direction.
     """
 
@@ -48,6 +56,7 @@ class WireFaults:
     duplicate: float = 0.0
     reorder: float = 0.0
     jitter: Ns = 0
+    baud: float = 0.0
     cuts: tuple[tuple[Ns, Ns], ...] = ()
 
     def __post_init__(self) -> None:
@@ -55,13 +64,15 @@ class WireFaults:
             value = getattr(self, name)
             if not 0.0 <= value <= 1.0:
                 raise UsageError(f"wire faults: {name}={value} is no probability; 0 to 1")
+        if not (isfinite(self.baud) and self.baud >= 0.0):
+            raise UsageError(f"wire faults: baud={self.baud} is no rate in bits per second")
 
     def cut_at(self, now: Ns) -> bool:
         """Return whether the connection is cut at time *now*."""
         return any(start <= now < end for start, end in self.cuts)
 
 
-FAULT_OPTIONS = (*PROBABILITIES, "cut", "jitter")
+FAULT_OPTIONS = (*PROBABILITIES, "baud", "cut", "jitter")
 
 
 def parse_wire_faults(options: Mapping[str, str]) -> WireFaults:
@@ -70,7 +81,8 @@ def parse_wire_faults(options: Mapping[str, str]) -> WireFaults:
     Example: ``drop=0.01&flip=1e-5&burst=0.001&jitter=0.05&cut=20-25,60-70``.
 
     Args:
-        options: Values by name, one of ``FAULT_OPTIONS``. ``jitter`` and ``cut`` (FROM-TO) are in seconds.
+        options: Values by name, one of ``FAULT_OPTIONS``. ``jitter`` and ``cut`` (FROM-TO) are in
+            seconds, ``baud`` in bits per second.
 
     Raises:
         UsageError: An option is unknown or its value is no number, no interval or no probability.
@@ -116,6 +128,7 @@ class FaultyLink(CodedLink):
         self._random = random
         self._noise = 0  # bytes that the burst in progress will still overwrite
         self._last_arrival: Ns = 0
+        self._sent_at: Ns = 0  # when the last byte that waits will have been sent
 
     def set_faults(self, faults: WireFaults) -> None:
         """Apply *faults* from now on, in both directions."""
@@ -132,16 +145,25 @@ class FaultyLink(CodedLink):
             data = self._corrupted(data)
         if faults.truncate and random.random() < faults.truncate:
             data = data[: random.randrange(len(data))]
-        if faults.cut_at(now):
+        if faults.cut_at(now) or (faults.baud and not self._queue(len(data), now)):
             return
         for arrival in self._arrivals():
             self._kernel.call_at(arrival, lambda: self.peer.arrived(data))
+
+    def _queue(self, count: int, now: Ns) -> bool:
+        """Send *count* bytes after those that wait; return False if the buffer is full."""
+        per_byte = BITS_PER_BYTE * S / self._faults.baud
+        if (self._sent_at - now) / per_byte > BUFFER:
+            return False
+        self._sent_at = max(now, self._sent_at) + round(count * per_byte)
+        return True
 
     def _arrivals(self) -> list[Ns]:
         """Return the times at which data that is sent now arrives; there are two if it is duplicated."""
         faults, random = self._faults, self._random
         jitter = int(random.random() * faults.jitter) if faults.jitter else 0
-        self._last_arrival = max(self._last_arrival, self._kernel.now() + self._delay + jitter)
+        sent = max(self._kernel.now(), self._sent_at)
+        self._last_arrival = max(self._last_arrival, sent + self._delay + jitter)
         arrival = self._last_arrival
         if faults.reorder and random.random() < faults.reorder:
             arrival += REORDER_DELAY

@@ -73,7 +73,7 @@ class _Push:
         self._elapsed = 0.0
         self._from: float | None = None
         self._over = False
-        self.take_off, self.engage, self.touch_down = inner.take_off, inner.engage, inner.touch_down
+        self.take_off, self.engage = inner.take_off, inner.engage
 
     def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
         """Apply a command, or the push."""

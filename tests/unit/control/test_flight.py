@@ -1,0 +1,186 @@
+"""Flights under control laws on a simulated ArduCopter: the switch, the landing, losses, both ways to act."""
+
+from __future__ import annotations
+
+from random import Random
+
+import pytest
+
+from rigs.controlled_flights import Watched, fly_watched
+from volery.base.errors import LinkLost, NotArrived, UsageError
+from volery.control.actuation import RC_SCALES, RcAxis
+from volery.control.laws import PidGains
+from volery.control.manoeuvres import Altitude, Rotation, Waypoints, cube, set_gains
+from volery.control.safety_switch import Reaction, SwitchSettings
+
+SWITCH = SwitchSettings()
+BOTH = pytest.mark.parametrize("by", ["setpoints", "rc"])
+REPORT_S, SAMPLE_S, DELAY_S = 0.05, 0.05, 0.01
+SETTLED_S = REPORT_S + SAMPLE_S + DELAY_S
+"""Time after which a moved switch has its effect: one report of RC channels, one sample of the loop."""
+
+
+def rotation() -> Rotation:
+    return Rotation([0.0, 90.0], 6.0)
+
+
+def landed_gently(flown: Watched) -> bool:
+    return not flown.end.armed and flown.end.height < 0.3 and flown.touch_down < 1.0
+
+
+@BOTH
+def test_a_turn_is_flown_and_the_drone_lands(by: str) -> None:
+    flown = fly_watched(rotation, [(0.0, 1500)], by=by, switch=SWITCH)
+    assert flown.error is None
+    assert landed_gently(flown)
+    assert flown.looks[-1].at < 45.0
+    yaw = [one for one in flown.samples if one.loop == "yaw"]
+    assert abs(yaw[-1].error) < 0.5
+    assert yaw[-1].output == pytest.approx(yaw[-1].proportional + yaw[-1].integral + yaw[-1].derivative)
+
+
+@BOTH
+@pytest.mark.parametrize("at", [1.5, 6.0, 14.0])
+def test_an_emergency_landing_in_every_phase(by: str, at: float) -> None:
+    """At the start of the motors, while it climbs, and while it turns."""
+    flown = fly_watched(rotation, [(0.0, 1500), (at, 1900)], by=by, switch=SWITCH)
+    assert landed_gently(flown)
+    assert flown.authority == "emergency landing"
+    assert flown.end.at < at + 20.0
+
+
+@BOTH
+def test_an_emergency_landing_over_a_slow_and_lossy_radio(by: str) -> None:
+    slow = "&wire=bytes&baud=57600&drop=0.02&flip=1e-5"
+    flown = fly_watched(rotation, [(0.0, 1500), (14.0, 1900)], by=by, switch=SWITCH, options=slow)
+    assert landed_gently(flown)
+    assert flown.authority == "emergency landing"
+
+
+def overrides_after_release(flown: Watched) -> list[float]:
+    """Return the times at which a channel was overridden although the switch had been low long enough."""
+    wrong, low_since = [], None
+    for one in flown.looks:
+        low_since = (
+            None if one.switch >= SWITCH.manual_below else low_since if low_since is not None else one.at
+        )
+        if low_since is not None and one.at - low_since > SETTLED_S and one.overridden:
+            wrong.append(one.at)
+    return wrong
+
+
+@BOTH
+@pytest.mark.parametrize("seed", range(4))
+def test_never_two_masters_over_random_switch_sequences(by: str, seed: int) -> None:
+    """While the switch is low no channel is overridden, and the autopilot follows no computer."""
+    random = Random(seed)
+    moves, at = [(0.0, 1500)], 2.0
+    while at < 25.0:
+        at += random.uniform(0.1, 4.0)
+        moves.append((at, random.choice([1000, 1000, 1150, 1250, 1500, 1600, 1750, 1900])))
+    flown = fly_watched(rotation, moves, by=by, switch=SWITCH, limit_s=40.0)
+    assert overrides_after_release(flown) == []
+    manual_for = 0.0
+    for before, now in zip(flown.looks, flown.looks[1:], strict=False):
+        manual_for = manual_for + now.at - before.at if now.switch < SWITCH.manual_below else 0.0
+        # a change of mode is a command with an answer
+        assert not (manual_for > SETTLED_S + 0.1 and now.armed and now.mode == "GUIDED"), now
+
+
+@BOTH
+def test_control_that_was_given_back_continues_the_flight(by: str) -> None:
+    moves = [(0.0, 1500), (13.0, 1000), (14.0, 1500)]
+    flown = fly_watched(lambda: Rotation([0.0, 90.0], 8.0), moves, by=by, switch=SWITCH)
+    assert flown.error is None
+    assert landed_gently(flown)
+    assert abs([one for one in flown.samples if one.loop == "yaw"][-1].error) < 1.0
+
+
+@pytest.mark.parametrize("pulse", [1000, 1900, 0])
+def test_without_the_middle_position_nothing_starts(pulse: int) -> None:
+    flown = fly_watched(rotation, [(0.0, pulse)], switch=SWITCH)
+    assert isinstance(flown.error, NotArrived)
+    assert "channel 6" in str(flown.error)
+    assert not any(one.armed for one in flown.looks)
+
+
+@pytest.mark.parametrize(
+    ("reaction", "authority"), [(Reaction.LAND, "emergency landing"), (Reaction.RELEASE, "manual")]
+)
+def test_a_lost_transmitter_has_its_reaction(reaction: Reaction, authority: str) -> None:
+    switch = SwitchSettings(on_rc_loss=reaction)
+    flown = fly_watched(rotation, [(0.0, 1500), (13.0, 0)], by="rc", switch=switch, limit_s=40.0)
+    assert flown.authority == authority
+    assert not flown.end.overridden
+
+
+def test_with_the_link_lost_the_autopilot_lands_by_its_failsafe() -> None:
+    cut = "&wire=bytes&cut=13-100&parameters=FS_GCS_ENABLE:5"
+    flown = fly_watched(rotation, [(0.0, 1500)], switch=SWITCH, options=cut, after_s=30.0)
+    assert isinstance(flown.error, LinkLost)
+    assert landed_gently(flown)
+
+
+def test_lost_telemetry_that_returns_ends_in_a_landing() -> None:
+    flown = fly_watched(rotation, [(0.0, 1500)], switch=SWITCH, options="&wire=bytes&cut=13-16.5")
+    assert flown.authority == "emergency landing"
+    assert landed_gently(flown)
+
+
+@BOTH
+def test_the_corners_of_a_cube(by: str) -> None:
+    points = cube(3.0, 4.0)
+    made: list[Waypoints] = []
+
+    def make() -> Waypoints:
+        made.append(Waypoints(points, tolerance=0.05, hold_s=0.5))
+        return made[0]
+
+    flown = fly_watched(make, by=by, limit_s=200.0)
+    assert flown.error is None
+    assert len(made[0].corners) == len(points)
+    assert max(one.error for one in made[0].corners) <= 0.05
+
+
+def test_heights() -> None:
+    flown = fly_watched(lambda: Altitude([7.0], 10.0), by="rc")
+    assert [one for one in flown.samples if one.loop == "altitude"][-1].measurement == pytest.approx(
+        7.0, abs=0.1
+    )
+
+
+# -- channels and bad input
+
+
+def test_a_channel_jumps_over_its_dead_band() -> None:
+    axis = RC_SCALES["ArduPilot"].turn
+    assert axis.pulse(0.0) == 1500.0
+    assert axis.pulse(0.1) > 1520.0
+    assert axis.pulse(-0.1) < 1480.0
+    assert (axis.pulse(1000.0), axis.pulse(-1000.0)) == (2000.0, 1000.0)
+    assert axis.position(202.5) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"per_unit": 0.0}, {"per_unit": 1.0, "trim": 2500.0}, {"per_unit": 1.0, "dead": -1.0}]
+)
+def test_a_wrong_channel_is_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(UsageError, match="RC channel"):
+        RcAxis(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Rotation([]), "at least one heading"),
+        (lambda: Rotation([float("nan")]), "at least one heading"),
+        (lambda: Rotation([0.0], 0.0), "time above 0"),
+        (lambda: Altitude([-1.0]), "above 0 m"),
+        (lambda: Waypoints([]), "at least one"),
+        (lambda: Waypoints([(0.0, 0.0, 5.0)], tolerance=0.0), "tolerance"),
+        (lambda: set_gains(Rotation([0.0]), "roll", PidGains()), "there is yaw"),
+    ],
+)
+def test_wrong_manoeuvres_are_refused(make, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        make()

@@ -1,0 +1,125 @@
+"""``go``: addresses, files of gains, and the thesis's comparison."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.control.laws import PidGains
+from volery.control.log_signals import read_signals
+from volery.control.manoeuvres import Rotation
+from volery.control.safety_switch import SwitchSettings
+from volery.run.go import GoSettings, go, read_gains, with_rates
+from volery.run.result import Options
+from volery.run.thesis_comparison import fly_thesis_comparison
+from volery.trace.events import Text
+from volery.trace.reader import read
+
+LOOPS = {"yaw": PidGains(kp=1.0, ki=0.5)}
+
+
+def test_the_telemetry_of_a_loop_is_requested_unless_stated() -> None:
+    assert with_rates("sim:ardupilot", None) == "sim:ardupilot?rate=20&attitude=25"
+    assert with_rates("ardupilot+udp://:14550?attitude=50", SwitchSettings()) == (
+        "ardupilot+udp://:14550?attitude=50&rate=20&rc=20"
+    )
+    assert with_rates("sim:ardupilot", SwitchSettings(channel=7)).endswith("transmitter=7:1450")
+    assert with_rates("sim:dji", None) == "sim:dji"
+
+
+def test_gains_are_read_and_others_kept(tmp_path: Path) -> None:
+    file = tmp_path / "gains.toml"
+    file.write_text("[yaw]\nkp = 2.5\n")
+    assert read_gains(file, LOOPS) == {"yaw": PidGains(kp=2.5, ki=0.5)}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[yaw]\nkp = nan\n", "kp is not a number"),
+        ("[yaw]\nkp = -1\n", "kp=-1"),
+        ("[yaw]\nkq = 1\n", "kq = 1 is no gain"),
+        ("[jaw]\nkp = 1\n", "no loop 'jaw'"),
+        ("yaw = 3\n", r"write a table"),
+        ("[yaw\n", "no TOML"),
+    ],
+)
+def test_wrong_gains_are_named(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "gains.toml"
+    file.write_text(text)
+    with pytest.raises(UsageError, match=said) as error:
+        read_gains(file, LOOPS)
+    assert "gains.toml" in str(error.value)
+
+
+def test_a_missing_file_of_gains_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"nowhere\.toml"):
+        read_gains(tmp_path / "nowhere.toml", LOOPS)
+
+
+def test_gains_that_change_in_flight_are_used_and_wrong_ones_are_not(tmp_path: Path) -> None:
+    file = tmp_path / "gains.toml"
+    file.write_text("[yaw]\nkp = 3.0\n")
+    turns = Rotation([0.0], 6.0)
+    seen = []
+
+    def edit(seconds: float) -> None:
+        law = turns.laws["yaw"]
+        seen.append(law.gains.kp)  # type: ignore[attr-defined]  # it is a PID law
+        if len(seen) == 40:
+            file.write_text("[yaw]\nkp = 2.0\n")
+        if len(seen) == 80:
+            file.write_text("[yaw]\nkp = -2.0\n")
+
+    step = turns.step
+
+    def watched(measured, sample_s):
+        edit(sample_s)
+        return step(measured, sample_s)
+
+    turns.step = watched  # type: ignore[method-assign]
+    run = go(lambda: turns, "sim:ardupilot?start=warm", GoSettings(gains=file), Options(out=tmp_path / "run"))
+    assert run.error is None
+    assert set(seen) == {3.0, 2.0}
+    assert seen[-1] == 2.0
+    texts = [event.text for event in read(tmp_path / "run" / "trace.mcap").events if isinstance(event, Text)]
+    assert any("are in use" in text for text in texts)
+    assert any("remain as they were" in text and "kp=-2" in text for text in texts)
+
+
+def test_a_flight_records_its_loops(tmp_path: Path) -> None:
+    run = go(
+        lambda: Rotation([45.0], 5.0),
+        "sim:px4?start=warm",
+        GoSettings(by="rc"),
+        Options(out=tmp_path / "run"),
+    )
+    assert run.error is None
+    (yaw,) = (one for one in read_signals(tmp_path / "run") if one.name == "yaw")
+    assert abs(yaw.measured[-1] - 45.0) < 2.0
+
+
+def test_wrong_settings_are_refused() -> None:
+    with pytest.raises(UsageError, match="by 'stick'"):
+        GoSettings(by="stick")
+    with pytest.raises(UsageError, match="above 0"):
+        GoSettings(height=0.0)
+
+
+def test_the_figures_of_the_thesis_are_met_and_beaten(tmp_path: Path) -> None:
+    """The laws of the thesis behave as it states, and ours keeps its stated bounds."""
+    flown = {one.law: one.responses for one in fly_thesis_comparison(tmp_path, ("p", "pid-thesis", "pid"))}
+    offset = [one.steady_error for one in flown["p"]]
+    assert offset[:3] == pytest.approx(
+        [20.0] * 3, abs=1.0
+    )  # (20 us dead band + 20 us trim) / 2 us per degree
+    assert abs(offset[3]) < 1.0
+    assert flown["pid-thesis"][3].overshoot == pytest.approx(57.0, abs=10.0)  # the thesis: about 50
+    for one in flown["pid"]:
+        assert one.overshoot_share <= 0.05
+        assert one.steady_share < 0.005
+    assert all(one.settled_10 <= 1.5 for one in flown["pid"][:3])
+    assert flown["pid"][3].pushed == pytest.approx(50.0, abs=5.0)
+    assert flown["pid"][3].recovery < 2.0
