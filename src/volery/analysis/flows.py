@@ -325,7 +325,7 @@ class FlowReader:
             component = instance.component
 
             def costs(figures: Sequence[Figure]) -> list[StatedCost]:
-                return [StatedCost(one.processor, one.frequency_hz, one.time_ns) for one in figures]
+                return [StatedCost(one.processor, one.frequency_hz, one.longest_ns) for one in figures]
 
             known = self._stated[instance.name] = self.prices[instance.processor or ""].stated(
                 instance.name,

@@ -11,7 +11,7 @@ from volery.base.files import read_bytes, write_text
 from volery.exchange.aadl import aadl_text
 from volery.exchange.sysml import sysml_text
 from volery.exchange.uml.context import Note
-from volery.exchange.uml.document import Imported, export_uml, import_uml
+from volery.exchange.uml.uml_model import Imported, export_uml, import_uml
 from volery.exchange.uml.xmi import MOST_BYTES
 from volery.model.assembly import DEFAULT_FILE, read_tree
 from volery.model.writing import model_text

@@ -114,13 +114,38 @@ def test_a_check_can_be_asked_for_as_json(tmp_path):
         "model",
         "check",
         str(example("starter")),
-        "--json",
+        "--format",
+        "json",
         "--set",
         "platform.processors.onboard.frequency=1 GHz",
     )
     found = json.loads(result.stdout)
     assert found["allocations"] == ["fast", "slow"]
     assert found["missing"] == {"times": [], "code": []}
+    assert found["findings"] == []
+
+
+def test_a_check_gives_sarif_that_names_rule_file_and_line(tmp_path):
+    folder = tmp_path / "model"
+    assert run("new", str(folder)).exit_code == OK
+    file = folder / "model.yaml"
+    file.write_text(file.read_text().replace("carried_by: drone_1", "carried_by: drone_7"))
+    result = run("model", "check", str(folder), "--format", "sarif")
+    assert result.exit_code == BAD_INPUT
+    log = json.loads(result.stdout)
+    assert log["version"] == "2.1.0"
+    (one, *_) = log["runs"][0]["results"]
+    assert one["ruleId"] == "V201"
+    place = one["locations"][0]["physicalLocation"]
+    line = next(n for n, line in enumerate(file.read_text().splitlines(), 1) if "drone_7" in line)
+    assert place == {"artifactLocation": {"uri": file.as_posix()}, "region": {"startLine": line}}
+    assert [rule["id"] for rule in log["runs"][0]["tool"]["driver"]["rules"]] == ["V201"]
+
+
+def test_an_unknown_format_of_a_check_is_named():
+    result = run("model", "check", str(example("starter")), "--format", "xml")
+    assert result.exit_code == BAD_INPUT
+    assert "--format xml: give json, sarif or text" in text(result)
 
 
 def test_an_option_that_is_wrong_is_named():

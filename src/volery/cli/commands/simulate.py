@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 from rich.text import Text
 
-from volery.base.errors import UsageError, choices
+from volery.base.errors import UsageError
 from volery.base.installed import require_extra
 from volery.cli.command import OK, Commands
 from volery.cli.console import Output, make_table, number_column
@@ -32,71 +31,7 @@ from volery.cli.options import (
     parse_speed,
 )
 
-if TYPE_CHECKING:
-    from volery.model.system import System
-
 model_commands = Commands("Simulate", group="model", summary="Check and draw a model without running it.")
-
-FIDELITIES = ("times", "code")
-
-
-@model_commands.add("quiet", "json", "debug")
-def check(output: Output, model: Model, overrides: Overrides = None) -> int:
-    """Check a model with each of its allocations and scenarios, and load its Python components."""
-    from volery.model.system_loader import check as check_model
-    from volery.model.system_loader import gaps
-    from volery.run.assembly.model_checks import check_components, vocabulary
-
-    words = vocabulary()
-    system = check_model(model, words, overrides or ())
-    check_components(system, words.languages)
-    missing = {fidelity: [str(gap) for gap in gaps(system, fidelity, words)] for fidelity in FIDELITIES}
-    warnings = [Text(f"⚠ {warning}", style="yellow") for warning in system.warnings]
-    output.show(_summary(system), _instances(system), *_readiness(missing), *warnings)
-    output.give(
-        {
-            "name": system.name,
-            "allocations": list(system.allocations),
-            "scenarios": list(system.scenarios),
-            "instances": {one.name: one.component.name for one in system.instances},
-            "requirements": [one.name for one in system.requirements],
-            "missing": missing,
-            "warnings": [str(one) for one in system.warnings],
-        }
-    )
-    return OK
-
-
-def _summary(system: System) -> Text:
-    line = Text(system.name, style="bold")
-    line.append("  is a valid model", style="green")
-    allocations = choices(system.allocations).replace(" or ", " and ")
-    scenarios = choices(system.scenarios).replace(" or ", " and ")
-    line.append(f"  allocations: {allocations}  scenarios: {scenarios}", style="dim")
-    return line
-
-
-def _instances(system: System) -> Table:
-    place = f"runs on ({system.allocation or 'nowhere'})"
-    listed = make_table("instance", "component", "language", place, "connected to")
-    for one in system.instances:
-        targets = [str(target) for connection in one.connections.values() for target in connection.targets]
-        where = one.processor or "environment"
-        listed.add_row(one.name, one.component.name, one.component.language, where, ", ".join(targets))
-    for vehicle in system.vehicles:
-        node = f"node on {vehicle.processor}" if vehicle.processor else "no node on a computer"
-        listed.add_row(vehicle.name, vehicle.kind, vehicle.autopilot, node, vehicle.at.name)
-    return listed
-
-
-def _readiness(missing: dict[str, list[str]]) -> Iterable[Text]:
-    for fidelity, found in missing.items():
-        if not found:
-            yield Text(f"✓ ready for fidelity {fidelity}", style="green")
-            continue
-        yield Text(f"· not ready for fidelity {fidelity}:", style="yellow")
-        for gap in found:
-            yield Text(f"    {gap}", style="dim")
 
 
 @model_commands.add("debug")

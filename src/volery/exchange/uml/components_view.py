@@ -14,13 +14,14 @@ from typing import Any
 from volery.base.errors import ModelError
 from volery.exchange.uml.context import Export, Import
 from volery.exchange.uml.interfaces_view import is_many, set_many
-from volery.exchange.uml.notations import SOURCES, properties, property_text, tagged, tagged_text
-from volery.exchange.uml.xmi import Element, local, tag, tags, uml_type, xmi_id
+from volery.exchange.uml.notations import properties, property_text, tagged
+from volery.exchange.uml.times_view import ACTIVE, Times, below, write_activity, write_times
+from volery.exchange.uml.xmi import Element, local, tag, uml_type, xmi_id
 from volery.model.components import LANGUAGES
 from volery.model.text import parse as parse_yaml
 from volery.model.writing import flow_text
 
-ACTIVE, PASSIVE = "RtUnit", "PpUnit"
+PASSIVE = "PpUnit"
 QUEUE_POLICIES = {
     "discard": "discard",
     "removeFirst": "remove-first",
@@ -31,17 +32,7 @@ QUEUE_POLICIES = {
 
 _LANGUAGES = {"cpp": "c++", "cxx": "c++", "c++11": "c++", "c++17": "c++", "py": "python", "python3": "python"}
 _S3D_LANGUAGES = {"c++": "C++", "c": "C", "python": "Python"}
-_TIMES = {"best": "BOET", "time": "MOET", "worst": "WOET"}
-_PROVENANCES = {ours: theirs for theirs, ours in SOURCES.items()}
 _MANY = "[]"
-_UNREAD_TAGS = (
-    "isDynamic",
-    "srPoolSize",
-    "srPoolPolicy",
-    "srPoolWaitingTime",
-    "operationalMode",
-    "msgMaxSize",
-)
 
 
 # -- import
@@ -106,9 +97,9 @@ def generals(imp: Import, component: Element) -> list[Element]:
     """Return a component and what it inherits from, itself first."""
     found = [component]
     for each in found:
-        for below in each:
-            if local(below) == "generalization":
-                general = imp.file.reference(below, "general")
+        for one in each:
+            if local(one) == "generalization":
+                general = imp.file.reference(one, "general")
                 if general is not None and general not in found:
                     found.append(general)
     return found
@@ -132,22 +123,14 @@ class _Component:
         parameters = self._parameters()
         if parameters:
             made["parameters"] = parameters
-        activity = self._activity()
+        times = Times(self.imp, self.key, self.family, self.rest.pop("active", None))
+        activity = times.activity()
         if activity is not None:
             made["active"] = activity
         if "at" in self.rest:
             made["at"] = self.rest.pop("at")
-        made |= self._times(made)
-        self.rest.pop("active", None)
+        made |= times.read(made.get("provides", {}))
         return {**made, **self.rest}
-
-    def _below(self, feature: str) -> Iterator[Element]:
-        seen = set()
-        for one in self.family:
-            for each in one:
-                if local(each) == feature and (name := each.get("name")) not in seen:
-                    seen.add(name)
-                    yield each
 
     # files
 
@@ -207,8 +190,8 @@ class _Component:
     def _folders(self) -> list[Element]:
         """Return the folders of files that are linked to the component, or that stand in its package."""
         linked, packages = [], {each.getparent() for each in self.family}
-        for link in self.imp.file.elements("Abstraction", "Dependency", "Usage"):
-            if set(self.imp.file.references(link, "supplier")) & set(self.family):
+        for each in self.family:
+            for link in self.imp.links_to(each):
                 for client in self.imp.file.references(link, "client"):
                     if self._is_folder(client):
                         linked.append(client)
@@ -230,7 +213,7 @@ class _Component:
         requires: dict[str, str] = {}
         queues: dict[str, Any] = {}
         made: dict[str, dict[str, Any]] = {"publishes": {}, "subscribes": {}}
-        for port in self._below("ownedAttribute"):
+        for port in below(self.family, "ownedAttribute"):
             if uml_type(port) != "Port":
                 continue
             flow = self.imp.file.stereotype(port, "FlowPort")
@@ -299,7 +282,7 @@ class _Component:
 
     def _parameters(self) -> dict[str, Any]:
         found = {}
-        for each in self._below("ownedAttribute"):
+        for each in below(self.family, "ownedAttribute"):
             if uml_type(each) != "Property":
                 continue
             name = str(each.get("name", ""))
@@ -316,114 +299,6 @@ class _Component:
             except ModelError:
                 found[name] = text
         return found
-
-    def _specification(self, operation: Element) -> Element | None:
-        for comment in self.imp.file.elements("Comment"):
-            application = self.imp.file.stereotype(comment, "RtSpecification")
-            if application is not None and operation in self.imp.file.references(comment, "annotatedElement"):
-                return application
-        return None
-
-    def _main(self) -> Element | None:
-        for each in self.family:
-            main = (
-                self.imp.file.reference(found, "main")
-                if (found := self.imp.file.stereotype(each, ACTIVE)) is not None
-                else None
-            )
-            if main is not None:
-                return main
-        operations = list(self._below("ownedOperation"))
-        named = [each for each in operations if str(each.get("name", "")).startswith("main")]
-        return next(iter(named), None)
-
-    def _activity(self) -> Any:
-        applied = [self.imp.file.stereotype(each, ACTIVE) for each in self.family]
-        unit = next((each for each in applied if each is not None), None)
-        if unit is None:
-            return None
-        stays = [name for name in _UNREAD_TAGS if tag(unit, name)]
-        if stays:
-            self.imp.note(self.element, f"«RtUnit» {', '.join(stays)}: a model has no such key")
-        made: dict[str, Any] = {}
-        main = self._main()
-        specification = self._specification(main) if main is not None else None
-        if specification is not None:
-            self.imp.finish(f"{self.key}/specification", self.imp.file.bases[specification])
-            occurs = tagged(tag(specification, "occKind"))
-            stated = {
-                "period": occurs.quantity("period", "minarrival", "mininterarrivaltime"),
-                "deadline": tagged(tag(specification, "relDl", "boundDl")).quantity("deadline", "value")
-                or tagged(f"deadline = {tag(specification, 'relDl')}").quantity("deadline"),
-                "jitter": occurs.quantity("jitter"),
-            }
-            made |= {key: value for key, value in stated.items() if value}
-            priority = tag(specification, "priority")
-            if priority.lstrip("-").isdigit():
-                made["priority"] = int(priority)
-        stated_rest = self.rest.get("active")
-        made |= stated_rest if isinstance(stated_rest, dict) else {}
-        return made or True
-
-    def _times(self, made: Mapping[str, Any]) -> dict[str, Any]:
-        offered = {
-            operation
-            for interface in made.get("provides", {}).values()
-            for operation in self.imp.tree.get("interfaces", {}).get(interface) or ()
-        }
-        main, found = self._main(), {}
-        operations: dict[str, Any] = {}
-        for operation in self._below("ownedOperation"):
-            name = str(operation.get("name", ""))
-            key = "main" if operation is main else name
-            self.imp.finish(f"{self.key}/operation:{key}", operation)
-            figures = self._figures(operation)
-            if not figures:
-                continue
-            stated = figures[0] if len(figures) == 1 else figures
-            if operation is main:
-                found["activation"] = stated
-            elif name in offered:
-                operations[name] = stated
-            else:
-                self.imp.note(operation, "it is in no provided interface; its times are left out")
-        return {**found, **({"operations": operations} if operations else {})}
-
-    def _figures(self, operation: Element) -> list[dict[str, Any]]:
-        usage = self.imp.file.stereotype(operation, "ResourceUsage", "GaStep", "SaStep", "PaStep")
-        texts = tags(usage, "execTime", "hostDemand")
-        rest = self.imp.annotation(operation).get("figures", [])
-        energies = tags(usage, "energy")
-        figures = [self._figure(operation, text) for text in texts]
-        if not texts:
-            specification = self._specification(operation)
-            text = tag(specification, "rdTime")
-            figures = [self._figure(operation, text)] if text else []
-        for position, made in enumerate(figures):
-            energy = self._energy(energies[position]) if position < len(energies) and made else None
-            made.update({"energy": energy} if energy else {})
-            if position < len(rest) and isinstance(rest[position], dict):
-                made.update(rest[position])
-        return [one for one in figures if one]
-
-    def _energy(self, text: str) -> str | None:
-        stated = tagged(text)
-        return tagged(f"v = {text}").quantity("v") or stated.quantity("energy", "value", "mean", "moe")
-
-    def _figure(self, operation: Element, text: str) -> dict[str, Any]:
-        stated = tagged(text)
-        best = stated.quantity("boet", "bcet", "best", "min")
-        worst = stated.quantity("woet", "wcet", "worst", "max")
-        mean = stated.quantity("moet", "acet", "mean", "value", "expr") or tagged(f"v = {text}").quantity("v")
-        time = mean or worst or best
-        if time is None:
-            self.imp.note(operation, f"no execution time can be read from {text!r}")
-            return {}
-        made = {"time": time}
-        made |= {"best": best} if best and best != time else {}
-        made |= {"worst": worst} if worst and worst != time else {}
-        provenance = SOURCES.get(stated.source, "")
-        return {**made, **({"provenance": provenance} if provenance else {})}
 
 
 def body_of(comment: Element) -> str:
@@ -467,12 +342,12 @@ def _write_component(
     for parameter, value in (rest.pop("parameters", None) or {}).items():
         _write_parameter(exp, component, f"{key}/parameter:{parameter}", parameter, value)
     _write_ports(exp, component, key, rest)
-    main = _write_times(exp, component, key, name, rest, bool(active))
+    main = write_times(exp, component, key, name, rest, bool(active))
     exp.remove_stereotype(component, PASSIVE if active else ACTIVE)
     if active:
         entry = xmi_id(main) if main is not None else ""
         exp.apply(key, component, "BehavioredClassifier", ACTIVE, **({"main": entry} if entry else {}))
-        kept = _write_activity(exp, component, key, main, active if isinstance(active, dict) else {})
+        kept = write_activity(exp, component, key, main, active if isinstance(active, dict) else {})
         if kept:
             rest["active"] = kept
     else:
@@ -488,13 +363,13 @@ def _write_files(
     folder = exp.element(f"{key}/files/0", package, "packagedElement", "Package", name="FilesFolder")
     exp.apply(f"{key}/files/0", folder, "Package", "FilesFolder")
     for one, file in files.items():
-        below = f"{key}/language/{one}"
+        entry = f"{key}/language/{one}"
         written = _S3D_LANGUAGES.get(one, one)
-        owner = exp.element(below, folder, "packagedElement", "Package", name=written)
-        exp.comment(f"{below}/language", owner, property_text("language", written))
+        owner = exp.element(entry, folder, "packagedElement", "Package", name=written)
+        exp.comment(f"{entry}/language", owner, property_text("language", written))
         if file:
             written = PurePath(os.path.normpath(rebase / str(file))).as_posix()
-            exp.comment(f"{below}/path", owner, property_text("path", written))
+            exp.comment(f"{entry}/path", owner, property_text("path", written))
     link = exp.element(f"{key}/files-link", package, "packagedElement", "Abstraction")
     exp.refer(link, "client", [xmi_id(folder)])
     exp.refer(link, "supplier", [xmi_id(component)])
@@ -531,8 +406,8 @@ def _write_ports(exp: Export, component: Element, key: str, rest: dict[str, Any]
             )
     for section, direction in (("publishes", "out"), ("subscribes", "in")):
         for topic, stated in (rest.pop(section, None) or {}).items():
-            below = f"{key}/{section}:{topic}"
-            port = exp.element(below, component, "ownedAttribute", "Port", name=topic)
+            entry = f"{key}/{section}:{topic}"
+            port = exp.element(entry, component, "ownedAttribute", "Port", name=topic)
             other = dict(stated)
             kind_name = str(other.pop("type", ""))
             if kind_name:
@@ -541,84 +416,5 @@ def _write_ports(exp: Export, component: Element, key: str, rest: dict[str, Any]
                     f"type:{kind_name}", types, "packagedElement", "DataType", name=kind_name
                 )
                 port.set("type", xmi_id(kind_element))
-            exp.apply(below, port, "Port", "FlowPort", direction=direction)
-            exp.annotate(below, port, other)
-
-
-def _write_activity(
-    exp: Export, component: Element, key: str, main: Element | None, active: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Write the real-time specification; return what it has no place for."""
-    rest = dict(active)
-    tags_: dict[str, str] = {}
-    try:
-        if "deadline" in rest:
-            tags_["relDl"] = tagged_text({"Deadline": str(rest.pop("deadline"))})
-        if "period" in rest:
-            tags_["occKind"] = f"Periodic ({tagged_text({'Period': str(rest.pop('period'))})})"
-    except ValueError:  # the text is no quantity; `volery model check` reports it
-        return dict(active)
-    if "priority" in rest:
-        tags_["priority"] = str(rest.pop("priority"))
-    if main is not None and tags_:
-        comment = exp.comment(f"{key}/specification", component, "", xmi_id(main))
-        exp.apply(
-            f"{key}/specification",
-            comment,
-            "Comment",
-            "RtSpecification",
-            **{"relDl": "", "occKind": "", "priority": "", **tags_},
-        )
-    return rest
-
-
-def _write_times(
-    exp: Export, component: Element, key: str, name: str, rest: dict[str, Any], active: bool
-) -> Element | None:
-    """Write the operations with their resource usage; return the main one of an active component."""
-    main = None
-    stated: list[tuple[str, str, Any]] = []
-    if active or "activation" in rest:
-        stated.append(("main", f"main_{name}", rest.pop("activation", None)))
-    stated += [(one, one, figures) for one, figures in (rest.pop("operations", None) or {}).items()]
-    for one, written, figures in stated:
-        below = f"{key}/operation:{one}"
-        known = exp.known.get(below)
-        named = written if known is None else str(known.get("name"))
-        operation = exp.element(below, component, "ownedOperation", "Operation", name=named)
-        main = operation if one == "main" else main
-        listed = figures if isinstance(figures, list) else [figures] if figures else []
-        texts, energies, others = [], [], []
-        for figure in listed:
-            text, energy, other = _figure_text(dict(figure))
-            texts.append(text)
-            energies.append(energy)
-            others.append(other)
-        if texts:
-            shown = [one for one in energies if one] if all(energies) else []
-            others = [
-                {**other, "energy": energy} if energy and not shown else other
-                for other, energy in zip(others, energies, strict=True)
-            ]
-            exp.apply(below, operation, "NamedElement", "ResourceUsage", execTime=texts, energy=shown)
-        else:
-            exp.remove_stereotype(operation, "ResourceUsage")
-        exp.annotate(below, operation, {"figures": others} if any(others) else {})
-    return main
-
-
-def _figure_text(figure: dict[str, Any]) -> tuple[str, str, dict[str, Any]]:
-    """Return the time and the energy of a figure as texts, and what they have no place for."""
-    times = {tag_: str(figure[key]) for key, tag_ in _TIMES.items() if key in figure}
-    energy = str(figure.pop("energy", ""))
-    try:
-        text = tagged_text(times)
-    except ValueError:  # several units, or no number: the mean stays readable, the rest is annotated
-        text = str(figure.get("time", ""))
-        return text, energy, {key: value for key, value in figure.items() if key != "time"}
-    rest = {key: value for key, value in figure.items() if key not in _TIMES}
-    source = _PROVENANCES.get(str(rest.get("provenance", "")))
-    if source:
-        rest.pop("provenance")
-        text += f"; source = {source}"
-    return text, energy, rest
+            exp.apply(entry, port, "Port", "FlowPort", direction=direction)
+            exp.annotate(entry, port, other)

@@ -67,6 +67,8 @@ class Import:
     notes: list[Note] = field(default_factory=list)
     names: dict[Element, str] = field(default_factory=dict)
     _parts: dict[Element, list[Element]] = field(default_factory=dict)
+    _links: dict[Element, list[Element]] | None = None
+    _specifications: dict[Element, Element] | None = None
 
     def note(self, element: Element, what: str) -> None:
         """Record what could not be imported from *element*."""
@@ -109,10 +111,29 @@ class Import:
         if not self._parts:
             self._parts[kind] = []
             for each in self.file.elements("Property"):
-                typed = self.file.reference(each, "type")
+                typed = self.file.reference(each, "type") if local(each) == "ownedAttribute" else None
                 if typed is not None:
                     self._parts.setdefault(typed, []).append(each)
         return self._parts.get(kind, [])
+
+    def links_to(self, supplier: Element) -> list[Element]:
+        """Return the dependencies whose supplier is *supplier*."""
+        if self._links is None:
+            self._links = {}
+            for link in self.file.elements("Abstraction", "Dependency", "Usage"):
+                for each in self.file.references(link, "supplier"):
+                    self._links.setdefault(each, []).append(link)
+        return self._links.get(supplier, [])
+
+    def specification(self, operation: Element) -> Element | None:
+        """Return the application of «RtSpecification» to a comment on *operation*."""
+        if self._specifications is None:
+            self._specifications = {}
+            for comment in self.file.with_stereotype("RtSpecification"):
+                for each in self.file.references(comment, "annotatedElement"):
+                    application = self.file.stereotype(comment, "RtSpecification")
+                    self._specifications.setdefault(each, application)
+        return self._specifications.get(operation)
 
     def finish(self, key: str, element: Element) -> None:
         """Record that *element* stands for *key* and was understood."""
@@ -278,7 +299,8 @@ class Export:
                 for below in element.iter(etree.Element):
                     self.file.unregister(below)
                 element.getparent().remove(element)
-        for element in [each for each in self.made.values() if each not in self.known.values()]:
+        before = set(self.known.values())
+        for element in [each for each in self.made.values() if each not in before]:
             self._remove_if_empty(element)
 
     def _remove_if_empty(self, package: Element) -> None:

@@ -173,15 +173,19 @@ def write_instances(exp: Export, model: Element, tree: Mapping[str, Any]) -> Non
     environment = dict(tree.get("environment") or {})
     around = dict(environment.pop("components", None) or {})
     for name, stated in (tree.get("application") or {}).items():
-        _write_instance(exp, system, name, stated)
+        _write_instance(exp, system, tree, name, stated)
     if environment or around:
-        _write_world(exp, model, system, environment, around)
+        _write_world(exp, model, tree, environment, around)
     for name, stated in {**(tree.get("application") or {}), **around}.items():
         _write_connectors(exp, "world" if name in around else "system", tree, name, stated)
 
 
 def _write_world(
-    exp: Export, model: Element, system: Element, environment: dict[str, Any], around: Mapping[str, Any]
+    exp: Export,
+    model: Element,
+    tree: Mapping[str, Any],
+    environment: dict[str, Any],
+    around: Mapping[str, Any],
 ) -> None:
     """Write the test context: the system under test, vehicles, and what surrounds them."""
     verification = exp.view("view:verification", model, "Verification", "VerificationView")
@@ -189,9 +193,9 @@ def _write_world(
     world = exp.element("world", verification, "packagedElement", "Component", name="World")
     exp.apply("world", world, "StructuredClassifier", "TestContext")
     under_test = exp.element("world/system", world, "ownedAttribute", "Property", name="system_under_test")
-    under_test.set("type", xmi_id(system))
+    under_test.set("type", xmi_id(exp.made["system"]))
     for name, stated in around.items():
-        _write_instance(exp, world, name, stated)
+        _write_instance(exp, world, tree, name, stated)
     for name, stated in (environment.pop("vehicles", None) or {}).items():
         rest = dict(stated)
         kind = str(rest.pop("kind", "vehicle"))
@@ -212,11 +216,13 @@ def _stand_in(exp: Export, package: Element, name: str, what: str) -> Element:
     return made
 
 
-def _write_instance(exp: Export, owner: Element, name: str, stated: Mapping[str, Any]) -> None:
+def _write_instance(
+    exp: Export, owner: Element, tree: Mapping[str, Any], name: str, stated: Mapping[str, Any]
+) -> None:
     key = f"instance:{name}"
     made = exp.element(key, owner, "ownedAttribute", "Property", name=name)
     component = exp.made.get(f"component:{stated.get('is')}")
-    ports = _required_ports(exp, str(stated.get("is")))
+    ports = _required_ports(exp, tree, str(stated.get("is")))
     rest = {one: value for one, value in stated.items() if one != "is" and one not in ports}
     if component is not None:
         known = exp.file.reference(made, "type")
@@ -231,22 +237,17 @@ def _family(exp: Export, component: Element) -> list[Element]:
     return generals(Import(exp.file), component)
 
 
-def _required_ports(exp: Export, component: str) -> dict[str, Element]:
-    head = f"component:{component}/port:"
-    return {
-        key.removeprefix(head): element
-        for key, element in exp.made.items()
-        if key.startswith(head)
-        and (one := exp.file.stereotype(element, "ClientServerQueuePort")) is not None
-        and one.get("reqInterface")
-    }
+def _required_ports(exp: Export, tree: Mapping[str, Any], component: str) -> dict[str, Element]:
+    stated = (tree.get("components") or {}).get(component) or {}
+    keys = {port: f"component:{component}/port:{port}" for port in stated.get("requires") or {}}
+    return {port: exp.made[key] for port, key in keys.items() if key in exp.made}
 
 
 def _write_connectors(
     exp: Export, owner: str, tree: Mapping[str, Any], name: str, stated: Mapping[str, Any]
 ) -> None:
     application = tree.get("application") or {}
-    for port, element in _required_ports(exp, str(stated.get("is"))).items():
+    for port, element in _required_ports(exp, tree, str(stated.get("is"))).items():
         listed = stated.get(port)
         texts = [str(one) for one in (listed if isinstance(listed, list) else [listed]) if one is not None]
         inside = all(text.partition(".")[0] in application for text in texts)

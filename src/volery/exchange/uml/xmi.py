@@ -83,10 +83,12 @@ class XmiFile:
     def __init__(self, root: Element, name: str) -> None:
         self.root, self.name = root, name
         self.ids: dict[str, Element] = {}
+        self._by_type: dict[str, list[Element]] = {}
         for element in root.iter(etree.Element):
             found = xmi_id(element)
             if found:
                 self.ids.setdefault(found, element)
+            self._by_type.setdefault(uml_type(element), []).append(element)
         self.applied: dict[Element, list[Application]] = {}
         self.bases: dict[Element, Element] = {}
         self.strange: list[Element] = []
@@ -152,7 +154,13 @@ class XmiFile:
         return [each for each in self.model.iter(etree.Element) if self.has(each, *names)]
 
     def elements(self, *types: str) -> Iterator[Element]:
-        """Yield the UML elements of some types, such as ``Component``, in the order of the file."""
+        """Yield the UML elements of some types, such as ``Component``, in the order of the file.
+
+        They are those of the file as it was read.
+        """
+        if len(types) == 1:
+            yield from self._by_type.get(types[0], ())
+            return
         for element in self.model.iter(etree.Element):
             if uml_type(element) in types:
                 yield element

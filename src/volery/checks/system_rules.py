@@ -1,0 +1,152 @@
+"""Rules that need a finished system: load, memory, deadlines, requirements, tool chains."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+
+from volery.analysis.system_analysis import analyse
+from volery.base.errors import EstimateError, Location
+from volery.base.time import to_seconds
+from volery.components.cpp.compiler import COMPILER_HINT, has_compiler
+from volery.model import rules
+from volery.model.components import CPP_LANGUAGES
+from volery.model.instances import Instance
+from volery.model.rules import Finding
+from volery.model.system import Bound, System
+
+_SHARES = ("utilisation", "battery_min")
+
+Rule = Callable[[System], Iterator[Finding]]
+
+
+def instance_path(instance: Instance) -> str:
+    """Return the path of an instance in the model."""
+    section = "environment.components" if instance.is_environment else "application"
+    return f"{section}.{instance.name}"
+
+
+# -- load, memory, deadlines
+
+
+def overload(system: System) -> Iterator[Finding]:
+    """Find processors whose stated work is more than all their cores can do."""
+    try:
+        shares = analyse(system).processors
+    except EstimateError:  # the catalogue has no figures of a processor
+        return
+    for one in shares:
+        if one.share > 1.0:
+            processor = system.processor(one.resource)
+            what = (
+                f"its components need {one.share:.0%} of its {processor.cores} cores, by their longest times"
+            )
+            yield Finding(rules.OVERLOAD, what, f"platform.processors.{one.resource}", processor.where)
+
+
+def deadlines(system: System) -> Iterator[Finding]:
+    """Find deadlines that are later than the next release."""
+    for instance in system.instances:
+        activity = instance.activity
+        if activity is None or activity.period_ns is None or activity.deadline_ns is None:
+            continue
+        if activity.deadline_ns > activity.period_ns:
+            what = (
+                f"the deadline of {to_seconds(activity.deadline_ns):g} s is after the next release, "
+                f"{to_seconds(activity.period_ns):g} s after the first"
+            )
+            yield Finding(rules.DEADLINE_PERIOD, what, instance_path(instance), instance.where)
+
+
+def memory(system: System) -> Iterator[Finding]:
+    """Find memory spaces and processors with less memory than their components take."""
+    needed: dict[tuple[str, str], float] = defaultdict(float)
+    for instance in system.instances:
+        size = instance.component.memory_b or 0.0
+        if instance.memory_space is not None:
+            needed["memory_spaces", instance.memory_space] += size
+        if instance.processor is not None:
+            needed["platform.processors", instance.processor] += size
+    places: list[tuple[str, str, float | None, Location | None]] = [
+        *(("memory_spaces", one.name, one.memory_b, one.where) for one in system.memory_spaces),
+        *(("platform.processors", one.name, one.memory_b, one.where) for one in system.processors),
+    ]
+    for section, name, size_there, where in places:
+        taken = needed[section, name]
+        if size_there is not None and taken > size_there:
+            what = f"its components take {taken / 1e6:g} MB, and it has {size_there / 1e6:g} MB"
+            yield Finding(rules.MEMORY_EXCEEDED, what, f"{section}.{name}", where)
+
+
+# -- requirements
+
+
+def requirements(system: System) -> Iterator[Finding]:
+    """Find requirements that no run can meet, or that every run meets."""
+    for bound in system.requirements:
+        why = _unreachable(system, bound)
+        if why:
+            yield Finding(rules.UNREACHABLE, why, f"requirements.{bound.name}", bound.where)
+
+
+def _unreachable(system: System, bound: Bound) -> str:
+    """Return why a bound is met by no run or by every run; empty if that depends on the run."""
+    subject, _, quantity = bound.observe.rpartition(".")
+    if bound.relation == "max" and bound.bound < 0.0:
+        return f"{bound.observe} is never negative"
+    if bound.relation == "min":
+        return _unreachable_minimum(system, bound, quantity)
+    for instance in system.instances:
+        if subject == instance.name:
+            return _unreachable_times(system, instance, quantity, bound)
+    return ""
+
+
+def _unreachable_minimum(system: System, bound: Bound, quantity: str) -> str:
+    orders = system.environment.workload
+    most = orders.count if orders.rate_hz or orders.count else 0
+    parcels = bound.observe in ("application.delivered", "application.ordered")
+    if bound.bound <= 0.0:
+        return f"{bound.observe} is never less than zero: every run meets it"
+    if parcels and most is not None and bound.bound > most:
+        return f"{bound.bound:g} are required, and {most} are ordered"
+    if quantity in _SHARES and bound.bound > 1.0:
+        return f"{bound.bound:g} is required of a share, which is at most 1"
+    for vehicle in system.vehicles:
+        left = vehicle.battery.charge if vehicle.battery is not None else 1.0
+        if bound.observe == f"{vehicle.name}.battery_min" and bound.bound > left:
+            return f"{bound.bound:g} is required, and the battery has {left:g} at the start"
+    return ""
+
+
+def _unreachable_times(system: System, instance: Instance, quantity: str, bound: Bound) -> str:
+    deadline = instance.activity.deadline_ns if instance.activity is not None else None
+    if quantity == "deadline_misses" and deadline is None:
+        return f"{instance.name} has no deadline: there is nothing to judge"
+    if quantity == "period_violations" and (instance.activity is None or instance.activity.period_ns is None):
+        return f"{instance.name} has no period: there is nothing to judge"
+    if instance.activity is None or not quantity.startswith("response_time") or instance.processor is None:
+        return ""
+    processor = system.processor(instance.processor)
+    for figure in instance.component.activation:
+        if figure.processor == processor.kind:
+            least = figure.best_ns if figure.best_ns is not None else figure.time_ns
+            takes = to_seconds(least) * figure.frequency_hz / processor.frequency_hz
+            if takes > bound.bound:
+                return f"an activation takes {takes * 1e3:g} ms there, more than {bound.bound * 1e3:g} ms"
+    return ""
+
+
+# -- this machine
+
+
+def tool_chains(system: System) -> Iterator[Finding]:
+    """Find languages whose compiler is not on this machine."""
+    for component in {one.component.name: one.component for one in system.instances}.values():
+        if component.path and component.language in CPP_LANGUAGES and not has_compiler():
+            what = f"no C++ compiler is installed: {COMPILER_HINT}"
+            yield Finding(rules.NO_TOOL_CHAIN, what, f"components.{component.name}.language", component.where)
+
+
+SYSTEM_RULES: tuple[Rule, ...] = (overload, deadlines, memory, requirements, tool_chains)
+"""Every function above, in the order of the report."""

@@ -1,0 +1,152 @@
+"""``volery model check``: everything that is wrong with a model, for people, programs and editors."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.table import Table
+from rich.text import Text
+
+from volery.base.errors import UsageError, choices
+from volery.cli.command import BAD_INPUT, OK, Commands
+from volery.cli.console import Output, make_table
+from volery.cli.options import Model, Overrides
+
+if TYPE_CHECKING:
+    from volery.checks.findings import CheckedModel
+    from volery.model.rules import Finding
+    from volery.model.system import System
+
+commands = Commands("Simulate", group="model")
+
+FORMATS = ("text", "json", "sarif")
+Format = Annotated[str, typer.Option("--format", metavar="text|json|sarif", help="Format of the findings.")]
+
+
+@commands.add("quiet", "debug")
+def check(output: Output, model: Model, overrides: Overrides = None, format_: Format = "text") -> int:
+    """Check a model with each of its allocations and scenarios, and load its Python components.
+
+    The exit status is 2 if a finding keeps the model from running, else 0.
+    """
+    if format_ not in FORMATS:
+        raise UsageError(f"--format {format_}: give {choices(FORMATS)}")
+    from volery.checks.findings import check as check_model
+    from volery.checks.sarif import sarif
+    from volery.model.assembly import DEFAULT_FILE
+    from volery.run.assembly.model_checks import vocabulary
+
+    checked = check_model(model, vocabulary(), overrides or ())
+    if format_ == "text":
+        _show(output, checked)
+    else:
+        file = model / DEFAULT_FILE if model.is_dir() else model
+        data = _data(checked) if format_ == "json" else sarif(checked, file)
+        output.results.print(
+            json.dumps(data, indent=2, ensure_ascii=False), markup=False, highlight=False, soft_wrap=True
+        )
+    return BAD_INPUT if checked.errors else OK
+
+
+@commands.add("json")
+def rules(output: Output) -> int:
+    """List the rules that a model is checked against."""
+    from volery.model.rules import RULES
+
+    listed = make_table("code", "name", "level", "what it finds", "remedy")
+    for one in RULES.values():
+        listed.add_row(one.code, one.name, one.level, one.title, one.remedy)
+    output.show(listed)
+    output.give(
+        [
+            {"code": one.code, "name": one.name, "level": one.level, "title": one.title, "remedy": one.remedy}
+            for one in RULES.values()
+        ]
+    )
+    return OK
+
+
+def _show(output: Output, checked: CheckedModel) -> None:
+    for one in checked.findings:
+        if one.rule.level == "error":
+            output.complain(f"volery: {_line(one)}")
+    system = checked.system
+    if system is not None and not checked.errors:
+        output.show(_summary(system), _instances(system), *_readiness(checked.missing))
+    for one in checked.findings:
+        if one.rule.level == "warning":
+            output.show(Text(f"⚠ {_line(one)}", style="yellow"))
+    for one, reason in checked.suppressed:
+        output.show(Text(f"· suppressed: {_line(one)} ({reason})", style="dim"))
+
+
+def _line(one: Finding) -> str:
+    where = f"{one.where}: " if one.where is not None else ""
+    return f"{where}{one} [{one.rule.code} {one.rule.name}]"
+
+
+def _data(checked: CheckedModel) -> dict[str, Any]:
+    system = checked.system
+    described: dict[str, Any] = {}
+    if system is not None:
+        described = {
+            "name": system.name,
+            "allocations": list(system.allocations),
+            "scenarios": list(system.scenarios),
+            "instances": {one.name: one.component.name for one in system.instances},
+            "requirements": [one.name for one in system.requirements],
+            "missing": {key: [_line(one) for one in found] for key, found in checked.missing.items()},
+        }
+    return {
+        **described,
+        "findings": [_record(one) for one in checked.findings],
+        "suppressed": [{**_record(one), "reason": reason} for one, reason in checked.suppressed],
+    }
+
+
+def _record(one: Finding) -> dict[str, Any]:
+    return {
+        "code": one.rule.code,
+        "rule": one.rule.name,
+        "level": one.rule.level,
+        "message": one.what,
+        "remedy": one.rule.remedy,
+        "path": one.path,
+        "file": one.where.file if one.where is not None else "",
+        "line": one.where.line if one.where is not None else 0,
+    }
+
+
+def _summary(system: System) -> Text:
+    line = Text(system.name, style="bold")
+    line.append("  is a valid model", style="green")
+    allocations = choices(system.allocations).replace(" or ", " and ")
+    scenarios = choices(system.scenarios).replace(" or ", " and ")
+    line.append(f"  allocations: {allocations}  scenarios: {scenarios}", style="dim")
+    return line
+
+
+def _instances(system: System) -> Table:
+    place = f"runs on ({system.allocation or 'nowhere'})"
+    listed = make_table("instance", "component", "language", place, "connected to")
+    for one in system.instances:
+        targets = [str(target) for connection in one.connections.values() for target in connection.targets]
+        where = one.processor or "environment"
+        listed.add_row(one.name, one.component.name, one.component.language, where, ", ".join(targets))
+    for vehicle in system.vehicles:
+        node = f"node on {vehicle.processor}" if vehicle.processor else "no node on a computer"
+        listed.add_row(vehicle.name, vehicle.kind, vehicle.autopilot, node, vehicle.at.name)
+    return listed
+
+
+def _readiness(missing: dict[str, tuple[Finding, ...]]) -> Iterable[Text]:
+    for fidelity, found in missing.items():
+        if not found:
+            yield Text(f"✓ ready for fidelity {fidelity}", style="green")
+            continue
+        yield Text(f"· not ready for fidelity {fidelity}:", style="yellow")
+        for gap in found:
+            yield Text(f"    {gap.where}: {gap}", style="dim")
