@@ -175,7 +175,7 @@ def main(model: Path, name: str, *, graph: str, allocation: str = "", scenario: 
     """
     parser = argparse.ArgumentParser(description=f"Host the component {name}.")
     parser.add_argument(
-        "--simulated", action="store_true", help="vehicles and time are those of a simulation"
+        "--simulated", choices=("true", "false"), default="false", help="vehicles and time of a simulation"
     )
     parser.add_argument(
         "--parameters", type=Path, metavar="FILE", help="YAML with parameters of the component"
@@ -187,7 +187,7 @@ def main(model: Path, name: str, *, graph: str, allocation: str = "", scenario: 
         if given.parameters is not None:
             system = with_parameters(system, name, given.parameters)
         system, _ = plan.without_computers(system)
-        well = Host(pipe.WorkerOrder(system, name, graph, seed=1), simulated=given.simulated).run()
+        well = Host(pipe.WorkerOrder(system, name, graph, seed=1), simulated=given.simulated == "true").run()
     except VoleryError as error:
         print(f"volery: {error}", file=sys.stderr, flush=True)  # noqa: T201
         os._exit(2)

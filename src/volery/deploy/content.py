@@ -1,0 +1,123 @@
+"""What goes to which computer: names of packages, hosted components, vehicles, files of the model."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from volery.base.errors import UsageError
+from volery.model.instances import Instance
+from volery.model.system import Processor, System
+from volery.run.assembly.vehicle_nodes import graph_access
+from volery.run.distributed.plan import worker_instances
+
+VERIFICATION = "verification"
+"""Last word of the package that has the vehicles and the environment of a simulation."""
+MODEL_FOLDER = "model"
+
+
+@dataclass(frozen=True)
+class Hosted:
+    """A component that a computer hosts; ``executable`` is the name of its entry point."""
+
+    instance: Instance
+    executable: str
+
+
+@dataclass(frozen=True)
+class Bridged:
+    """A vehicle whose node a computer executes in reality; ``device`` is what udev calls its autopilot."""
+
+    vehicle: str
+    autopilot: str
+    namespace: str
+    device: str
+    executable: str
+
+
+@dataclass(frozen=True)
+class Computer:
+    """What one computer gets: a ROS package called ``package``."""
+
+    processor: Processor
+    package: str
+    hosted: tuple[Hosted, ...]
+    bridged: tuple[Bridged, ...]
+
+
+def package_name(*parts: str) -> str:
+    """Return a name that ROS 1 and ROS 2 allow: lower case letters, digits and single underscores."""
+    words = re.sub(r"[^a-z0-9]+", "_", "_".join(parts).lower()).strip("_")
+    return words if words[:1].isalpha() else f"pkg_{words}"
+
+
+def computers(system: System) -> tuple[Computer, ...]:
+    """Return the computers that execute something, in the order of the model.
+
+    Raises:
+        CapabilityError: A component is in a language that cannot be hosted.
+        UsageError: Two computers would get the same package, or there is nothing to deploy.
+    """
+    worker_instances(system)  # raises for languages without a host
+    found = tuple(one for one in (_computer(system, each) for each in system.processors) if _executes(one))
+    names: dict[str, str] = {}
+    for one in found:
+        clash = names.setdefault(one.package, one.processor.name)
+        if clash != one.processor.name:
+            raise UsageError(
+                f"{clash} and {one.processor.name} would both be the package {one.package}: rename one"
+            )
+    if not found:
+        raise UsageError(
+            f"{system.name}: no component is allocated to a computer; there is nothing to deploy"
+        )
+    return found
+
+
+def _executes(computer: Computer) -> bool:
+    return bool(computer.hosted or computer.bridged)
+
+
+def _computer(system: System, processor: Processor) -> Computer:
+    hosted = tuple(
+        Hosted(one, package_name(one.name)) for one in system.instances if one.processor == processor.name
+    )
+    bridged = tuple(
+        Bridged(
+            one.name,
+            one.autopilot,
+            graph_access(one.autopilot, one.name).namespace,
+            f"autopilot_{package_name(one.name)}",
+            f"vehicle_{package_name(one.name)}",
+        )
+        for one in system.vehicles
+        if one.processor == processor.name
+    )
+    return Computer(processor, package_name(system.name, processor.name), hosted, bridged)
+
+
+def model_files(system: System, instances: tuple[Instance, ...]) -> Iterator[tuple[Path, Path]]:
+    """Yield the files that hosts of *instances* read: each, and where it goes below the model's folder.
+
+    The text of the model with all files that it includes, and the Python files beside each component.
+
+    Raises:
+        UsageError: A file is outside the model's folder.
+    """
+    wanted = {system.folder / one.name: None for one in system.sources}
+    wanted |= dict.fromkeys(sorted(system.folder.glob("*.yaml")))  # what other scenarios include
+    for one in instances:
+        if one.component.path:
+            folder = system.file_of(one.component).parent
+            wanted |= dict.fromkeys(sorted(folder.glob("*.py")))
+    wanted |= dict.fromkeys(system.catalogues)
+    root = system.folder.resolve()
+    for file in wanted:
+        resolved = file.resolve()
+        if not resolved.is_relative_to(root):
+            raise UsageError(
+                f"{file} is outside the folder of the model and cannot be deployed: move it there"
+            )
+        yield resolved, Path(MODEL_FOLDER) / resolved.relative_to(root)

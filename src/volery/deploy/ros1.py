@@ -1,0 +1,115 @@
+"""The package of a computer for ROS 1: catkin, launch files in XML, executables in ``scripts``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+from volery.deploy.content import MODEL_FOLDER, VERIFICATION, Computer, package_name
+from volery.deploy.texts import (
+    bridge_script,
+    host_script,
+    model_expression,
+    package_xml,
+    parameter_files,
+    systemd_unit,
+    udev_rules,
+    unit_name,
+    verification_script,
+)
+from volery.model.system import System
+
+GRAPH = "ros1"
+_SHEBANG = "#!/usr/bin/env python3\n"
+_TOOLS = ("<buildtool_depend>catkin</buildtool_depend>",)
+
+
+def computer_files(computer: Computer, system: System) -> Iterator[tuple[Path, str]]:
+    """Yield the files of a computer's package, without those of the model."""
+    name, model = computer.package, model_expression(1)
+    what = f"{system.name}: what {computer.processor.name} executes"
+    packages = dict.fromkeys(("rospy", "std_msgs", *message_packages(computer)))
+    depends = [f"<exec_depend>{one}</exec_depend>" for one in packages]
+    yield Path("package.xml"), package_xml(name, system, what, _TOOLS, depends)
+    scripts = {one.executable: host_script(one, system, GRAPH, model) for one in computer.hosted}
+    scripts |= {one.executable: bridge_script(one, GRAPH) for one in computer.bridged}
+    for executable, text in scripts.items():
+        yield Path("scripts") / executable, _SHEBANG + text
+    yield Path("CMakeLists.txt"), _cmake(name, scripts, ("launch", "config", MODEL_FOLDER))
+    yield Path("launch") / f"{name}.launch", _launch(computer)
+    yield from parameter_files(computer)
+    launch = f"roslaunch {name} {name}.launch"
+    yield (
+        Path("systemd") / unit_name(computer),
+        systemd_unit(computer, system, launch, "$WORKSPACE/devel/setup.bash"),
+    )
+    if computer.bridged:
+        yield Path("udev") / f"99-{name}.rules", udev_rules(computer)
+
+
+def verification_files(system: System, computers: Sequence[Computer]) -> Iterator[tuple[Path, str]]:
+    """Yield the files of the package that simulates vehicles and environment."""
+    name = package_name(system.name, VERIFICATION)
+    depends = [f"<exec_depend>{one}</exec_depend>" for one in ("rospy", "std_msgs", "rosgraph_msgs")]
+    what = f"{system.name}: simulated vehicles and environment for the deployed components"
+    yield Path("package.xml"), package_xml(name, system, what, _TOOLS, depends)
+    yield Path("CMakeLists.txt"), _cmake(name, ["world"], ("launch", MODEL_FOLDER))
+    yield Path("scripts") / "world", _SHEBANG + verification_script(system, GRAPH, model_expression(1))
+    yield Path("launch") / "world.launch", _document(_world(name))
+    included = [
+        f'<include file="$(find {one.package})/launch/{one.package}.launch">'
+        '<arg name="simulated" value="true"/></include>'
+        for one in computers
+    ]
+    yield Path("launch") / f"{name}.launch", _document([*_world(name), *included])
+
+
+def _world(package: str) -> list[str]:
+    return [
+        '<arg name="options" default="" doc="further options of volery simulate"/>',
+        '<param name="/use_sim_time" value="true"/>',
+        f'<node pkg="{package}" type="world" name="world" required="true" output="screen" args="$(arg options)"/>',
+    ]
+
+
+def _launch(computer: Computer) -> str:
+    lines = ['<arg name="simulated" default="false" doc="vehicles and time are those of a simulation"/>']
+    for one in computer.hosted:
+        file = f"$(find {computer.package})/config/{one.executable}.yaml"
+        lines.append(
+            f'<node pkg="{computer.package}" type="{one.executable}" name="{package_name(one.instance.name)}" '
+            f'output="screen" args="--parameters {file} --simulated $(arg simulated)"/>'
+        )
+    for each in computer.bridged:
+        url = f"{each.autopilot}+serial:///dev/{each.device}?baud=57600"
+        lines.append(f'<arg name="{each.executable}_url" default={quoteattr(url)}/>')
+        lines.append(
+            f'<node unless="$(arg simulated)" pkg="{computer.package}" type="{each.executable}" '
+            f'name="{each.executable}" respawn="true" output="screen" args="$(arg {each.executable}_url)"/>'
+        )
+    return _document(lines)
+
+
+def _document(lines: Iterable[str]) -> str:
+    return "<launch>\n" + "".join(f"  {line}\n" for line in lines) + "</launch>\n"
+
+
+def _cmake(name: str, scripts: Iterable[str], folders: Sequence[str]) -> str:
+    programs = " ".join(f"scripts/{one}" for one in scripts)
+    return f"""cmake_minimum_required(VERSION 3.5)
+project({name} NONE)
+find_package(catkin REQUIRED)
+catkin_package()
+catkin_install_python(PROGRAMS {programs} DESTINATION ${{CATKIN_PACKAGE_BIN_DESTINATION}})
+install(DIRECTORY {" ".join(folders)} DESTINATION ${{CATKIN_PACKAGE_SHARE_DESTINATION}})
+"""
+
+
+def message_packages(computer: Computer) -> Iterator[str]:
+    """Yield the packages of the messages that the components of a computer publish and subscribe to."""
+    for one in computer.hosted:
+        component = one.instance.component
+        types = [topic.type for topic in component.publishes.values()]
+        types += [topic.type for topic in component.subscribes.values()]
+        yield from (one.partition("/")[0] for one in types)

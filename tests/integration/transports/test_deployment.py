@@ -1,0 +1,123 @@
+"""What ``volery deploy`` writes is built and started by the tools of ROS, and delivers the parcel."""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rigs.requirements import lacking
+from volery.deploy.generation import Deployment, deploy
+from volery.model.system_loader import load
+from volery.ros.transports.ros1 import available
+from volery.run.assembly.model_checks import vocabulary
+
+from .conftest import python_of, surroundings
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(300)]
+
+DELIVERY = Path(__file__).parents[3] / "examples" / "delivery"
+LIMIT_S = 200
+SETTINGS = ("--seed", "7", "--speed", "2.5", "--set", "run.duration=300s")
+
+
+def deployed(folder: Path, ros: int) -> Deployment:
+    return deploy(load(DELIVERY, vocabulary(), scenario="pocket"), folder, ros)
+
+
+def assert_delivered(folder: Path, said: str) -> None:
+    assert (folder / "run.json").exists(), said
+    record: dict[str, Any] = json.loads((folder / "run.json").read_text())
+    assert record["outcome"]["status"] == "completed", said
+    assert record["parcels"]["parcel-1"]["state"] == "delivered"
+    assert record["outcome"]["requirements_met"], record["requirements"]
+    assert all(vehicle["landed"] for vehicle in record["vehicles"].values())
+    assert not record["failures"]
+    assert any("landing_offset_1' is not judged" in one for one in record["warnings"])
+
+
+def run(command: list[str], env: Mapping[str, str], cwd: Path) -> str:
+    """Run *command* in a session of its own, which ends with it."""
+    process = subprocess.Popen(
+        command, env=env, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    try:
+        said, _ = process.communicate(timeout=LIMIT_S)
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+    assert process.returncode == 0, said
+    return said
+
+
+def test_catkin_builds_it_and_roslaunch_delivers_the_parcel(tmp_path: Path) -> None:
+    if not available() or not all(map(shutil.which, ("roslaunch", "catkin_make"))):
+        lacking("no rospy, roslaunch or catkin_make here (scripts/debian-packages ros1)")
+    made = deployed(tmp_path / "ws" / "src", 1)
+    with socket.socket() as asked:
+        asked.bind(("127.0.0.1", 0))
+        port = asked.getsockname()[1]
+    leaked = ("ROS_PACKAGE_PATH", "CMAKE_PREFIX_PATH", "VIRTUAL_ENV")
+    env = {key: value for key, value in os.environ.items() if key not in leaked}
+    env |= {"ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1", "ROS_HOME": str(tmp_path)}
+    workspace = tmp_path / "ws"
+    built = ["catkin_make", "-C", str(workspace), f"-DPYTHON_EXECUTABLE={sys.executable}"]
+    run(built, env, workspace)
+    options = " ".join((*SETTINGS, "--out", str(tmp_path / "out")))
+    start = f"roslaunch -p {port} {made.verification} {made.verification}.launch options:='{options}'"
+    debian = "export ROS_PACKAGE_PATH=$ROS_PACKAGE_PATH:/usr/share"
+    said = run(["bash", "-c", f". devel/setup.bash && {debian} && exec {start}"], env, workspace)
+    assert_delivered(tmp_path / "out", said)
+    assert "process has finished cleanly" in said
+
+
+def test_pip_installs_it_and_the_entry_points_deliver_the_parcel_on_ros_2(tmp_path: Path) -> None:
+    """`ros2 launch` cannot be had from PyPI: what the launch files name is started here one by one."""
+    made = deployed(tmp_path / "src", 2)
+    python, installed = python_of("jazzy"), tmp_path / "installed"
+    packages = [str(made.folder / one) for one in (*made.packages.values(), made.verification)]
+    pip = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check", "--no-deps"]
+    run([*pip, "--prefix", str(installed), *packages], os.environ, tmp_path)
+    [site] = installed.glob("lib/python*/site-packages")
+    env = {**surroundings(23), "PYTHONPATH": str(site)}
+    started = []
+    try:
+        for package in made.packages.values():
+            for executable, parameters in launched(installed / "share" / package, package):
+                command = [installed / "bin" / executable, "--parameters", parameters, "--simulated", "true"]
+                started.append(subprocess.Popen(command, env=env, stderr=subprocess.PIPE, text=True))
+        assert len(started) == 9
+        said = run([str(installed / "bin" / "world"), *SETTINGS, "--out", "out"], env, tmp_path)
+        assert [process.wait(LIMIT_S) for process in started] == [0] * 9
+    finally:
+        for process in started:
+            process.kill()
+            process.communicate()
+    assert_delivered(tmp_path / "out", said)
+
+
+def launched(share: Path, package: str) -> list[tuple[str, Path]]:
+    """The executables and parameter files of the hosts in an installed launch file."""
+    [tree] = [ast.parse(file.read_text()) for file in share.glob("launch/*.launch.py")]
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Node":
+            keywords = {one.arg: one.value for one in node.keywords}
+            if "condition" not in keywords:  # only in reality
+                assert ast.literal_eval(keywords["package"]) == package
+                executable = ast.literal_eval(keywords["executable"])
+                found.append((executable, share / "config" / f"{executable}.yaml"))
+                assert found[-1][1].is_file()
+    return found
