@@ -50,7 +50,7 @@ def _allocate(imp: Import, link: Element, clients: list[Element], suppliers: lis
         imp.note(link, f"{suppliers[0].get('name', '')!r} is no place in a model; the allocation is left out")
         return
     allocation = _allocation_of(imp, link)
-    places = imp.section("allocations", allocation)
+    places = imp.tree.get("allocations", {}).get(allocation, {})
     for client in clients:
         name = _name(imp, client)
         if not name:
@@ -58,6 +58,7 @@ def _allocate(imp: Import, link: Element, clients: list[Element], suppliers: lis
         elif places.get(name, place) != place:
             imp.note(link, f"{name} is allocated to {places[name]} already")
         else:
+            places = imp.section("allocations", allocation)
             places[name] = place
             imp.finish(f"allocation:{allocation}/{name}", link)
 

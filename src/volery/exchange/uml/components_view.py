@@ -15,7 +15,7 @@ from volery.base.errors import ModelError
 from volery.exchange.uml.context import Export, Import
 from volery.exchange.uml.interfaces_view import is_many, set_many
 from volery.exchange.uml.notations import properties, property_text, tagged
-from volery.exchange.uml.times_view import ACTIVE, Times, below, write_activity, write_times
+from volery.exchange.uml.times_view import ACTIVE, Times, below, generals, write_activity, write_times
 from volery.exchange.uml.xmi import Element, local, tag, uml_type, xmi_id
 from volery.model.components import LANGUAGES
 from volery.model.text import parse as parse_yaml
@@ -91,18 +91,6 @@ def _has_parts(imp: Import, component: Element) -> bool:
             if found is not None and uml_type(found) == "Component":
                 return True
     return False
-
-
-def generals(imp: Import, component: Element) -> list[Element]:
-    """Return a component and what it inherits from, itself first."""
-    found = [component]
-    for each in found:
-        for one in each:
-            if local(one) == "generalization":
-                general = imp.file.reference(one, "general")
-                if general is not None and general not in found:
-                    found.append(general)
-    return found
 
 
 class _Component:
@@ -226,8 +214,9 @@ class _Component:
                 self.imp.finish(f"{self.key}/{section}:{topic}", port)
                 continue
             name = self.imp.name(port, (*provides, *requires))
-            self.imp.finish(f"{self.key}/port:{name}", port)
             self._client_server(port, name, provides, requires)
+            if name in provides or name in requires:
+                self.imp.finish(f"{self.key}/port:{name}", port)
             queue = self._queue(port)
             if queue:
                 queues[name] = queue
@@ -286,11 +275,11 @@ class _Component:
             if uml_type(each) != "Property":
                 continue
             name = str(each.get("name", ""))
-            self.imp.finish(f"{self.key}/parameter:{name}", each)
             default = next((one for one in each if local(one) == "defaultValue"), None)
             if default is None:
                 self.imp.note(each, "an attribute without a default value is no parameter; it is left out")
                 continue
+            self.imp.finish(f"{self.key}/parameter:{name}", each)
             text = str(default.get("value", "")) or next(
                 (one.text or "" for one in default if local(one) == "body"), ""
             )
@@ -366,10 +355,16 @@ def _write_files(
         entry = f"{key}/language/{one}"
         written = _S3D_LANGUAGES.get(one, one)
         owner = exp.element(entry, folder, "packagedElement", "Package", name=written)
-        exp.comment(f"{entry}/language", owner, property_text("language", written))
+        stated = {"language": written}
         if file:
-            written = PurePath(os.path.normpath(rebase / str(file))).as_posix()
-            exp.comment(f"{entry}/path", owner, property_text("path", written))
+            stated["path"] = PurePath(os.path.normpath(rebase / str(file))).as_posix()
+        known = [exp.known.get(f"{entry}/{name}") for name in stated]
+        if None not in known and len(set(known)) == 1 and len(known) > 1:  # one comment states both
+            both = " ".join(property_text(name, value) for name, value in stated.items())
+            exp.made[f"{entry}/path"] = exp.comment(f"{entry}/language", owner, both)
+            continue
+        for name, value in stated.items():
+            exp.comment(f"{entry}/{name}", owner, property_text(name, value))
     link = exp.element(f"{key}/files-link", package, "packagedElement", "Abstraction")
     exp.refer(link, "client", [xmi_id(folder)])
     exp.refer(link, "supplier", [xmi_id(component)])

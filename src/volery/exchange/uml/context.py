@@ -12,6 +12,7 @@ import re
 from base64 import urlsafe_b64encode
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from lxml import etree
@@ -19,6 +20,7 @@ from lxml import etree
 from volery.base.errors import Location, ModelError
 from volery.exchange.uml.stereotypes import NAMESPACES, PROFILES, prefix_of
 from volery.exchange.uml.xmi import ECORE, UML, XMI, Element, XmiFile, local, uml_type, xmi_id
+from volery.exchange.uml.xmi import tags as tags_of
 from volery.model.text import parse as parse_yaml
 from volery.model.writing import flow_text
 
@@ -93,8 +95,10 @@ class Import:
             number, base = 2, made
             while made in taken:
                 made, number = f"{base}_{number}", number + 1
-            if made != written:
+            if identifier(written) != written:
                 self.note(element, f"{written!r} is no name in a model; it is {made!r} there")
+            elif made != written:
+                self.note(element, f"something else is {written!r}, too; this is {made!r} in the model")
             self.names[element] = made
         return self.names[element]
 
@@ -146,6 +150,11 @@ def identifier(text: str) -> str:
     return f"_{made}" if made[:1].isdigit() else made
 
 
+def _states_nothing(application: Element, name: str) -> bool:
+    """Return whether a tag is absent, empty or ``null``, as real files have it."""
+    return not tags_of(application, name)
+
+
 @dataclass
 class Export:
     """An export in progress, into a new file or into an existing one with the elements of ``known``."""
@@ -154,6 +163,11 @@ class Export:
     known: Mapping[str, Element] = field(default_factory=dict)
     notes: list[Note] = field(default_factory=list)
     made: dict[str, Element] = field(default_factory=dict)
+
+    @cached_property
+    def before(self) -> Import:
+        """Reads what the existing file states, to leave alone what has not changed."""
+        return Import(self.file)
 
     def element(self, key: str, parent: Element, feature: str, kind: str, **attributes: str) -> Element:
         """Return the element of *key* with these attributes; it is made below *parent* if it is new.
@@ -200,6 +214,8 @@ class Export:
             application.set(f"base_{base}", xmi_id(element))
             self.file.register(element, stereotype, prefix_of(stereotype), application)
         for name, value in tags.items():
+            if not value and _states_nothing(application, name):
+                continue
             application.attrib.pop(name, None)
             for each in [each for each in application if local(each) == name]:
                 application.remove(each)

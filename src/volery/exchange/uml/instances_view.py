@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from volery.exchange.uml.components_view import generals, instance_owners
+from volery.exchange.uml.components_view import instance_owners
 from volery.exchange.uml.context import Export, Import
+from volery.exchange.uml.times_view import generals
 from volery.exchange.uml.xmi import Element, local, uml_type, xmi_id
 
 _MANY = "[]"

@@ -62,7 +62,7 @@ def _operations(imp: Import, element: Element, key: str, seen: set[Element]) -> 
         if local(each) == "generalization":
             general = imp.file.reference(each, "general")
             if general is not None:
-                found |= _operations(imp, general, f"{key}/inherited", seen)
+                found |= _operations(imp, general, key, seen)
     for each in element:
         if local(each) == "ownedOperation":
             name = imp.name(each, found)

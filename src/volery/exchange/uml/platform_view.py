@@ -230,9 +230,15 @@ def _write_processor(exp: Export, system: Element, kinds: Element, name: str, re
             rest = {"is": kind, **rest} if kind.lower() != name.lower() else rest
     else:
         made, base = exp.element(key, system, "ownedAttribute", "Property", name=name), "Property"
-        of_kind = exp.element(f"kind:{kind}", kinds, "packagedElement", "Component", name=kind)
-        exp.apply(f"kind:{kind}", of_kind, "Classifier", "HwProcessor")
-        made.set("type", xmi_id(of_kind))
+        typed = exp.file.reference(made, "type") if known is not None else None
+        if typed is not None and exp.file.has(typed, "HwProcessor"):
+            written = str(typed.get("name", ""))
+            exp.made[f"kind:{written}"] = typed
+            rest = rest if written == kind else {"is": kind, **rest}
+        else:
+            of_kind = exp.element(f"kind:{kind}", kinds, "packagedElement", "Component", name=kind)
+            exp.apply(f"kind:{kind}", of_kind, "Classifier", "HwProcessor")
+            made.set("type", xmi_id(of_kind))
     caches = rest.pop("caches", None) or {}
     ids = []
     for cache, stated in caches.items():
@@ -247,7 +253,7 @@ def _write_processor(exp: Export, system: Element, kinds: Element, name: str, re
             type=str(stated.get("type", "")),
             memorySize=_marte(stated.get("size", "")),
         )
-        ids.append(xmi_id(exp.file.stereotype(one, "HwCache") or one))
+        ids.append(xmi_id(exp.file.stereotype(one, "HwCache")))
     exp.apply(
         key,
         made,

@@ -35,6 +35,18 @@ def below(family: list[Element], feature: str) -> Iterator[Element]:
                 yield each
 
 
+def generals(imp: Import, component: Element) -> list[Element]:
+    """Return a component and what it inherits from, itself first."""
+    found = [component]
+    for each in found:
+        for one in each:
+            if local(one) == "generalization":
+                general = imp.file.reference(one, "general")
+                if general is not None and general not in found:
+                    found.append(general)
+    return found
+
+
 class Times:
     """The times of one component that is being imported.
 
@@ -100,9 +112,10 @@ class Times:
         operations: dict[str, Any] = {}
         for operation in below(self.family, "ownedOperation"):
             name = str(operation.get("name", ""))
-            key = "main" if operation is main else name
-            self.imp.finish(f"{self.key}/operation:{key}", operation)
-            figures = self._figures(operation)
+            figures = self.figures(operation)
+            if operation is main or (figures and name in offered):
+                key = "main" if operation is main else name
+                self.imp.finish(f"{self.key}/operation:{key}", operation)
             if not figures:
                 continue
             stated = figures[0] if len(figures) == 1 else figures
@@ -114,7 +127,8 @@ class Times:
                 self.imp.note(operation, "it is in no provided interface; its times are left out")
         return {**found, **({"operations": operations} if operations else {})}
 
-    def _figures(self, operation: Element) -> list[dict[str, Any]]:
+    def figures(self, operation: Element) -> list[dict[str, Any]]:
+        """Return the figures of an operation as a model states them."""
         usage = self.imp.file.stereotype(operation, "ResourceUsage", "GaStep", "SaStep", "PaStep")
         texts = tags(usage, "execTime", "hostDemand")
         rest = self.imp.annotation(operation).get("figures", [])
@@ -158,6 +172,14 @@ def write_activity(
     exp: Export, component: Element, key: str, main: Element | None, active: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Write the real-time specification; return what it has no place for."""
+    if key in exp.known:
+        stated = exp.before.annotation(component).get("active")
+        if Times(exp.before, key, generals(exp.before, component), stated).activity() == (
+            dict(active) or True
+        ):
+            comment = exp.known.get(f"{key}/specification")
+            exp.made |= {f"{key}/specification": comment} if comment is not None else {}
+            return stated if isinstance(stated, dict) else {}
     rest = dict(active)
     tags_: dict[str, str] = {}
     try:
@@ -197,6 +219,8 @@ def write_times(
         operation = exp.element(below, component, "ownedOperation", "Operation", name=named)
         main = operation if one == "main" else main
         listed = figures if isinstance(figures, list) else [figures] if figures else []
+        if known is not None and Times(exp.before, key, [component], None).figures(known) == listed:
+            continue
         texts, energies, others = [], [], []
         for figure in listed:
             text, energy, other = _figure_text(dict(figure))

@@ -32,7 +32,7 @@ _UML_URI = re.compile(
 _PROFILES = (
     re.compile(r"^http:///schemas/(?P<name>essyn_Profile|PHARAON_Profile)/_[A-Za-z0-9_-]+/\d+$"),
     re.compile(r"^http://(?P<name>essyn_Profile|PHARAON_Profile)\.UTP_Stereotypes/schemas/UTP/"),
-    re.compile(r"^http:///(?P<name>essyn_Profile|PHARAON_Profile)/.*\.ecore$"),
+    re.compile(r"^http:///(?P<name>essyn_Profile|PHARAON_Profile)(/.*)?\.ecore$"),
     re.compile(r"^http://www\.eclipse\.org/papyrus/(?P<name>\w+)/\d+$"),
     re.compile(r"^http:///(?:MARTE/)(?:\w+/)*(?P<name>\w+)\.ecore$"),
     re.compile(r"^http:///schemas/(?P<name>\w+)/_[A-Za-z0-9_-]+/\d+$"),

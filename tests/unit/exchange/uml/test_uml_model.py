@@ -1,0 +1,270 @@
+"""Models of UML with MARTE and S3D: six hand-made files, examples there and back, and hostile files."""
+
+import re
+from pathlib import Path, PurePath
+from xml.etree import ElementTree
+
+import pytest
+from lxml import etree
+
+from volery.base.errors import ModelError
+from volery.cli.commands.first_steps import example
+from volery.exchange.uml.uml_model import export_uml, import_uml
+from volery.exchange.uml.xmi import MOST_BYTES, xmi_id
+from volery.model.assembly import read_tree
+from volery.model.text import parse
+from volery.model.writing import model_text
+
+MODELS = Path(__file__).parent / "models"
+FILES = sorted(path.stem for path in MODELS.glob("*.uml"))
+KINDS = {"A72": "rpi4-cortex-a72", "Cortex-A72": "rpi4-cortex-a72"}
+CATALOGUE = ("rpi4-cortex-a72", "intel-i5-3470")
+
+
+def read(name, data=None):
+    data = (MODELS / f"{name}.uml").read_bytes() if data is None else data
+    return import_uml(data, f"{name}.uml", catalogue=CATALOGUE, processors=KINDS)
+
+
+def said(imported):
+    return [str(note) for note in imported.notes]
+
+
+def test_there_are_six_files():
+    assert FILES == ["all_views", "conflicts", "empty_tags", "minimal", "older_namespaces", "other_writer"]
+
+
+# -- what is understood
+
+
+def test_every_element_of_the_minimal_file_is_understood():
+    imported = read("minimal")
+    assert imported.tree["components"]["Detector"] == {
+        "language": "c++",
+        "path": "src/detector",
+        "provides": {"img": "ImageIn"},
+        "queues": {"img": {"size": 4}},
+        "active": {"period": "200 ms", "deadline": "200 ms"},
+        "activation": {"time": "8 ms", "best": "1 ms", "worst": "15 ms"},
+    }
+    assert imported.tree["application"] == {"det": {"is": "Detector"}}
+    assert imported.tree["memory_spaces"] == {"vision": None}
+    assert imported.tree["allocations"] == {"default": {"det": "vision"}}
+    processors = imported.tree["platform"]["processors"]
+    assert processors == {"A72": {"is": "rpi4-cortex-a72", "frequency": "1.5 GHz", "cores": 4}}
+    understood = {xmi_id(each) for each in imported.keys.values()} | {"m", "app"}
+    applied = {xmi_id(each) for each in imported.file.bases}
+    every = {xmi_id(each) for each in imported.file.root.iter() if xmi_id(each)}
+    assert every == understood | applied
+    assert len(said(imported)) == 1
+    assert "no processor is known that its times were taken at" in said(imported)[0]
+
+
+def test_older_namespaces_say_the_same():
+    assert read("older_namespaces").tree == read("minimal").tree
+
+
+def test_all_views_are_read():
+    tree = read("all_views").tree
+    assert tree["interfaces"] == {"Grab": {"grab": {"args": {"count": "int"}, "returns": "Image[]"}}}
+    assert tree["types"] == {"Image": {"fields": {"width": "int"}}, "Mode": {"values": ["day", "night"]}}
+    camera, detector = tree["components"]["SysCamera"], tree["components"]["SysDetector"]
+    assert (camera["language"], camera["path"]) == ("c++", "src/camera.cpp")
+    assert camera["files"] == {"python": "model/camera.py"}
+    assert camera["queues"] == {
+        "pictures": {"size": 2, "retries": 1, "full": "remove-first", "timeout": "50 ms"}
+    }
+    assert camera["operations"] == {"grab": {"time": "3 ms", "best": "1 ms"}}
+    assert detector["active"] == {"period": "100 ms", "deadline": "80 ms", "jitter": "2 ms", "priority": 7}
+    assert detector["activation"] == {"time": "12 ms", "provenance": "measured", "energy": "30 mJ"}
+    assert detector["at"] == {"processor": "rpi4-cortex-a72", "frequency": "1.5 GHz"}
+    assert tree["application"]["detector"] == {"is": "SysDetector", "eyes": "front_camera.pictures"}
+    platform = tree["platform"]
+    assert platform["operating_systems"] == {
+        "linux": {"type": "Linux", "ipc": "sharedMemory", "drivers": ["v4l2"]}
+    }
+    assert platform["processors"]["cpu0"]["caches"]["l2"]["size"] == "1024 kB"
+    assert platform["networks"] == {"bus": {"between": ["cpu0", "cpu1"], "bandwidth": "100 Mbit/s"}}
+    assert platform["devices"] == {"lens": {"kind": "sensor"}}
+    assert tree["allocations"]["Architecture"] == {
+        "front_camera": "vision_exe",
+        "detector": "vision_exe",
+        "vision_exe": "linux",
+        "linux": "cpu0",
+    }
+    assert tree["environment"]["components"] == {"scene": {"is": "Scene"}}
+
+
+def test_empty_tags_and_expressions_are_noted_not_fatal():
+    imported = read("empty_tags")
+    assert imported.tree["components"]["Unit"]["activation"] == {"time": "5 ms", "provenance": "estimated"}
+    notes = "\n".join(said(imported))
+    for piece in (
+        "a port without an interface",
+        "'other' for full queues",
+        "no execution time can be read from '(expr=$x,",
+        "'2nd unit' is no name in a model; it is '_2nd_unit' there",
+        "it refers to 'gone', which does not exist",
+        "it refers to 'nowhere', which does not exist",
+        "a stereotype of a profile that is not read",
+        "`--processor board=NAME`",
+    ):
+        assert piece in notes, piece
+    assert all(re.match(r"empty_tags\.uml:\d+: .*\([a-z]+\d*\): ", line) for line in said(imported))
+
+
+def test_the_form_of_other_writers_is_read():
+    tree = read("other_writer").tree
+    assert tree["application"] == {"one": {"is": "A", "mouth": "two.ear"}, "two": {"is": "B"}}
+    assert tree["allocations"] == {"default": {"one": "cpu", "two": "cpu"}}
+    assert tree["requirements"] == {"quiet": {"observe": "one.failures", "max": 0}}
+
+
+def test_conflicts_are_noted_with_their_place():
+    notes = "\n".join(said(read("conflicts")))
+    for piece in (
+        "user.use is connected twice",
+        "user is allocated to cpu already",
+        "an interface that inherits from itself",
+        "no component can be in 'ada'",
+        "something else is 'server_1', too",
+        "'App' is no place in a model",
+    ):
+        assert piece in notes, piece
+
+
+# -- there and back
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_an_export_into_the_file_changes_nothing_that_it_does_not_know(name):
+    imported = read(name)
+    before = {xmi_id(each): dict(each.attrib) for each in imported.file.root.iter() if xmi_id(each)}
+    text, notes = export_uml(imported.tree, name, base=imported)
+    again = read(name, text.encode())
+    assert again.tree == imported.tree
+    assert notes == ()
+    after = {xmi_id(each): dict(each.attrib) for each in again.file.root.iter() if xmi_id(each)}
+    kept = {
+        key: value for key, value in before.items() if key not in {xmi_id(e) for e in imported.keys.values()}
+    }
+    changed = [key for key, value in kept.items() if after.get(key, {}).items() < value.items()]
+    assert changed == []
+    assert before.keys() <= after.keys()
+
+
+def test_a_removed_instance_takes_its_element_and_its_links_away():
+    imported = read("all_views")
+    del imported.tree["application"]["detector"]
+    del imported.tree["allocations"]["Architecture"]["detector"]
+    text, _ = export_uml(imported.tree, "all_views", base=imported)
+    assert "i_det" not in re.findall(r'xmi:id="(\w+)"', text)
+    assert "con" not in re.findall(r'xmi:id="(\w+)"', text)
+    assert read("all_views", text.encode()).tree["application"] == {"front_camera": {"is": "SysCamera"}}
+
+
+@pytest.mark.parametrize("name", ["starter", "cpp", "delivery"])
+def test_a_model_of_volery_is_the_same_after_uml(name):
+    tree = read_tree(example(name) / "model.yaml").plain()
+    text, notes = export_uml(tree, "m.uml")
+    assert notes == ()
+    imported = read("m", text.encode())
+    assert said(imported) == []
+    assert imported.tree == tree
+    assert parse(model_text(imported.tree), "m").plain() == tree
+    again, _ = export_uml(imported.tree, "m.uml", base=imported)
+    assert read("m", again.encode()).tree == tree
+
+
+def test_ids_depend_on_the_model_alone():
+    tree = read_tree(example("delivery") / "model.yaml").plain()
+    one, two = export_uml(tree, "a.uml")[0], export_uml(tree, "b.uml")[0]
+    assert one == two
+    ids = re.findall(r'xmi:id="([^"]+)"', one)
+    assert len(ids) == len(set(ids))
+
+
+def test_a_pass_through_another_writer_changes_nothing():
+    tree = read_tree(example("delivery") / "model.yaml").plain()
+    text, _ = export_uml(tree, "m.uml")
+    other = ElementTree.tostring(ElementTree.fromstring(text), encoding="utf-16")
+    assert read("m", other).tree == tree
+    canonical = etree.tostring(etree.fromstring(text.encode()), method="c14n")
+    assert read("m", canonical).tree == tree
+
+
+def test_only_tags_of_the_profiles_are_written():
+    """An attribute that a stereotype does not have makes EMF refuse the file."""
+    tags = {
+        "ClientServerQueuePort": "kind provInterface reqInterface queueSize fullPoolPolicy retry timeout",
+        "HwProcessor": "frequency nbCores caches",
+        "RtUnit": "main",
+        "RtSpecification": "relDl occKind priority",
+        "ResourceUsage": "execTime energy",
+        "HwMedia": "bandWidth blockT",
+        "NfpConstraint": "kind",
+        "OS": "type interProcessCommunication",
+        "MemoryPartition": "memorySizeFootprint",
+        "FlowPort": "direction",
+        "HwCache": "level type memorySize",
+    }
+    tree = read("all_views").tree
+    text, _ = export_uml(tree, "m.uml")
+    for element in read("m", text.encode()).file.bases:
+        name = etree.QName(element).localname
+        stated = {key for key in element.attrib if not key.startswith(("base_", "{"))}
+        stated |= {etree.QName(each).localname for each in element}
+        assert stated <= set(tags.get(name, "").split()), name
+
+
+def test_paths_start_at_the_folder_of_each_file():
+    tree = {"volery": 1, "name": "m", "components": {"A": {"language": "python", "path": "code/a.py"}}}
+    text, _ = export_uml(tree, "m.uml", PurePath("../model"))
+    assert "$path=../model/code/a.py;" in text
+    back = import_uml(text.encode(), "m.uml", PurePath("../uml"))
+    assert back.tree["components"]["A"]["path"] == "../model/code/a.py"
+    assert (
+        import_uml(text.encode(), "m.uml", PurePath("../x")).tree["components"]["A"]["path"]
+        == "../model/code/a.py"
+    )
+
+
+# -- hostile and wrong files
+
+BOMB = """<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;">
+<!ENTITY c "&b;&b;&b;&b;&b;&b;">]><x>&c;</x>"""
+OUTSIDE = '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY p SYSTEM "file:///etc/passwd">]><x>&p;</x>'
+EMPTY = """<xmi:XMI xmlns:xmi="http://www.omg.org/spec/XMI/20131001" xmlns:uml="http://www.eclipse.org/uml2/5.0.0/UML">
+<uml:Model xmi:id="m" name="x"/></xmi:XMI>"""
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        (BOMB.encode(), "a document type or an entity is declared"),
+        (BOMB.replace('"1.0"', '"1.0" encoding="utf-16"').encode("utf-16"), "a document type is declared"),
+        (OUTSIDE.encode(), "a document type or an entity is declared"),
+        (b"not XML", "this is not XML"),
+        (b"", "this is not XML"),
+        (b"<a><b></a>", "m.uml:1: this is not XML"),
+        (b"<a>" * 100_000, "this is not XML"),
+        (b"<a/>", "there is no uml:Model in it; its root is 'a'"),
+        (
+            b'<di:SashWindowsMngr xmlns:di="http://www.eclipse.org/papyrus/0.7.0/sashdi"/>',
+            "this is a .di file",
+        ),
+        (EMPTY.encode(), "no stereotype of MARTE or S3D is applied in it; was it saved with its profiles?"),
+        (b" " * (MOST_BYTES + 1), "a UML model has at most 32 MiB"),
+    ],
+)
+def test_what_is_no_model_is_refused_with_the_reason(data, expected):
+    with pytest.raises(ModelError, match=re.escape(expected)):
+        read("m", data)
+
+
+def test_a_damaged_annotation_is_noted():
+    tree = read_tree(example("delivery") / "model.yaml").plain()
+    text, _ = export_uml(tree, "m.uml")
+    spoilt = re.sub(r'key="wind" value="[^"]*"', 'key="wind" value="{speed: ["', text)
+    assert spoilt != text
+    assert any("its annotation is damaged" in line for line in said(read("m", spoilt.encode())))
