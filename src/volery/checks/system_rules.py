@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 
 from volery.analysis.system_analysis import analyse
-from volery.base.errors import EstimateError, Location
+from volery.base.errors import EstimateError, Location, UsageError
 from volery.base.time import to_seconds
 from volery.components.cpp.compiler import COMPILER_HINT, has_compiler
 from volery.model import rules
@@ -33,7 +33,7 @@ def overload(system: System) -> Iterator[Finding]:
     """Find processors whose stated work is more than all their cores can do."""
     try:
         shares = analyse(system).processors
-    except EstimateError:  # the catalogue has no figures of a processor
+    except (EstimateError, UsageError):  # no figures of a processor, or a name that ROS does not take
         return
     for one in shares:
         if one.share > 1.0:

@@ -256,7 +256,7 @@ def _add_entries(root: Node, included: Node, path: Path, problems: Problems) -> 
             root.items[key] = below
         elif (*path, key) == ("volery",):
             continue
-        elif len(path) < 2 and isinstance(own.value, dict) and isinstance(below.value, dict):
+        elif not names_are_free(path) and isinstance(own.value, dict) and isinstance(below.value, dict):
             _add_entries(own, below, (*path, key), problems)
         else:
             what = f"{below.where} states it, too"

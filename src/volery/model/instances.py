@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from graphlib import CycleError, TopologicalSorter
 from typing import Annotated, Any
 
-from volery.base.errors import Location
+from volery.base.errors import Location, choices
 from volery.model import rules
 from volery.model.components import (
     ACTIVITY,
@@ -193,12 +193,30 @@ def _instance_target(reading: Reading, path: Path, interface: str, text: str) ->
         return Target(TargetKind.INSTANCE, name, port)
     if port in component.provides:
         provided, candidates = component.provides[port], _candidates(reading, interface)
-        what = f"{text} provides {provided}, not {interface}; {candidates}"
+        differs = _difference(reading, interface, provided)
+        what = f"{text} provides {provided}, not {interface}{differs}; {candidates}"
+        reading.problems.add(path, what, rule=rules.INTERFACE_MISMATCH)
     else:
         has = ", ".join(f"{name}.{provided}" for provided in component.provides) or "no provided port"
         what = f"{text!r} is no provided port; {name} has {has}"
-    reading.problems.add(path, what)
+        reading.problems.add(path, what, rule=rules.UNKNOWN_NAME)
     return None
+
+
+def _difference(reading: Reading, required: str, provided: str) -> str:
+    """Return how the operations of two interfaces differ: methods that are missing, and other types."""
+    wanted, offered = ({} if one is None else one.items for one in _interfaces(reading, required, provided))
+    missing = [name for name in wanted if name not in offered]
+    other = [
+        name for name, node in wanted.items() if name in offered and node.plain() != offered[name].plain()
+    ]
+    parts = [f"it has no {choices(missing)}"] if missing else []
+    parts += [f"other types in {choices(other)}"] if other else []
+    return f" ({'; '.join(parts)})" if parts else " (of the same operations)"
+
+
+def _interfaces(reading: Reading, *names: str) -> Iterator[Node | None]:
+    return (reading.root.at(("interfaces", name)) for name in names)
 
 
 # -- instances

@@ -227,7 +227,7 @@ SPOILT = {
         ("routes: planner.paths", "routes: control.service"),
         "routes: control.service",
         "application.central.routes",
-        ["control.service provides DroneService, not Routing; Routing is provided by planner.paths"],
+        ["control.service provides DroneService, not Routing (it has no get_path); Routing is provided by"],
     ),
     "a list for one port": (
         ("routes: planner.paths", "routes: [planner.paths, planner.paths]"),
