@@ -83,7 +83,7 @@ def fly_watched(
         during: called with the fleet and the drone before the flight.
         after_s: time that passes after the flight, s.
     """
-    url = f"sim:{DRONE}?start=warm&attitude=20&rate=20&rc=20{options}"
+    url = f"sim:{DRONE}?start=warm&attitude=50&rate=20&rc=20{options}"
     opened = open_vehicles({DRONE: url}, {DRONE: Drone}, VehicleSettings())
     kernel, fleet, watched = opened.kernel, opened.fleet, Watched()
     drone = opened.vehicles[0]

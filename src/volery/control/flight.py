@@ -45,7 +45,6 @@ class ControlledFlight:
         switch: the operator's switch; ``None`` flies without one.
         period: sample time, ns.
         height: height of the take-off, m above home.
-        lands: whether it lands at the end.
         on_sample: called before each sample of the manoeuvre with the time in s since it began, for pushes
             and changes of gains.
     """
@@ -59,11 +58,10 @@ class ControlledFlight:
         switch: SwitchSettings | None = None,
         period: Ns = PERIOD,
         height: float = 5.0,
-        lands: bool = True,
         on_sample: Callable[[float], None] = lambda _: None,
     ) -> None:
         self._drone, self._manoeuvre, self._actuation = drone, manoeuvre, actuation
-        self._switch, self._period, self._height, self._lands = switch, period, height, lands
+        self._switch, self._period, self._height = switch, period, height
         self._on_sample = on_sample
         self._landing = Landing()
         self._state = SwitchState()
@@ -87,7 +85,7 @@ class ControlledFlight:
         if not self._drone.flying:
             self._blocking(lambda: self._actuation.take_off(self._height))
             self._engaged = self.authority is Authority.AUTONOMOUS
-        if self._fly(self._manoeuvre) and self._lands:
+        if self._fly(self._manoeuvre):
             self._land()
 
     # -- the switch

@@ -16,7 +16,7 @@ from volery.control.actuation import Command, Measured
 from volery.control.laws import DEGREES, Law, OnOffGains, OnOffLaw, PidGains, PidLaw, Terms, per_sample
 
 YAW_GAINS = PidGains(
-    kp=3.0, ki=0.1, kd=0.15, filter_s=0.05, low=-200.0, high=200.0, deceleration=150.0, period=DEGREES
+    kp=2.2, ki=0.02, kd=0.1, filter_s=0.05, low=-200.0, high=200.0, deceleration=170.0, period=DEGREES
 )
 """From degrees of heading to degrees/s."""
 POSITION_GAINS = PidGains(kp=0.9, ki=0.02, low=-4.0, high=4.0, deceleration=1.2)

@@ -21,14 +21,14 @@ from volery.control.manoeuvres import Manoeuvre, set_gains
 from volery.control.safety_switch import SwitchSettings
 from volery.run.fly import fly
 from volery.run.result import Options, Run
-from volery.trace.events import Text
+from volery.trace.events import Event, Stream, Text
 from volery.vehicles import Drone
 from volery.vehicles.address import MAVLINK_OPTIONS, parse
 from volery.vehicles.driver import drivers
 
 SETPOINTS, RC = "setpoints", "rc"
 WAYS = (SETPOINTS, RC)
-RATES = {"rate": "20", "attitude": "25", "rc": "20"}
+RATES = {"rate": "20", "attitude": "50", "rc": "20"}
 """Telemetry that a control loop needs, Hz, unless the address states other rates."""
 READ_AGAIN_S = 1.0
 """Time after which a file of gains is read again."""
@@ -82,7 +82,12 @@ def with_rates(url: str, switch: SwitchSettings | None) -> str:
 
 
 def go(
-    make: Callable[[], Manoeuvre], on: str, settings: GoSettings, options: Options, *, lands: bool = True
+    make: Callable[[], Manoeuvre],
+    on: str,
+    settings: GoSettings,
+    options: Options,
+    *,
+    listener: Callable[[Event], None] | None = None,
 ) -> Run:
     """Fly a manoeuvre and return the record.
 
@@ -91,7 +96,7 @@ def go(
         on: address of the vehicle.
         settings: how it is flown.
         options: options of the run.
-        lands: whether the flight lands at its end.
+        listener: called with each event of the run while the mission lasts.
 
     Raises:
         UsageError: the address, the gains or the settings are wrong; nothing has started.
@@ -108,9 +113,11 @@ def go(
             switch=settings.switch,
             period=settings.period,
             height=settings.height,
-            lands=lands,
             on_sample=gains.watch(drone) if gains is not None else lambda _: None,
         )
+        stream = drone.kernel.record
+        if listener is not None and isinstance(stream, Stream):
+            stream.tap(listener)
         drone.wait_ready()
         flight.run()
 

@@ -119,7 +119,7 @@ def _fly(law: str, folder: Path, on: str, seed: int) -> Flown:
         period = 50 * MS if ours else 100 * MS
         ControlledFlight(drone, turns, actuation, period=period).run()
 
-    rates = "attitude=25&rate=20" if law == OURS else "attitude=10&rate=10"
+    rates = "attitude=50&rate=20" if law == OURS else "attitude=10&rate=10"
     address = f"{on}{'&' if '?' in on else '?'}{rates}"
     run = fly(mission, address, Options(out=folder, seed=seed))
     if run.error is not None:

@@ -21,9 +21,9 @@ LOOPS = {"yaw": PidGains(kp=1.0, ki=0.5)}
 
 
 def test_the_telemetry_of_a_loop_is_requested_unless_stated() -> None:
-    assert with_rates("sim:ardupilot", None) == "sim:ardupilot?rate=20&attitude=25"
-    assert with_rates("ardupilot+udp://:14550?attitude=50", SwitchSettings()) == (
-        "ardupilot+udp://:14550?attitude=50&rate=20&rc=20"
+    assert with_rates("sim:ardupilot", None) == "sim:ardupilot?rate=20&attitude=50"
+    assert with_rates("ardupilot+udp://:14550?attitude=10", SwitchSettings()) == (
+        "ardupilot+udp://:14550?attitude=10&rate=20&rc=20"
     )
     assert with_rates("sim:ardupilot", SwitchSettings(channel=7)).endswith("transmitter=7:1450")
     assert with_rates("sim:dji", None) == "sim:dji"

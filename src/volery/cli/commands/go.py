@@ -67,7 +67,7 @@ def rotation(
     """Take off, turn to one heading after the other, and land."""
     from volery.control.manoeuvres import Rotation
 
-    settings = _switch(switch, on_rc_loss, on_telemetry_loss)
+    settings = parse_switch(switch, on_rc_loss, on_telemetry_loss)
     return _go(
         output, "rotation", lambda: Rotation(angle, hold), on, by, height, gains, settings, seed, speed, out
     )
@@ -92,7 +92,7 @@ def altitude(
     """Take off, climb or descend to one height after the other, and land."""
     from volery.control.manoeuvres import Altitude
 
-    settings = _switch(switch, on_rc_loss, on_telemetry_loss)
+    settings = parse_switch(switch, on_rc_loss, on_telemetry_loss)
     return _go(
         output, "altitude", lambda: Altitude(to, hold), on, by, height, gains, settings, seed, speed, out
     )
@@ -136,7 +136,7 @@ def waypoints(
     def make() -> Manoeuvre:
         return manoeuvres.Waypoints(points, tolerance=tolerance, hold_s=hold, rounds=rounds)
 
-    settings = _switch(switch, on_rc_loss, on_telemetry_loss)
+    settings = parse_switch(switch, on_rc_loss, on_telemetry_loss)
     return _go(output, "waypoints", make, on, by, height, gains, settings, seed, speed, out)
 
 
@@ -157,13 +157,14 @@ def land(
     """Land in steps of descent with the heading kept, and disarm; take off first if the vehicle stands."""
     from volery.control.manoeuvres import Altitude
 
-    settings = _switch(switch, on_rc_loss, on_telemetry_loss)
+    settings = parse_switch(switch, on_rc_loss, on_telemetry_loss)
     return _go(
         output, "land", lambda: Altitude([height], 0.1), on, by, height, gains, settings, seed, speed, out
     )
 
 
-def _switch(text: str, on_rc_loss: str, on_telemetry_loss: str) -> SwitchSettings | None:
+def parse_switch(text: str, on_rc_loss: str, on_telemetry_loss: str) -> SwitchSettings | None:
+    """Return the settings of the safety switch, or None for ``none``."""
     from volery.control.safety_switch import SwitchSettings, parse_reaction
 
     rc, telemetry = parse_reaction(on_rc_loss), parse_reaction(on_telemetry_loss)
