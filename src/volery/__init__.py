@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from volery.components.component_api import note as note
     from volery.components.component_api import now as now
     from volery.components.component_api import sleep as sleep
+    from volery.model.builder import ModelBuilder as ModelBuilder
     from volery.run.connect import connect as connect
     from volery.run.connect import connect_fleet as connect_fleet
     from volery.run.fly import fly as fly

@@ -10,6 +10,7 @@ from volery.base.errors import ModelError
 from volery.checks.ros_rules import ROS_RULES
 from volery.checks.system_rules import SYSTEM_RULES
 from volery.model import rules
+from volery.model.builder import ModelBuilder
 from volery.model.design import Suppression
 from volery.model.reading import Vocabulary
 from volery.model.rules import Finding
@@ -40,11 +41,11 @@ class CheckedModel:
         return tuple(one for one in self.findings if one.rule.level == "error")
 
 
-def check(path: Path, vocabulary: Vocabulary, overrides: Iterable[str] = ()) -> CheckedModel:
+def check(path: Path | ModelBuilder, vocabulary: Vocabulary, overrides: Iterable[str] = ()) -> CheckedModel:
     """Check a model with each of its allocations and scenarios, and load its Python components.
 
     Args:
-        path: The model's file, or its folder.
+        path: The model's file or its folder, or a model that was built in Python.
         vocabulary: Names that are defined outside the model.
         overrides: Changes ``path=value``.
 
@@ -83,7 +84,7 @@ def _is_fault(gap: Finding, system: System) -> bool:
 
 
 def _loaded(
-    path: Path,
+    path: Path | ModelBuilder,
     vocabulary: Vocabulary,
     scenario: str | None,
     allocation: str | None,

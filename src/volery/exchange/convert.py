@@ -13,7 +13,7 @@ from volery.exchange.sysml import sysml_text
 from volery.exchange.uml.context import Note
 from volery.exchange.uml.uml_model import Imported, export_uml, import_uml
 from volery.exchange.uml.xmi import MOST_BYTES
-from volery.model.assembly import DEFAULT_FILE, read_tree
+from volery.model.assembly import model_file, read_tree
 from volery.model.writing import model_text
 
 FORMATS = {".uml": "UML with MARTE and S3D", ".aadl": "AADL", ".sysml": "SysML v2"}
@@ -84,7 +84,7 @@ def export_model(model: Path, target: Path, catalogue: Iterable[str]) -> tuple[N
     if target.suffix not in FORMATS:
         listed = choices([f"{ending} ({what})" for ending, what in FORMATS.items()])
         raise UsageError(f"{target}: its ending chooses the format: {listed}")
-    file = model / DEFAULT_FILE if model.is_dir() else model
+    file = model_file(model)
     tree = read_tree(file).plain()
     if target.suffix == ".uml":
         base = read_uml(target, file.parent, catalogue) if target.exists() else None

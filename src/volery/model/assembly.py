@@ -14,6 +14,7 @@ from pathlib import Path as FilePath
 from volery.base import files
 from volery.base.errors import Location, ModelError, UsageError
 from volery.model import rules
+from volery.model.builder import TEXT_NAME, ModelBuilder
 from volery.model.document import GEOGRAPHY, keys_at, names_are_free, short_key
 from volery.model.system import Source
 from volery.model.text import (
@@ -193,6 +194,12 @@ DEFAULT_FILE = "model.yaml"
 """The file that a folder stands for."""
 
 
+def model_file(path: str | FilePath) -> FilePath:
+    """Return the file of a model: *path*, or the ``model.yaml`` of that folder."""
+    path = FilePath(path)
+    return path / DEFAULT_FILE if path.is_dir() else path
+
+
 def read_tree(file: FilePath) -> Node:
     """Return the tree of a model as its files state it, without an allocation or a scenario.
 
@@ -210,6 +217,15 @@ def _read_files(file: FilePath) -> tuple[Assembly, Problems]:
     made = Assembly(root, (Source(file.name, text),))
     problems = Problems(root.locate)
     _include(made, root, file.parent, problems, (file.resolve(),))
+    return made, problems
+
+
+def _built(model: ModelBuilder) -> tuple[Assembly, Problems]:
+    """Return the tree of a model that was built in Python, with the files that it includes."""
+    root = model.root.copy()
+    made = Assembly(root, (Source(TEXT_NAME, model.text()),))
+    problems = Problems(root.locate)
+    _include(made, root, model.folder, problems, ())
     return made, problems
 
 
@@ -267,9 +283,10 @@ def _allowed(root: Node, folder: FilePath, file: FilePath) -> bool:
     return is_inside(file, [folder, *(folder / one for one in stated_texts(root, "files_from"))])
 
 
-def assemble(file: FilePath, selection: Selection) -> tuple[Assembly, Problems]:
-    """Read *file* and the files that it names, and apply the selection. Return the tree and its problems."""
-    made, problems = _read_files(file)
+def assemble(model: FilePath | ModelBuilder, selection: Selection) -> tuple[Assembly, Problems]:
+    """Read *model* and the files that it names, and apply the selection. Return the tree and its problems."""
+    made, problems = _built(model) if isinstance(model, ModelBuilder) else _read_files(model)
+    folder = model.folder if isinstance(model, ModelBuilder) else model.parent
     root = made.root
     early, late = _parted(selection.options)
     apply_changes(root, early, problems)
@@ -278,7 +295,7 @@ def assemble(file: FilePath, selection: Selection) -> tuple[Assembly, Problems]:
         *_choose_allocation(made, selection, problems),
         *late,
     ]
-    _merge_world(made, file.parent, all_changes, problems)
+    _merge_world(made, folder, all_changes, problems)
     apply_changes(root, all_changes, problems)
     return made, problems
 

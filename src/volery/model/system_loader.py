@@ -12,7 +12,15 @@ from pathlib import Path as FilePath
 
 from volery.base.errors import ModelError, choices
 from volery.model import rules
-from volery.model.assembly import DEFAULT_FILE, NOT_PLACES, Assembly, Selection, assemble, change_from_option
+from volery.model.assembly import (
+    NOT_PLACES,
+    Assembly,
+    Selection,
+    assemble,
+    change_from_option,
+    model_file,
+)
+from volery.model.builder import ModelBuilder
 from volery.model.components import Figure
 from volery.model.document import DOCUMENT, Document
 from volery.model.environment import Environment, Vehicle
@@ -85,7 +93,7 @@ RESERVED = ("application", "environment", NOTE_PREFIX)
 
 
 def load(
-    path: str | FilePath,
+    model: str | FilePath | ModelBuilder,
     vocabulary: Vocabulary,
     scenario: str | None = None,
     allocation: str | None = None,
@@ -94,7 +102,7 @@ def load(
     """Read a model.
 
     Args:
-        path: The model's file, or a folder with a ``model.yaml``.
+        model: The model's file, a folder with a ``model.yaml``, or a model that was built in Python.
         vocabulary: Names that are defined outside the model.
         scenario: The scenario; None for the model without one.
         allocation: The allocation; None for the scenario's, or the first of the model.
@@ -106,9 +114,10 @@ def load(
     """
     options = tuple(overrides)
     selection = Selection(scenario, allocation, tuple(change_from_option(text) for text in options))
-    file = FilePath(path) / DEFAULT_FILE if FilePath(path).is_dir() else FilePath(path)
-    made, problems = assemble(file, selection)
-    reading = Reading(made.root, problems, vocabulary, file.parent)
+    source = model if isinstance(model, ModelBuilder) else model_file(model)
+    folder = source.folder if isinstance(source, ModelBuilder) else source.parent
+    made, problems = assemble(source, selection)
+    reading = Reading(made.root, problems, vocabulary, folder)
     catalogues = _read_catalogues(reading)
     _, document = read_child(DOCUMENT, made.root, (), reading)
     if document is None:
@@ -116,34 +125,6 @@ def load(
     system = _resolve(reading, document, made)
     problems.raise_if_any()
     return replace(system, overrides=options, catalogues=catalogues, warnings=problems.warnings)
-
-
-def check(path: str | FilePath, vocabulary: Vocabulary, overrides: Iterable[str] = ()) -> System:
-    """Read the model with each of its allocations and each of its scenarios; return it as it stands.
-
-    The result has the warnings of all of them.
-
-    Raises:
-        ModelError: the problems of all of them.
-    """
-    options = tuple(overrides)
-    system = load(path, vocabulary, overrides=options)
-    found: dict[str, ModelError] = {}
-    warnings = dict.fromkeys(system.warnings)
-    variants = [(None, name) for name in system.allocations] + [(name, None) for name in system.scenarios]
-    for scenario, allocation in variants:
-        try:
-            variant = load(path, vocabulary, scenario, allocation, options)
-            warnings.update(dict.fromkeys(variant.warnings))
-        except CollectedModelError as several:
-            found |= {str(error): error for error in several.errors}
-        except ModelError as error:
-            found[str(error)] = error
-    if len(found) == 1:
-        raise next(iter(found.values()))
-    if found:
-        raise CollectedModelError(found.values())
-    return replace(system, warnings=tuple(warnings))
 
 
 def _read_catalogues(reading: Reading) -> tuple[FilePath, ...]:

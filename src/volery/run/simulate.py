@@ -11,6 +11,7 @@ from volery.base.errors import CapabilityError, UsageError, choices
 from volery.base.time import MS, Ns
 from volery.components.cpp.build import build_framework
 from volery.kernel.virtual import VirtualKernel
+from volery.model.builder import ModelBuilder
 from volery.model.system import System
 from volery.model.system_loader import load
 from volery.requirements.verdicts import Observers
@@ -54,7 +55,7 @@ GOAL_PERIOD: Ns = 100 * MS
 
 
 def simulate(
-    model: System | str | Path,
+    model: System | ModelBuilder | str | Path,
     options: Options = DEFAULT_OPTIONS,
     *,
     scenario: str | None = None,
@@ -66,7 +67,7 @@ def simulate(
     The same model, options and seed give the same trace, byte for byte.
 
     Args:
-        model: A file, a folder with a ``model.yaml``, or a ``System``.
+        model: A file, a folder with a ``model.yaml``, a ``ModelBuilder``, or a ``System``.
         options: Fidelity, seed, pace, run folder and progress reports.
         scenario: Scenario of a model that is read from a file.
         allocation: Allocation of a model that is read from a file; None for its first.

@@ -106,6 +106,21 @@ def test_several_faults_are_found_in_one_check(bench):
     assert {one.rule.code for one in bench.check().errors} == {"V103", "V208", "V201"}
 
 
+def test_every_allocation_and_scenario_is_checked(bench):
+    frequency = "platform.processors.onboard.frequency"
+    bench.change("environment:", f"  slow: {{extends: all, set: {{{frequency}: 60 MHz}}}}\nenvironment:")
+    bench.change("environment.wind: 0 m/s", "environment.wind: 0 kg")
+    assert {(one.rule.code, one.where.line) for one in bench.check().errors} == {
+        ("V403", bench.line_of("slow: {")),
+        ("V106", bench.line_of("calm:")),
+    }
+
+
+def test_a_warning_of_every_variant_is_found_once(bench):
+    bench.change("value: 1500 MHz", "value: 1450 MHz")
+    assert [one.rule.code for one in bench.check().findings] == ["V404"]
+
+
 def test_codes_and_names_of_rules_are_unique_and_stable_in_form():
     names = [one.name for one in RULES.values()]
     assert len(set(names)) == len(names)

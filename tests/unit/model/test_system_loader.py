@@ -13,7 +13,7 @@ from volery.model.faults import MotorDead
 from volery.model.instances import Connection, Target, TargetKind
 from volery.model.reading import ProcessorKind
 from volery.model.system import Chain
-from volery.model.system_loader import check, load
+from volery.model.system_loader import load
 
 
 def test_units_are_si_and_times_nanoseconds(workshop):
@@ -235,16 +235,6 @@ def test_an_unknown_name_is_looked_up(workshop):
         workshop.load().vehicle("drone_2")
 
 
-def test_check_tries_every_allocation_and_scenario(workshop):
-    assert check(workshop.file, workshop.vocabulary).allocation == "fast"
-    workshop.change("600 MHz", "60 MHz").change("environment.wind: 0 m/s", "environment.wind: 0 kg")
-    assert workshop.load().allocation == "fast"
-    with pytest.raises(ModelError) as caught:
-        check(workshop.file, workshop.vocabulary)
-    assert "60 MHz is outside what is known of rpi4-cortex-a72" in str(caught.value)
-    assert "environment.wind.speed" in str(caught.value)
-
-
 def test_unknown_scenario_and_allocation_are_the_callers_fault(workshop):
     with pytest.raises(UsageError, match=r"no scenario named 'poket' \(did you mean 'pocket'\?\)"):
         workshop.load("poket")
@@ -273,10 +263,6 @@ def test_a_frequency_between_two_settings_is_a_warning_that_names_them(workshop)
 def test_a_processor_whose_settings_are_not_known_is_not_warned_of(workshop):
     board = "platform.processors.ground={is: intel-i5-3470, frequency: 1650 MHz}"
     assert workshop.load(None, None, board).warnings == ()
-
-
-def test_a_check_has_the_warnings_of_every_variant_once(workshop):
-    assert len(check(workshop.file, workshop.vocabulary, [BOARD % 1450]).warnings) == 1
 
 
 def test_a_catalogue_that_the_model_brings_along(workshop):

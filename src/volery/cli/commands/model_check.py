@@ -36,15 +36,14 @@ def check(output: Output, model: Model, overrides: Overrides = None, format_: Fo
         raise UsageError(f"--format {format_}: give {choices(FORMATS)}")
     from volery.checks.findings import check as check_model
     from volery.checks.sarif import sarif
-    from volery.model.assembly import DEFAULT_FILE
+    from volery.model.assembly import model_file
     from volery.run.assembly.model_checks import vocabulary
 
     checked = check_model(model, vocabulary(), overrides or ())
     if format_ == "text":
         _show(output, checked)
     else:
-        file = model / DEFAULT_FILE if model.is_dir() else model
-        data = _data(checked) if format_ == "json" else sarif(checked, file)
+        data = _data(checked) if format_ == "json" else sarif(checked, model_file(model))
         output.results.print(
             json.dumps(data, indent=2, ensure_ascii=False), markup=False, highlight=False, soft_wrap=True
         )
