@@ -15,16 +15,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from enum import Enum
+from functools import partial
 from typing import Any
 
-from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
+from volery.base.errors import Refused, UsageError, VoleryError, choices, did_you_mean
 from volery.base.time import to_seconds
 from volery.testing.checks import CHECKS, Check, CheckFailedError, NotPossibleError
 from volery.testing.driver_checks import GROUPS
 from volery.testing.stage import RealStage, SimulatedStage, Stage, kind_of
 from volery.vehicles.address import Address, parse
+from volery.vehicles.telemetry import describe_state
 
 
 class Outcome(Enum):
@@ -63,11 +65,21 @@ Show = Callable[[Check, Result | None], None]
 
 @dataclass(frozen=True)
 class Report:
-    """Results of all checks at an address."""
+    """Results of the checks at an address.
+
+    Attributes:
+        url: The address.
+        seed: Seed of the simulation.
+        results: Results in the order of execution.
+        interrupted: The checks were ended before the last one, by Ctrl-C or SIGTERM.
+        left: Why a real vehicle does not stand on the ground at the end; empty if it does.
+    """
 
     url: str
     seed: int
     results: tuple[Result, ...]
+    interrupted: bool = False
+    left: str = ""
 
     @property
     def faults(self) -> tuple[Result, ...]:
@@ -76,13 +88,20 @@ class Report:
 
     @property
     def conforms(self) -> bool:
-        """Whether no check failed."""
-        return not self.faults
+        """Whether all checks were run, none failed, and the vehicle stands on the ground."""
+        return not (self.faults or self.interrupted or self.left)
 
     def as_data(self) -> dict[str, Any]:
         """Return the report as values for JSON."""
         results = [{**asdict(one), "outcome": one.outcome.value} for one in self.results]
-        return {"url": self.url, "seed": self.seed, "conforms": self.conforms, "results": results}
+        return {
+            "url": self.url,
+            "seed": self.seed,
+            "conforms": self.conforms,
+            "interrupted": self.interrupted,
+            "left": self.left,
+            "results": results,
+        }
 
 
 def conformance(
@@ -96,6 +115,10 @@ def conformance(
     show: Show | None = None,
 ) -> Report:
     """Run the checks on a vehicle and return their results.
+
+    ``KeyboardInterrupt`` ends the checks; the report has the results so far. A real vehicle is landed after
+    each check and at the end; if that fails, the checks that fly are not run any more, and the report says
+    where the vehicle is.
 
     Args:
         url: Address of the vehicle. A simulated vehicle is new for every check.
@@ -113,11 +136,17 @@ def conformance(
     address = parse(url)
     wanted = chosen(only, kind)
     report = show or _report_nothing
-    if address.transport == "sim":
-        results = [_simulated(one, address, kind, seed, report) for one in wanted]
-    else:
-        results = _real(wanted, RealStage(address, kind_of(kind), second), fly, report)
-    return Report(url, seed, tuple(results))
+    results: list[Result] = []
+    left, interrupted = "", False
+    try:
+        if address.transport == "sim":
+            for one in wanted:
+                results.append(_simulated(one, address, kind, seed, report))
+        else:
+            left = _real(wanted, RealStage(address, kind_of(kind), second), fly, report, results)
+    except KeyboardInterrupt:
+        interrupted = True
+    return Report(url, seed, tuple(results), interrupted or len(results) < len(wanted), left)
 
 
 def chosen(only: Sequence[str] = (), kind: str = "drone") -> list[Check]:
@@ -145,39 +174,62 @@ def _simulated(one: Check, address: Address, kind: str, seed: int, report: Show)
     return result
 
 
-def _real(wanted: list[Check], stage: RealStage, fly: bool, report: Show) -> list[Result]:
-    results = []
+def _real(wanted: list[Check], stage: RealStage, fly: bool, report: Show, results: list[Result]) -> str:
+    """Append the results of the checks; return why the vehicle does not stand on the ground, else empty."""
+    left = ""
     stage.kernel.start()
     try:
         with stage.kernel.adopt("conformance"):
             stage.drone.wait_connected()
-            try:
+            if stage.in_the_air:
+                raise Refused(
+                    stage.name, "check it", "it flies; land it first: the checks begin on the ground"
+                )
+            with suppress(KeyboardInterrupt):
                 for one in wanted:
                     report(one, None)
                     results.append(_on_real(one, stage, fly))
                     report(one, results[-1])
-            except KeyboardInterrupt:
-                with suppress(VoleryError):
-                    stage.rest()
-                raise
+            left = _left_in_the_air(stage)
     finally:
         stage.close()
-    return results
+    return left
 
 
-def _on_real(one: Check, stage: RealStage, fly: bool) -> Result:
-    if one.lets_fall or one.neighbour or one.cold:
-        why = "in simulation only"
-        return Result(one.name, one.group, one.demands, Outcome.IMPOSSIBLE, why)
-    if one.flies and not fly:
-        return Result(one.name, one.group, one.demands, Outcome.IMPOSSIBLE, "it flies: permit it with --fly")
-    result = _judged(one, stage, lambda: _play(one, stage))
+def _left_in_the_air(stage: RealStage) -> str:
+    """Bring the vehicle to rest at the end; a second signal ends that, too."""
+    try:
+        return _not_at_rest(stage)
+    except KeyboardInterrupt:
+        flying = ", FLYING" if stage.in_the_air else ""
+        return f"a second signal ended its landing: {describe_state(stage.drone.telemetry)}{flying}"
+
+
+def _not_at_rest(stage: RealStage) -> str:
+    """Bring the vehicle to rest; return why that was not possible, else empty."""
     try:
         stage.rest()
     except VoleryError as error:
-        detail = f"{result.detail}; afterwards it did not come to rest: {error}".removeprefix("; ")
-        return Result(one.name, one.group, one.demands, Outcome.FAILED, detail, result.seconds)
-    return result
+        return str(error)
+    return ""
+
+
+def _on_real(one: Check, stage: RealStage, fly: bool) -> Result:
+    impossible = partial(Result, one.name, one.group, one.demands, Outcome.IMPOSSIBLE)
+    if one.lets_fall or one.neighbour or one.cold:
+        return impossible("in simulation only")
+    if one.flies and not fly:
+        return impossible("it flies: permit it with --fly")
+    if one.flies and stage.in_the_air:
+        left = _not_at_rest(stage)
+        if left:
+            return impossible(f"the vehicle flies since an earlier check: {left}")
+    result = _judged(one, stage, lambda: _play(one, stage))
+    left = _not_at_rest(stage)
+    if not left:
+        return result
+    detail = f"{result.detail}; afterwards it did not come to rest: {left}".removeprefix("; ")
+    return replace(result, outcome=Outcome.FAILED, detail=detail)
 
 
 class _LackingError(Exception):

@@ -38,9 +38,11 @@ from volery.vehicles import Drone, Rover, Vehicle
 from volery.vehicles.address import Address, open_link, parse
 from volery.vehicles.driver import Driver, drivers
 from volery.vehicles.executor import StepExecutor
-from volery.vehicles.telemetry import Telemetry
+from volery.vehicles.telemetry import Telemetry, describe_state
 
 FIRST_MESSAGE_S = 10.0
+SEEN_WITHIN: Ns = 5 * S
+"""Time within which what one link shows is seen on another."""
 
 STATION, CONSOLE = 255, 190
 """Usual system and component id of a ground station on MAVLink."""
@@ -86,6 +88,11 @@ class Commander:
         }
         self._link.send(Frame("COMMAND_INT", fields, STATION, CONSOLE))
 
+    @property
+    def has_control(self) -> bool:
+        """Whether the vehicle is in the mode that this station has commanded last."""
+        return bool(self.seen.mode) and self.seen.mode == self._executor.commanded
+
     def close(self) -> None:
         """Close the drivers."""
         self._driver.close()
@@ -106,6 +113,11 @@ class Stage(ABC):
     def name(self) -> str:
         """Name of the vehicle."""
         return str(self.drone.name)
+
+    @property
+    def in_the_air(self) -> bool:
+        """Whether the vehicle flies; its landed state may be reported after it has disarmed."""
+        return bool(self.drone.telemetry.armed and self.drone.telemetry.flying)
 
     # -- time and place
 
@@ -182,6 +194,10 @@ class Stage(ABC):
     def another_program(self) -> Any:
         """Return the same vehicle for a program that starts now, on a link of its own."""
 
+    def end_program(self) -> None:
+        """End the program under test as a crash does: its link goes silent, the vehicle gets no last word."""
+        self.drone.close()
+
     # -- what only a simulation can do
 
     @property
@@ -223,8 +239,17 @@ class RealStage(Stage):
         self._second = parse(second) if second else None
         if self._second is not None and self._second.driver != address.driver:
             raise UsageError(f"{second} is not a second link to {address}: it names another driver")
-        self._link_control, self.driver = self._open(address)
-        self.drone = kind(self.kernel, address.driver, self.driver)
+        self._start_program()
+
+    def _start_program(self) -> None:
+        self._link_control, self.driver = self._open(self._address)
+        self.drone = self._kind(self.kernel, self._address.driver, self.driver)
+        self._ended = False
+
+    def end_program(self) -> None:
+        """See ``Stage``; ``rest`` starts it again."""
+        super().end_program()
+        self._ended = True
 
     def _open(self, address: Address, **more: str) -> tuple[ControlledLink, Driver]:
         if address.transport in (EMBEDDED, *GRAPHS):
@@ -273,10 +298,29 @@ class RealStage(Stage):
         raise NotPossibleError("needs a second vehicle on the same link")
 
     def rest(self) -> None:
-        """Restore the link and land the vehicle, unless another commander controls it."""
+        """Restore the link and land the vehicle; the other station of a check lands what it has taken.
+
+        Raises:
+            VehicleError: A pilot or a station that is not of the checks controls the vehicle in the air.
+            LinkError: The link did not return.
+        """
         self._link_control.restore()
-        super().rest()
-        self.drone.come_to_rest()
+        if self._ended:
+            self._start_program()
+            self.drone.wait_connected()
+        try:
+            said = self.drone.come_to_rest()
+            for other in self._others:
+                if self.in_the_air and other.has_control:
+                    other.land()
+                    seen: Telemetry = self.drone.telemetry
+                    seen.changed.wait_for(lambda: not self.in_the_air, SEEN_WITHIN)
+        finally:
+            super().rest()
+        if self.in_the_air:
+            raise VehicleError(
+                self.name, "come to rest", f"it {said}, {describe_state(self.drone.telemetry)}"
+            )
 
     def close(self) -> None:
         """Close the drivers."""

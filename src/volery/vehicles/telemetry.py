@@ -104,6 +104,7 @@ class Telemetry:
         answers: last acknowledgement by key.
         rc: pulse widths of the RC channels as the autopilot reads them, µs; 0 or 65535 where there is none.
         rc_ns: time of their last report; -1 before the first.
+        home_ns: time since which the present home position is reported; -1 without one.
         detects_silence: whether a silence is one of the link, not of a node that does not run its loop.
         stream_lost: how a stream of this program was interrupted, so that a failsafe of the autopilot acts.
     """
@@ -136,7 +137,8 @@ class Telemetry:
         self.above_home = nan
         self.amsl_known = True
         self.amsl_remedy = ""
-        self.home: Position | None = None
+        self._home: Position | None = None
+        self.home_ns: Ns = -1
         self.velocity = Velocity(nan, nan, nan)
         self.attitude = Attitude(nan, nan, nan)
         self.battery = Battery(nan, nan, nan)
@@ -194,6 +196,16 @@ class Telemetry:
         age = now - self._position_ns
         lost = age if age > min(allowed, LONGEST_POSITION_AGE) else 0
         return max(lost, now - self._fix_lost_ns if self._fix_lost_ns is not None else 0)
+
+    @property
+    def home(self) -> Position | None:
+        """Home position (AMSL); None before the first report."""
+        return self._home
+
+    @home.setter
+    def home(self, home: Position | None) -> None:
+        if home != self._home:
+            self._home, self.home_ns = home, self._kernel.now()
 
     @property
     def fix(self) -> str:

@@ -188,3 +188,22 @@ def test_velocities_in_the_body_frame_turn_with_the_nose(bench: Any) -> None:
     assert away[0] > 1.5
     assert away[1] > 0.5
     assert rig.vehicle.estimate.attitude[2] > heading + 0.7
+
+
+@pytest.mark.parametrize(("later", "ends_north"), [(0.1, 0.0), (2.2, 20.0)])
+def test_a_return_right_after_home_was_moved_ends_at_the_old_one(
+    later: float, ends_north: float, bench: Any
+) -> None:
+    """Measured on 1.14: it lands 20 m off. The destination is taken from home every two seconds."""
+    rig = bench()
+    rig.ready()
+    latitude, longitude, amsl = rig.vehicle.estimate.geodetic
+    rig.airborne()
+    checked = rig.vehicle.firmware_state._return_checked
+    rig.run_until(lambda: rig.vehicle.firmware_state._return_checked != checked, 3.0)
+    moved = {"x": round((latitude + 20.0 / 111_200.0) * 1e7), "y": round(longitude * 1e7), "z": amsl}
+    assert rig.command_int(179, **moved) == 0
+    rig.run(later)
+    assert rig.mode(4, 5) == 0
+    rig.run_until(lambda: not rig.vehicle.armed)
+    assert rig.ned[0] == pytest.approx(ends_north, abs=2.0)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import signal
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -57,11 +59,12 @@ def conformance(
     """Check a driver and its autopilot: readiness, operations, refusals, other stations, the link.
 
     Each check gets a new simulated vehicle, which flies in virtual time. A real vehicle goes through the
-    checks in order and in real time; checks that arm or fly it are skipped without --fly. Exit status: 0 if
-    no check failed, 2 for bad input, 1 otherwise.
+    checks in order and in real time; checks that arm or fly it are skipped without --fly. It is landed after
+    each check, and after Ctrl-C or SIGTERM; if that fails, the report says so. conformance.json is written
+    after every check. Exit status: 0 if all checks were run and none failed, 2 for bad input, 1 otherwise.
     """
     from volery.run.recording import make_folder
-    from volery.testing.driver_conformance import chosen
+    from volery.testing.driver_conformance import Report, chosen
     from volery.testing.driver_conformance import conformance as run_checks
 
     names = tuple(name.strip() for name in (only or "").split(",") if name.strip())
@@ -69,16 +72,52 @@ def conformance(
         _list_checks(output, chosen(names, kind))
         return OK
     folder = make_folder(out) if out is not None else None
-    with _status(output) as show:
+    found: list[Result] = []
+    with _ended_by_signals(), _progress(output, len(chosen(names, kind))) as progress:
+
+        def show(one: Check, result: Result | None) -> None:
+            progress(one, result)
+            if result is not None:
+                found.append(result)
+                _write(folder, Report(url, seed, tuple(found), interrupted=True))
+
         report = run_checks(url, only=names, kind=kind, fly=allow_flight, seed=seed, second=second, show=show)
-    if folder is not None:
-        text = json.dumps(report.as_data(), indent=2, ensure_ascii=False)
-        (folder / "conformance.json").write_text(text + "\n", encoding="utf-8")
+    _write(folder, report)
     output.show(_result_table(report), _summary(report))
     output.give(report.as_data())
     for fault in report.faults:
         output.complain(f"volery: {url}: {fault.check}: {fault.detail}")
+    if report.interrupted:
+        output.complain(f"volery: {url}: interrupted after {len(report.results)} checks")
+    if report.left:
+        output.complain(f"volery: {url}: THE VEHICLE IS NOT DOWN: {report.left}")
     return OK if report.conforms else FAILED
+
+
+@contextmanager
+def _ended_by_signals() -> Iterator[None]:
+    """Let SIGINT and SIGTERM raise ``KeyboardInterrupt``, also in a job that a shell started with ``&``."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, lambda number, frame: signal.raise_signal(signal.SIGINT))
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _write(folder: Path | None, report: Report) -> None:
+    """Replace conformance.json, if there is a folder for it."""
+    if folder is None:
+        return
+    text = json.dumps(report.as_data(), indent=2, ensure_ascii=False)
+    part = folder / "conformance.json.part"
+    part.write_text(text + "\n", encoding="utf-8")
+    part.replace(folder / "conformance.json")
 
 
 def _list_checks(output: Output, checks: Sequence[Check]) -> None:
@@ -129,20 +168,29 @@ def _summary(report: Report) -> Text:
 
 
 @contextmanager
-def _status(output: Output) -> Iterator[Show | None]:
-    """Show the check in progress on a terminal."""
+def _progress(output: Output, checks: int) -> Iterator[Show]:
+    """Show the check in progress on a terminal; elsewhere print a line for each that has ended."""
     from volery.testing.driver_conformance import Outcome
 
+    done = 0
+
+    def line(one: Check, result: Result | None) -> None:
+        nonlocal done
+        if result is None:
+            return
+        done += 1
+        detail = f": {result.detail}" if result.outcome is Outcome.FAILED else ""
+        output.note(f"{done}/{checks} {one.group}: {one.name}: {result.outcome.value}{detail}")
+
     if not output.shows_progress:
-        yield None
+        yield line
         return
     with Status("", console=output.notes) as status:
-        done = 0
 
         def show(one: Check, result: Result | None) -> None:
             nonlocal done
             if result is None:
-                status.update(f"{done} done; {one.group}: {one.name}")
+                status.update(f"{done} of {checks}; {one.group}: {one.name}")
                 return
             done += 1
             if result.outcome is Outcome.FAILED:

@@ -91,7 +91,7 @@ def commander_silence(stage: Stage) -> str:
     words = stage.driver.on_link_loss()
     witness = stage.another_program()
     witness.wait_connected()
-    stage.drone.close()
+    stage.end_program()
     stage.sleep(20)
     north, east, _ = stage.offset(here, witness.position)
     demand(hypot(north, east) < 30.0, f"it went {hypot(north, east):.0f} m")

@@ -41,6 +41,7 @@ from volery.simulation.autopilots.px4.flight_modes import (
     Return,
     TakeOff,
 )
+from volery.simulation.autopilots.px4.follow_target import FollowTarget
 from volery.simulation.autopilots.px4.modes import INFO, commander_of
 from volery.simulation.autopilots.px4.offboard import AttitudeTarget, Offboard, OffboardTarget
 from volery.simulation.autopilots.vehicle_state import ArmingTimes, Manoeuvre, ParameterTable, Vehicle
@@ -74,6 +75,10 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         **_SHARED,
         "COM_DISARM_LAND": "time after a landing until disarming; 0: never",
         "COM_DISARM_PRFLT": "time after arming without a take-off until disarming; 0: never",
+        "FLW_TGT_DST": "distance from a target that is followed",
+        "FLW_TGT_FA": "angle from the course of that target; 180: behind it",
+        "FLW_TGT_HT": "height over home while following",
+        "FLW_TGT_MAX_VEL": "largest speed while following",
         "MIS_TAKEOFF_ALT": "minimum height of a take-off",
         "MPC_ACC_DOWN_MAX": "largest acceleration down",
         "MPC_ACC_HOR": "acceleration in the plane",
@@ -226,7 +231,7 @@ COPTER_MODES = modes.mode_table(
         ),
         modes.RTL: lambda vehicle: Return(vehicle, report_return_stage),
         modes.LAND: Descent,
-        modes.FOLLOW: Hold,
+        modes.FOLLOW: FollowTarget,
     },
     flies=True,
 )

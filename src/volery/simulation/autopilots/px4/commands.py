@@ -6,10 +6,12 @@ The latter are heartbeats, manual control and set-points.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from math import isfinite, isnan
 from typing import Any, Protocol, runtime_checkable
 
 from volery.base.frames import Vector
+from volery.base.time import Ns, S
 from volery.simulation.autopilots.mavlink.channel import GROUND_STATION
 from volery.simulation.autopilots.mavlink.firmware import MessageHandler
 from volery.simulation.autopilots.mavlink.messages import (
@@ -40,6 +42,7 @@ RETURN, LAND, TAKEOFF, ORBIT = 20, 21, 22, 34
 DO_SET_MODE, CHANGE_SPEED, SET_HOME, FLIGHT_TERMINATION, REPOSITION = 176, 178, 179, 185, 192
 STORAGE, REBOOT, MISSION_START, ARM_DISARM, REQUEST_PROTOCOL = 245, 246, 300, 400, 519
 ROI_LOCATION, ROI_NONE, ROI, GET_HOME, RUN_CHECKS = 195, 197, 201, 410, 401
+MOTOR_TEST, CALIBRATION, ACTUATOR_TEST = 209, 241, 310
 
 CUSTOM_MODE_ENABLED = 1
 CHANGE_MODE = 1
@@ -227,6 +230,66 @@ def on_run_checks(vehicle: Vehicle, _command: Command) -> int:
     return ACCEPTED
 
 
+CALIBRATED_AFTER: Ns = 4 * S
+"""Duration of the calibration of the gyroscope, the barometer and the level (assumed)."""
+GIVEN_UP_AFTER: Ns = 90 * S
+"""Time after which a calibration that needs movements ends without them (assumed)."""
+
+
+def _calibrated(command: Command) -> tuple[str, bool] | None:
+    """Return the name of the sensor to calibrate and whether the vehicle may stand still, or None."""
+    if command.param1 == 1.0:
+        return "gyro", True
+    if command.param2 == 1.0:
+        return "mag", False
+    if command.param3 == 1.0:
+        return "baro", True
+    if command.x == 2.0:
+        return "level", True
+    return ("accel", False) if command.x in (1.0, 4.0) else None
+
+
+def on_calibration(vehicle: Vehicle, command: Command) -> int:
+    """Handle PREFLIGHT_CALIBRATION: a new one, or all zero, ends the one in hand.
+
+    A vehicle that stands cannot turn to the sides that accelerometer and compass need: those fail.
+    """
+    commander = commander_of(vehicle)
+    if vehicle.armed:
+        return TEMPORARILY_REJECTED
+    for step in commander.calibration:
+        step.cancel()
+    if commander.calibration:
+        commander.calibration = []
+        vehicle.send_text(INFO, "[cal] calibration cancelled\t")
+    asked = _calibrated(command)
+    if asked is None:
+        return DENIED if any((command.param1, command.param2, command.param3, command.x)) else ACCEPTED
+    sensor, stands = asked
+    last = f"done: {sensor}" if stands else "failed: timeout: no motion"
+    texts = [f"calibration started: 2 {sensor}"]
+    texts += [f"progress <{percent}>" for percent in range(0, 101, 20)] if stands else []
+    texts.append(f"calibration {last}")
+    whole = CALIBRATED_AFTER if stands else GIVEN_UP_AFTER
+    kernel = vehicle.kernel
+
+    def say(number: int) -> None:
+        vehicle.send_text(INFO, f"[cal] {texts[number]}\t")
+        if number == len(texts) - 1:
+            commander.calibration = []
+
+    commander.calibration = [
+        kernel.call_at(kernel.now() + whole * number // (len(texts) - 1), partial(say, number))
+        for number in range(len(texts))
+    ]
+    return ACCEPTED
+
+
+def on_motor_test(vehicle: Vehicle, _command: Command) -> int:
+    """Handle DO_MOTOR_TEST and ACTUATOR_TEST: only disarmed; nothing moves."""
+    return TEMPORARILY_REJECTED if vehicle.armed else ACCEPTED
+
+
 def accept(_vehicle: Vehicle, _command: Command) -> int:
     """Accept a command that changes nothing here: storage of parameters, regions of interest."""
     return ACCEPTED
@@ -249,6 +312,9 @@ SHARED_COMMANDS: Mapping[int, Handler] = {
     ROI_NONE: accept,
     GET_HOME: on_get_home,
     RUN_CHECKS: on_run_checks,
+    CALIBRATION: on_calibration,
+    MOTOR_TEST: on_motor_test,
+    ACTUATOR_TEST: on_motor_test,
 }
 
 COPTER_COMMANDS: Mapping[int, Handler] = {

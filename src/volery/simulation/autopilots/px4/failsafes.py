@@ -172,6 +172,7 @@ def on_step(vehicle: Vehicle) -> None:
     now = vehicle.kernel.now()
     passed = 0.0 if commander.last_step == NEVER else to_seconds(now - commander.last_step)
     commander.last_step = now
+    commander.check_return()
     _detect_stick_loss(commander, now)
     _detect_ground(commander, now)
     _forget_ended_cause(commander)

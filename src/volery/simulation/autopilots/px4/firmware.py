@@ -11,6 +11,7 @@ from functools import partial
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.autopilot import BootEvent, BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.simulation.autopilots.mavlink import onboard_files
 from volery.simulation.autopilots.mavlink.channel import StatusTextPolicy
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import (
@@ -26,6 +27,7 @@ from volery.simulation.autopilots.mavlink.firmware import (
 from volery.simulation.autopilots.mavlink.messages import DENIED, FAILED, Handler
 from volery.simulation.autopilots.px4 import failsafes, mission, telemetry
 from volery.simulation.autopilots.px4.commands import DO_SET_MODE, MESSAGE_HANDLERS, set_mode
+from volery.simulation.autopilots.px4.follow_target import on_follow_target
 from volery.simulation.autopilots.px4.modes import LOITER, READY_AFTER, Commander, commander_of
 from volery.simulation.autopilots.vehicle_state import (
     ArmingTimes,
@@ -203,12 +205,18 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
             link_uses=USES,
             refuse_interval=lambda _vehicle, _message: FAILED,
             unknown_message=DENIED,
+            nothing_to_send=DENIED,
             on_mode_change=(),
             on_home_change=("GPS_GLOBAL_ORIGIN",),
         ),
         commands=CommandPolicy(
             commands=commands,
-            handlers=MESSAGE_HANDLERS,
+            handlers={**MESSAGE_HANDLERS, "FOLLOW_TARGET": on_follow_target},
+            questions={
+                "FILE_TRANSFER_PROTOCOL": onboard_files.on_file_transfer,
+                "LOG_REQUEST_LIST": onboard_files.on_log_list,
+                "SERIAL_CONTROL": onboard_files.on_shell,
+            },
             set_mode=set_mode,
             set_mode_ack=DO_SET_MODE,
             answer_delay=6 * MS,

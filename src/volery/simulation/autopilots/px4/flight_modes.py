@@ -15,7 +15,7 @@ from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
 from volery.simulation.autopilots.manoeuvres.to_point import Land, ToPoint
-from volery.simulation.autopilots.state_groups import NEVER
+from volery.simulation.autopilots.state_groups import NEVER, Home
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 CLIMB_RAMP = ((0.0, 0.05), (1.0, 0.3), (1.33, 0.75), (3.0, 1.0))
@@ -202,7 +202,12 @@ class Return(Manoeuvre):
 
     @property
     def _home(self) -> Vector:
-        return self.vehicle.home.ned if self.vehicle.home else (0.0, 0.0, 0.0)
+        return self._destination.ned if self._destination else (0.0, 0.0, 0.0)
+
+    @property
+    def _destination(self) -> Home | None:
+        destination: Home | None = self.vehicle.firmware_state.return_to
+        return destination
 
     def _least_height(self, away: float) -> float:
         """Return the least height above home [m]: RTL_RETURN_ALT, less within the cone of RTL_CONE_ANG."""
@@ -223,7 +228,7 @@ class Return(Manoeuvre):
         self._active.enter()
         self.target, self.landing = self._active.target, self._active.landing
         above = self._home[2] - point[2]
-        amsl = (self.vehicle.home.amsl if self.vehicle.home else 0.0) + above
+        amsl = (self._destination.amsl if self._destination else 0.0) + above
         self._report(self.vehicle, stage, amsl, above)
 
     def step(self) -> None:

@@ -12,10 +12,11 @@ from dataclasses import replace
 
 from volery.base.frames import Vector
 from volery.base.time import MS, Ns
+from volery.kernel.api import Handle
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
 from volery.simulation.autopilots.px4 import event_interface
 from volery.simulation.autopilots.px4.offboard import Joystick, SetpointStream
-from volery.simulation.autopilots.state_groups import NEVER
+from volery.simulation.autopilots.state_groups import NEVER, Home
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
 
 CUSTOM, AUTO, GUIDED, STABILIZED, MANUAL_INPUT = 1, 4, 8, 16, 64
@@ -130,6 +131,9 @@ HOME_CHECK_FROM: Ns = 10_000 * MS
 REPORT_FROM: Ns = 2_084 * MS
 REPORT_EVERY: Ns = 2_000 * MS
 
+RETURN_CHECKED_EVERY: Ns = 2_000 * MS
+"""Period at which the destination of a return is taken from the home position, while no return is flown."""
+
 THROTTLE_HIGH = 0.2
 """Throttle that refuses arming, above the centre of the stick; in modes that command thrust, above its low
 end.
@@ -171,6 +175,8 @@ class Commander:
         self.after_hold = 0
         self.reached: tuple[int, Ns] | None = None
         """Mission item that was reached last, and when."""
+        self.calibration: list[Handle] = []
+        """Steps of the calibration in hand that are still to come."""
         self.station_seen: Ns = NEVER
         self.ground = 0.0
         """Height of the ground at arming, down about the estimator's origin [m]."""
@@ -182,6 +188,9 @@ class Commander:
         self.reported: event_interface.ArmingChecks | None = None
         self.reported_at: Ns = NEVER
         self.last_step: Ns = NEVER
+        self.return_to: Home | None = None
+        """Destination of a return: the home position as of the last check."""
+        self._return_checked: Ns = NEVER
 
     # -- state
 
@@ -397,6 +406,16 @@ class Commander:
         self.takeoff_amsl = None
         self.requested = self.after_disarming
         self._fly(self.requested)
+
+    def check_return(self) -> None:
+        """Take the destination of a return from the home position, from time to time and not in a return.
+
+        A return that begins right after home was moved ends at the old one: measured on 1.14.
+        """
+        vehicle, now = self.vehicle, self.vehicle.kernel.now()
+        due = self._return_checked == NEVER or now - self._return_checked >= RETURN_CHECKED_EVERY
+        if self.return_to is None or (due and vehicle.mode.number != RTL):
+            self.return_to, self._return_checked = vehicle.home, now
 
     # -- reports
 

@@ -73,6 +73,8 @@ from volery.vehicles.telemetry import Telemetry, Velocity
 TAKEOFF_SHORT_M = 1.5
 """NAV_TAKEOFF ended up to 1.03 m below its altitude."""
 LEVELLED_WITHIN: Ns = MINUTE
+HOME_TAKEN_UP_AFTER: Ns = 2500 * MS
+"""Age of a home position from which a return leads to it."""
 REPEATED_FOR: Ns = 1500 * MS
 """MISSION_ITEM_REACHED was repeated eleven times, for a second."""
 
@@ -285,11 +287,24 @@ class PX4(MavlinkDriver):
         return (*first, *self._end_manual_control(), begin, enter)
 
     def return_home(self, within: Ns) -> Sequence[Step]:
-        """Enter AUTO.RTL. A drone lands and disarms itself; a rover stops near home."""
+        """Enter AUTO.RTL. A drone lands and disarms itself; a rover stops near home.
+
+        PX4 takes the destination of a return from its home position every 2 s: a return that begins right
+        after home was moved ends at the old one. So a home that has just been moved is waited for.
+        """
         if self.telemetry.kind == DRONE_KIND:
-            return self._until_disarmed(modes.RTL, "return home and land", within)
+            return (*self._home_taken_up(), *self._until_disarmed(modes.RTL, "return home and land", within))
         reach = self._reach_home(modes.RTL, HOLD, within)
-        return (*self._end_manual_control(), self._change_mode(modes.RTL), reach)
+        return (*self._home_taken_up(), *self._end_manual_control(), self._change_mode(modes.RTL), reach)
+
+    def _home_taken_up(self) -> Sequence[Step]:
+        def old_enough(seen: Telemetry) -> bool:
+            return self._kernel.now() - seen.home_ns >= HOME_TAKEN_UP_AFTER
+
+        if not self.telemetry.armed or old_enough(self.telemetry):
+            return ()
+        wait = Step(ask="take up its new home", send=send_nothing, done=old_enough, within=5 * S)
+        return (wait,)
 
     def land(self, within: Ns) -> Sequence[Step]:
         """Enter AUTO.LAND; done when disarmed. Without a position it drifts with the wind."""

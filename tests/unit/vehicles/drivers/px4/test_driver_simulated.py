@@ -307,3 +307,22 @@ def test_a_mode_of_sticks_is_asked_for_when_px4_has_taken_them_in() -> None:
     field.fly(by_sticks)
     refused = [event for event in field.events if isinstance(event, Text) and "not available" in event.text]
     assert refused == []
+
+
+def test_a_home_that_was_just_moved_is_where_it_returns_to() -> None:
+    """PX4 flies to the home of up to two seconds ago."""
+    field = Field()
+    moved = at(20, 0, 0)
+
+    def flight(drone: Drone) -> None:
+        drone.takeoff(5)
+        amsl = drone.home.altitude.metres
+        place = {"x": round(moved.latitude * 1e7), "y": round(moved.longitude * 1e7), "z": amsl}
+        old = drone.home
+        field.station_sends("COMMAND_INT", 0.1, command=179, frame=0, **place)
+        drone.telemetry.changed.wait_for(lambda: drone.home != old, 5 * S)
+        drone.return_home()
+
+    field.fly(flight)
+    landed = field.vehicle.position
+    assert abs(landed.latitude - moved.latitude) * 111_200.0 < 2.0
