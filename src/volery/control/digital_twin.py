@@ -1,0 +1,250 @@
+"""The digital twin: a vehicle that follows another's heading and position, and how well it does.
+
+The reference is a record (run, rosbag, tlog, DataFlash log, ULog) or a vehicle that another program flies.
+The twin is commanded the reference's velocity plus what a law makes of the error, so it lags less than by the
+error alone. Its loops are recorded like those of any flight, with the reference as the set-point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import hypot, isfinite, nan
+from typing import NamedTuple
+
+import numpy as np
+
+from volery.base.errors import UsageError
+from volery.base.frames import LocalFrame
+from volery.control.actuation import Command, Measured
+from volery.control.laws import DEGREES, Law, PidGains, PidLaw, wrap
+from volery.control.manoeuvres import HEIGHT_GAINS, LoopSample, Manoeuvre
+from volery.control.step_response import Array, Signal
+from volery.vehicles import Drone
+
+FOLLOW_GAINS = PidGains(kp=0.9, low=-8.0, high=8.0)
+FOLLOW_YAW_GAINS = PidGains(kp=2.0, low=-200.0, high=200.0, period=DEGREES)
+AIRBORNE = 1.5
+"""Height of the reference from which it counts as flying, m."""
+SLOPE_S = 0.4
+"""Time over which velocities of a record are differences, s."""
+
+
+class Reference(NamedTuple):
+    """Where the reference is: heading in degrees, m about its home, m/s; NaN where unknown."""
+
+    heading: float
+    north: float
+    east: float
+    up: float
+    velocity_north: float = 0.0
+    velocity_east: float = 0.0
+    velocity_up: float = 0.0
+    turn_rate: float = 0.0
+
+
+Follow = Callable[[float], Reference | None]
+"""Returns the reference at a time in s since the twin follows; ``None`` at its end."""
+
+
+@dataclass(frozen=True)
+class RecordedReference:
+    """A flight in a record, from the first moment in the air to the last.
+
+    Attributes:
+        times: seconds.
+        heading: degrees, continuous.
+        north: m about the first position.
+        east: the same to the east.
+        up: m above the first position.
+    """
+
+    times: Array
+    heading: Array
+    north: Array
+    east: Array
+    up: Array
+
+    @property
+    def duration(self) -> float:
+        """Duration, s."""
+        return float(self.times[-1] - self.times[0])
+
+    def __call__(self, elapsed: float) -> Reference | None:
+        """Return the interpolated reference with velocities from differences."""
+        if elapsed > self.duration:
+            return None
+        at = self.times[0] + elapsed
+
+        def value(column: Array, moment: float) -> float:
+            return float(np.interp(moment, self.times, column))
+
+        columns = (self.heading, self.north, self.east, self.up)
+        heading, north, east, up = (value(one, at) for one in columns)
+        ends = self.times[0], self.times[-1]
+        first, last = max(ends[0], at - SLOPE_S / 2.0), min(ends[1], at + SLOPE_S / 2.0)
+        turn, *rates = ((value(one, last) - value(one, first)) / (last - first) for one in columns)
+        return Reference(heading, north, east, up, rates[0], rates[1], rates[2], turn)
+
+
+def recorded_reference(signals: Sequence[Signal]) -> RecordedReference:
+    """Return the flight that a record contains.
+
+    Args:
+        signals: what ``read_signals`` returns.
+
+    Raises:
+        UsageError: yaw, north, east or altitude is missing, or nothing flies.
+    """
+    found = {name: _called(signals, name) for name in ("yaw", "north", "east", "altitude")}
+    missing = [name for name, one in found.items() if one is None]
+    known = {name: one for name, one in found.items() if one is not None}
+    if missing:
+        raise UsageError(
+            f"the record has no {', '.join(missing)}; a twin needs yaw, north, east and altitude"
+        )
+    start = max(float(one.times[0]) for one in known.values())
+    end = min(float(one.times[-1]) for one in known.values())
+    if end <= start:
+        raise UsageError("yaw and position of the record have no time in common")
+    times = np.arange(start, end, 0.05)
+    columns = {name: np.interp(times, one.times, _whole(one)) for name, one in known.items()}
+    up = columns["altitude"] - columns["altitude"][0]
+    flying = np.flatnonzero(up >= AIRBORNE)
+    if len(flying) < 2:
+        raise UsageError(f"the record never rises {AIRBORNE:g} m above where it begins: nothing flies in it")
+    part = slice(int(flying[0]), int(flying[-1]) + 1)
+    north, east = columns["north"] - columns["north"][0], columns["east"] - columns["east"][0]
+    return RecordedReference(times[part], columns["yaw"][part], north[part], east[part], up[part])
+
+
+def _called(signals: Sequence[Signal], name: str) -> Signal | None:
+    return next((one for one in signals if one.name == name or one.name.endswith(f" {name}")), None)
+
+
+def _whole(signal: Signal) -> Array:
+    if signal.period is None:
+        return signal.measured
+    return np.asarray(np.unwrap(signal.measured, period=signal.period))
+
+
+class LiveReference:
+    """A vehicle that another program or a pilot flies; this program only receives its telemetry.
+
+    Args:
+        leader: the vehicle.
+        over: whether the twin should stop following.
+    """
+
+    def __init__(self, leader: Drone, over: Callable[[], bool]) -> None:
+        self._leader, self._over = leader, over
+        self._frame: LocalFrame | None = None
+
+    def __call__(self, elapsed: float) -> Reference | None:
+        """Return the last telemetry; NaN while it is silent."""
+        if self._over():
+            return None
+        seen = self._leader.telemetry
+        north = east = nan
+        if seen.position is not None and seen.located:
+            if self._frame is None:
+                at = seen.home or seen.position
+                self._frame = LocalFrame(at.latitude, at.longitude, at.altitude.metres)
+            place = seen.position
+            east, north, _ = self._frame.to_enu(place.latitude, place.longitude, place.altitude.metres)
+        heading = nan if seen.stale else seen.attitude.heading
+        return Reference(heading, north, east, seen.above_home, *seen.velocity)
+
+
+class Twin(Manoeuvre):
+    """Follows a reference.
+
+    Args:
+        reference: where to be.
+        lowest: height below which the twin does not follow, m.
+    """
+
+    def __init__(self, reference: Follow, lowest: float = AIRBORNE) -> None:
+        self._reference, self._lowest = reference, lowest
+        self._axes = {
+            "north": PidLaw(FOLLOW_GAINS),
+            "east": PidLaw(FOLLOW_GAINS),
+            "altitude": PidLaw(HEIGHT_GAINS),
+        }
+        self._yaw = PidLaw(FOLLOW_YAW_GAINS)
+        self.laws: dict[str, Law] = {**self._axes, "yaw": self._yaw}
+        self._elapsed = 0.0
+        self._ended = False
+
+    @property
+    def done(self) -> bool:
+        """Whether the reference has ended."""
+        return self._ended
+
+    def step(self, measured: Measured, sample_s: float) -> tuple[Command, Sequence[LoopSample]]:
+        """Follow the reference by its velocity and by its error."""
+        aim = self._reference(self._elapsed)
+        self._elapsed += sample_s
+        if aim is None:
+            self._ended = True
+            return Command(), []
+        goals = (aim.north, aim.east, max(self._lowest, aim.up))
+        have = (measured.north, measured.east, measured.up)
+        ahead = (aim.velocity_north, aim.velocity_east, aim.velocity_up if aim.up > self._lowest else 0.0)
+        outputs, samples = [], []
+        for (loop, law), goal, value, velocity in zip(self._axes.items(), goals, have, ahead, strict=True):
+            feed = velocity if isfinite(velocity) and isfinite(goal) else 0.0
+            terms = law(goal, value, sample_s, feed)
+            outputs.append(float(terms.output) if isfinite(goal) else 0.0)
+            samples.append(LoopSample(loop, "twin", "m", 0.0, goal, value, terms))
+        turn = self._yaw(
+            aim.heading, measured.heading, sample_s, aim.turn_rate if isfinite(aim.turn_rate) else 0.0
+        )
+        samples.append(
+            LoopSample("yaw", "twin", "deg", DEGREES, aim.heading % DEGREES, measured.heading, turn)
+        )
+        rate = float(turn.output) if isfinite(aim.heading) else 0.0
+        north, east, up = outputs
+        return Command(north, east, up, rate), samples
+
+
+class TrackingError(NamedTuple):
+    """How far a twin was from its reference: root mean square, 95th percentile and greatest value."""
+
+    quantity: str
+    unit: str
+    rms: float
+    p95: float
+    greatest: float
+
+
+SETTLING_S = 5.0
+"""Time at the beginning that is not judged: the twin joins its reference."""
+
+
+def tracking_errors(signals: Sequence[Signal]) -> list[TrackingError]:
+    """Return the errors of a twin's loops after it has joined its reference.
+
+    Args:
+        signals: what ``read_signals`` returns of the twin's run.
+    """
+    found, parts = [], {}
+    for signal in signals:
+        if signal.controller != "twin" or signal.goal is None:
+            continue
+        late = signal.times >= signal.times[0] + SETTLING_S
+        error = signal.goal[late] - signal.measured[late]
+        error = np.asarray(wrap(error, signal.period)) if signal.period is not None else error
+        error = np.abs(error[np.isfinite(error)])
+        if len(error):
+            parts[signal.name] = error
+            found.append(_summary(signal.name, signal.unit, error))
+    if "north" in parts and "east" in parts and len(parts["north"]) == len(parts["east"]):
+        distance = np.array([hypot(*pair) for pair in zip(parts["north"], parts["east"], strict=True)])
+        found.insert(0, _summary("horizontal", "m", distance))
+    return found
+
+
+def _summary(quantity: str, unit: str, error: Array) -> TrackingError:
+    rms, p95 = float(np.sqrt(np.mean(error**2))), float(np.percentile(error, 95))
+    return TrackingError(quantity, unit, rms, p95, float(np.max(error)))
