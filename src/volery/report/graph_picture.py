@@ -9,7 +9,14 @@ from pathlib import Path
 
 from volery.base.errors import UsageError
 from volery.base.time import to_seconds
-from volery.ros.graph.interface import ServiceState
+from volery.model.instances import TargetKind
+from volery.model.system import System
+from volery.ros.graph.interface import (
+    ServiceState,
+    absolute_name,
+    absolute_remaps,
+    full_node_name,
+)
 from volery.ros.graph.snapshot import GraphSnapshot, TopicSnapshot
 from volery.trace.events import Call, Message, Published
 from volery.trace.mcap_writer import TRACE_FILE
@@ -61,6 +68,49 @@ def graph_of_run(folder: Path) -> GraphSnapshot:
     nodes = {node for topic in topics for node in (*topic.publishers, *topic.subscribers)}
     served = tuple(ServiceState(name, "", server) for name, server in sorted(services.items()))
     return GraphSnapshot(tuple(sorted(nodes)), topics, served)
+
+
+def graph_of_model(system: System) -> GraphSnapshot:
+    """Return the topics that a model states, and for each vehicle those of the node that serves it.
+
+    Raises:
+        UsageError: The model has neither.
+    """
+    publishers: dict[str, list[str]] = {}
+    subscribers: dict[str, list[str]] = {}
+    types: dict[str, str] = {}
+    for one in system.instances:
+        node, component = full_node_name(one.name, one.namespace), one.component
+        remaps = absolute_remaps(one.remap, one.namespace, node)
+        for stated, found in ((component.publishes, publishers), (component.subscribes, subscribers)):
+            for name, topic in stated.items():
+                absolute = absolute_name(name, one.namespace, node)
+                absolute = remaps.get(absolute, absolute)
+                types[absolute] = topic.type
+                found.setdefault(absolute, []).append(node)
+        for connection in one.connections.values():
+            for target in connection.targets:
+                if target.kind is TargetKind.VEHICLE and not one.is_environment:
+                    state, commands = f"/{target.name}/… (state)", f"/{target.name}/… (commands)"
+                    publishers.setdefault(state, [f"/{target.name}"])
+                    subscribers.setdefault(state, []).append(node)
+                    publishers.setdefault(commands, []).append(node)
+                    subscribers.setdefault(commands, [f"/{target.name}"])
+    names = sorted({*publishers, *subscribers})
+    if not names:
+        raise UsageError(f"{system.name}: the model states no topics; volery graph shows those of a run")
+    topics = tuple(
+        TopicSnapshot(
+            name,
+            types.get(name, ""),
+            tuple(dict.fromkeys(publishers.get(name, ()))),
+            tuple(dict.fromkeys(subscribers.get(name, ()))),
+            None,
+        )
+        for name in names
+    )
+    nodes = {node for topic in topics for node in (*topic.publishers, *topic.subscribers)}
+    return GraphSnapshot(tuple(sorted(nodes)), topics, ())
 
 
 ROW, PAD, TOP = 34, 20, 46

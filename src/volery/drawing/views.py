@@ -1,0 +1,114 @@
+"""The views of a model as boxes and links: its functional architecture and its verification environment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from volery.base.time import to_seconds
+from volery.drawing.boxes import Box, Diagram, Link, Port
+from volery.model.components import ENVIRONMENT_INTERFACE, VEHICLE_INTERFACES
+from volery.model.environment import Vehicle
+from volery.model.instances import Instance, TargetKind
+from volery.model.system import System
+
+COMMANDS = "commands"
+"""The provided port of a vehicle."""
+SYSTEM = "system"
+_INTERFACE_OF = {kind: interface for interface, kind in VEHICLE_INTERFACES.items()}
+
+
+def functional(system: System) -> Diagram:
+    """Return the functional architecture: components with their ports, and who is connected to whom."""
+    boxes = [_component(one) for one in system.instances]
+    boxes += [_vehicle(one) for one in system.vehicles]
+    links = tuple(_links(system))
+    called = {one.target for one in links}
+    framed = frozenset(one.name for one in system.instances if not one.is_environment)
+    before = (
+        frozenset(one.name for one in system.instances if one.is_environment and one.name not in called)
+        - framed
+    )
+    return Diagram(system.name, tuple(boxes), links, system.name, framed, before)
+
+
+def verification(system: System) -> Diagram:
+    """Return the verification environment: the system as one box, and what surrounds it in a run."""
+    inside = {one.name for one in system.instances if not one.is_environment}
+    around = [one for one in system.instances if one.is_environment]
+    links = list(_links(system))
+    incoming = dict.fromkeys(
+        (one.target, one.target_port) for one in links if one.source not in inside and one.target in inside
+    )
+    outgoing = dict.fromkeys(
+        (one.target, one.target_port) for one in links if one.source in inside and one.target not in inside
+    )
+    provided = _provided_interfaces(system)
+    ports = [Port(f"{name}.{port}", provided[name, port], provided=True) for name, port in incoming]
+    ports += [Port(name, provided[name, port], provided=False) for name, port in outgoing]
+    chosen = [f"allocation {system.allocation}"] if system.allocation else []
+    chosen += [f"scenario {system.scenario}"] if system.scenario else []
+    whole = Box(SYSTEM, system.name, "System", " · ".join(chosen), "system", tuple(ports))
+    boxes = [whole, *(_component(one) for one in around), *(_vehicle(one) for one in system.vehicles)]
+    kept = [one for one in links if one.source not in inside and one.target not in inside]
+    kept += [
+        Link(one.source, one.source_port, SYSTEM, f"{one.target}.{one.target_port}")
+        for one in links
+        if (one.target, one.target_port) in incoming and one.source not in inside
+    ]
+    kept += [Link(SYSTEM, name, name, port) for name, port in outgoing]
+    called = {one.target for one in kept}
+    before = frozenset(one.name for one in around if one.name not in called)
+    return Diagram(
+        f"{system.name}: verification environment",
+        tuple(boxes),
+        tuple(kept),
+        "",
+        frozenset((SYSTEM,)),
+        before,
+    )
+
+
+def _component(one: Instance) -> Box:
+    component, activity = one.component, one.activity
+    words = [component.language]
+    if activity is not None and activity.period_ns is not None:
+        words.append(f"each {to_seconds(activity.period_ns) * 1000:g} ms")
+    if activity is not None and not one.is_environment:
+        words.append(f"priority {activity.priority}")
+    words += [f"uses {ENVIRONMENT_INTERFACE}"] * any(
+        port.interface == ENVIRONMENT_INTERFACE for port in component.requires.values()
+    )
+    ports = [Port(name, interface, provided=True) for name, interface in component.provides.items()]
+    ports += [
+        Port(port.name, port.interface, provided=False)
+        for port in component.requires.values()
+        if port.interface != ENVIRONMENT_INTERFACE
+    ]
+    stereotype = "TestComponent" if one.is_environment else "RtUnit" if activity else "PpUnit"
+    kind = "environment" if one.is_environment else "active" if activity else "passive"
+    return Box(one.name, f"{one.name}: {component.name}", stereotype, " · ".join(words), kind, tuple(ports),
+               activity is not None)  # fmt: skip
+
+
+def _vehicle(one: Vehicle) -> Box:
+    port = Port(COMMANDS, _INTERFACE_OF[one.kind], provided=True)
+    return Box(one.name, one.name, one.kind, f"{one.autopilot} · at {one.at.name}", "vehicle", (port,))
+
+
+def _links(system: System) -> Iterator[Link]:
+    for one in system.instances:
+        for connection in one.connections.values():
+            for target in connection.targets:
+                if target.kind is TargetKind.INSTANCE:
+                    yield Link(one.name, connection.port, target.name, target.port)
+                elif target.kind is TargetKind.VEHICLE:
+                    yield Link(one.name, connection.port, target.name, COMMANDS)
+
+
+def _provided_interfaces(system: System) -> dict[tuple[str, str], str]:
+    found = {
+        (one.name, port): interface
+        for one in system.instances
+        for port, interface in one.component.provides.items()
+    }
+    return found | {(one.name, COMMANDS): _INTERFACE_OF[one.kind] for one in system.vehicles}
