@@ -13,7 +13,14 @@ from typing import Any
 from volery.base import units
 from volery.base.time import Ns
 from volery.base.units import QuantityError
-from volery.exchange.notes import Unmapped, connections, default_allocation, instances, note_rest
+from volery.exchange.notes import (
+    Unmapped,
+    connections,
+    default_allocation,
+    instances,
+    note_rest,
+    without_provenance,
+)
 from volery.exchange.uml.context import Note
 
 _MANY = "[]"
@@ -51,6 +58,7 @@ def time_text(time: Ns) -> str:
 def aadl_text(tree: Mapping[str, Any]) -> tuple[str, tuple[Note, ...]]:
     """Return a model as an AADL package, and notes on what is not in it."""
     unmapped = Unmapped()
+    tree = without_provenance(tree, unmapped)
     note_rest(unmapped, tree, (*_MAPPED, *_ALSO))
     name = identifier(str(tree.get("name", "model")))
     lines = [

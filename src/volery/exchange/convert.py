@@ -8,8 +8,10 @@ from pathlib import Path, PurePath
 
 from volery.base.errors import Location, ModelError, UsageError, choices
 from volery.base.files import read_bytes, write_text
+from volery.base.units import QuantityError
 from volery.exchange.aadl import aadl_text
 from volery.exchange.sysml import sysml_text
+from volery.exchange.uml.components_view import Rebase
 from volery.exchange.uml.context import Note
 from volery.exchange.uml.uml_model import Imported, export_uml, import_uml
 from volery.exchange.uml.xmi import MOST_BYTES
@@ -43,7 +45,7 @@ def read_uml(
         data = read_bytes(source, MOST_BYTES)
     except OSError as error:
         raise ModelError(f"cannot read it: {error.strerror or error}", "", Location(str(source), 0)) from None
-    return import_uml(data, str(source), _path(source.parent, folder), catalogue, processors)
+    return import_uml(data, str(source), _rebase(source.parent, folder), catalogue, processors)
 
 
 def import_model(
@@ -88,15 +90,21 @@ def export_model(model: Path, target: Path, catalogue: Iterable[str]) -> tuple[N
     tree = read_tree(file).plain()
     if target.suffix == ".uml":
         base = read_uml(target, file.parent, catalogue) if target.exists() else None
-        text, notes = export_uml(tree, str(target), _path(file.parent, target.parent), base)
+        text, notes = export_uml(tree, str(target), _rebase(file.parent, target.parent), base)
     else:
-        text, notes = (aadl_text if target.suffix == ".aadl" else sysml_text)(tree)
+        try:
+            text, notes = (aadl_text if target.suffix == ".aadl" else sysml_text)(tree)
+        except QuantityError as error:
+            what = f"{error}; `volery model check` names the line"
+            raise ModelError(what, "", Location(str(file), 0)) from None
     _write(target, text)
     return notes
 
 
-def _path(of: Path, start: Path) -> PurePath:
-    return PurePath(os.path.relpath(of.resolve(), start.resolve()))
+def _rebase(of: Path, start: Path) -> Rebase:
+    """Return what makes paths that start in the folder *of* start in the folder *start*."""
+    one, other = of.resolve(), start.resolve()
+    return lambda path: PurePath(os.path.relpath(one / path, other)).as_posix()
 
 
 def _write(path: Path, text: str) -> None:

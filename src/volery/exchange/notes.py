@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from volery.model.fields import STATED_KEYS
+
 
 class Unmapped:
     """Collects what was not exported: the kind of thing, and how many or which."""
@@ -20,6 +22,21 @@ class Unmapped:
         """Yield one line for each kind of thing."""
         for what, names in self._found.items():
             yield f"{what}: {', '.join(names)}" if names else what
+
+
+def without_provenance(tree: Any, unmapped: Unmapped, path: str = "") -> Any:
+    """Return a tree in which quantities with a provenance are bare quantities; record where."""
+    if isinstance(tree, Mapping):
+        if "value" in tree and tree.keys() <= set(STATED_KEYS):
+            unmapped.add("provenance of quantities", path)
+            return tree["value"]
+        return {
+            key: without_provenance(below, unmapped, f"{path}.{key}" if path else str(key))
+            for key, below in tree.items()
+        }
+    if isinstance(tree, list):
+        return [without_provenance(below, unmapped, path) for below in tree]
+    return tree
 
 
 def instances(tree: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:

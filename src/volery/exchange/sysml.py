@@ -10,7 +10,14 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from volery.exchange.notes import Unmapped, connections, default_allocation, instances, note_rest
+from volery.exchange.notes import (
+    Unmapped,
+    connections,
+    default_allocation,
+    instances,
+    note_rest,
+    without_provenance,
+)
 from volery.exchange.uml.context import Note
 
 _MANY = "[]"
@@ -44,6 +51,7 @@ def name_text(text: str) -> str:
 def sysml_text(tree: Mapping[str, Any]) -> tuple[str, tuple[Note, ...]]:
     """Return a model as a SysML v2 package, and notes on what is not in it."""
     unmapped = Unmapped()
+    tree = without_provenance(tree, unmapped)
     note_rest(unmapped, tree, _MAPPED)
     lines = [
         f"package {name_text(str(tree.get('name', 'model')))} {{",

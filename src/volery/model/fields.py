@@ -168,7 +168,8 @@ class OneOf(Syntax):
         return {"enum": list(self.values)}
 
 
-_STATED = ("value", "provenance", "uncertainty", "source")
+STATED_KEYS = ("value", "provenance", "uncertainty", "source")
+"""Keys of a quantity that is written with its provenance."""
 
 
 def _bare_value(node: Node, path: Path, reading: Reading) -> object:
@@ -176,13 +177,13 @@ def _bare_value(node: Node, path: Path, reading: Reading) -> object:
     if not isinstance(node.value, dict):
         return node.value
     for key in node.items:
-        if key not in _STATED:
-            what = f"unknown key{did_you_mean(key, _STATED)}; valid here: {choices(_STATED)}"
+        if key not in STATED_KEYS:
+            what = f"unknown key{did_you_mean(key, STATED_KEYS)}; valid here: {choices(STATED_KEYS)}"
             reading.problems.add((*path, key), what, node.where, rules.UNKNOWN_KEY)
     if "value" not in node.items:
         reading.problems.add((*path, "value"), "this key is missing", node.where, rules.MISSING_KEY)
         raise WrongValueError("")
-    provenance, uncertainty, source = (node.child(key) for key in _STATED[1:])
+    provenance, uncertainty, source = (node.child(key) for key in STATED_KEYS[1:])
     reading.provenances[path] = Provenance(
         str(OneOf(PROVENANCES).read(provenance, path, reading)) if provenance else "estimated",
         units.read(uncertainty.value, units.RATIO) if uncertainty else None,

@@ -6,9 +6,7 @@ from it has the ports and the times. Both become one component of the model.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator, Mapping
-from pathlib import PurePath
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from volery.base.errors import ModelError
@@ -20,6 +18,9 @@ from volery.exchange.uml.xmi import Element, local, tag, uml_type, xmi_id
 from volery.model.components import LANGUAGES
 from volery.model.text import parse as parse_yaml
 from volery.model.writing import flow_text
+
+Rebase = Callable[[str], str]
+"""Returns a path that starts in one folder as one that starts in another."""
 
 PASSIVE = "PpUnit"
 QUEUE_POLICIES = {
@@ -38,12 +39,12 @@ _MANY = "[]"
 # -- import
 
 
-def read_components(imp: Import, rebase: PurePath) -> None:
+def read_components(imp: Import, rebase: Rebase) -> None:
     """Read the components that instances are of, and those that carry «RtUnit» or «PpUnit».
 
     Args:
         imp: The import.
-        rebase: Path from the folder of the model to that of the file: paths in the file start there.
+        rebase: Makes a path of the file relative to the folder of the model.
     """
     used = set(_types_of_instances(imp))
     inherited = {general for each in used for general in generals(imp, each)[1:]}
@@ -96,7 +97,7 @@ def _has_parts(imp: Import, component: Element) -> bool:
 class _Component:
     """One component that is being imported."""
 
-    def __init__(self, imp: Import, element: Element, name: str, rebase: PurePath) -> None:
+    def __init__(self, imp: Import, element: Element, name: str, rebase: Rebase) -> None:
         self.imp, self.element, self.name, self.rebase = imp, element, name, rebase
         self.key = f"component:{name}"
         self.family = generals(imp, element)
@@ -129,7 +130,7 @@ class _Component:
             language = _LANGUAGES.get(language, language)
             path = stated.get("path", "")
             if path:
-                path = PurePath(os.path.normpath(self.rebase / path.replace("\\", "/"))).as_posix()
+                path = self.rebase(path.replace("\\", "/"))
             if language and language not in LANGUAGES:
                 self.imp.note(owner, f"no component can be in {language!r}; {', '.join(LANGUAGES)} can")
             if number == 0 or language not in found:
@@ -300,22 +301,20 @@ def body_of(comment: Element) -> str:
 # -- export
 
 
-def write_components(exp: Export, library: Element, tree: Mapping[str, Any], rebase: PurePath) -> None:
+def write_components(exp: Export, library: Element, tree: Mapping[str, Any], rebase: Rebase) -> None:
     """Write the components, each into a package of its own.
 
     Args:
         exp: The export.
         library: The package of the component library.
         tree: The model.
-        rebase: Path from the folder of the file to that of the model.
+        rebase: Makes a path of the model relative to the folder of the file.
     """
     for name, stated in (tree.get("components") or {}).items():
         _write_component(exp, library, name, dict(stated), rebase)
 
 
-def _write_component(
-    exp: Export, library: Element, name: str, rest: dict[str, Any], rebase: PurePath
-) -> None:
+def _write_component(exp: Export, library: Element, name: str, rest: dict[str, Any], rebase: Rebase) -> None:
     key = f"component:{name}"
     known = exp.known.get(key)
     package = (
@@ -345,7 +344,7 @@ def _write_component(
 
 
 def _write_files(
-    exp: Export, package: Element, component: Element, key: str, rest: dict[str, Any], rebase: PurePath
+    exp: Export, package: Element, component: Element, key: str, rest: dict[str, Any], rebase: Rebase
 ) -> None:
     language, path = rest.pop("language", ""), rest.pop("path", "")
     files = {language: path, **(rest.pop("files", None) or {})}
@@ -357,7 +356,7 @@ def _write_files(
         owner = exp.element(entry, folder, "packagedElement", "Package", name=written)
         stated = {"language": written}
         if file:
-            stated["path"] = PurePath(os.path.normpath(rebase / str(file))).as_posix()
+            stated["path"] = rebase(str(file))
         known = [exp.known.get(f"{entry}/{name}") for name in stated]
         if None not in known and len(set(known)) == 1 and len(known) > 1:  # one comment states both
             both = " ".join(property_text(name, value) for name, value in stated.items())

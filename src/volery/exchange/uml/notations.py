@@ -115,6 +115,31 @@ def figure(text: str, unit: str = "") -> str | None:
     return None
 
 
+def stated_quantity(text: str) -> str | dict[str, str] | None:
+    """Return a figure as a model states it: with its provenance if *text* has a VSL ``source``."""
+    found = figure(text)
+    provenance = SOURCES.get(tagged(text).source) if found is not None and "=" in text else None
+    return {"value": found, "provenance": provenance} if found and provenance else found
+
+
+def quantity_text(value: object) -> tuple[str, dict[str, object]]:
+    """Return a quantity of a model as MARTE writes it, and what it has no place for.
+
+    A quantity with a provenance becomes VSL: ``(value=1500,unit=MHz,source=req)``.
+    """
+    rest = dict(value) if isinstance(value, Mapping) else {}
+    text = str(rest.pop("value", "") if isinstance(value, Mapping) else value)
+    try:
+        number, unit = split_figure(text)
+    except ValueError:
+        return text, rest
+    source = next((one for one, name in SOURCES.items() if name == rest.get("provenance")), "")
+    if source:
+        rest.pop("provenance")
+        return f"(value={number},unit={unit},source={source})", rest
+    return f"{number} {unit}".strip(), rest
+
+
 def split_figure(text: str) -> tuple[str, str]:
     """Return the number and MARTE's unit of a quantity such as ``0.3 ms``.
 

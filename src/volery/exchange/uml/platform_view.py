@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from volery.exchange.uml.context import Export, Import
-from volery.exchange.uml.notations import figure, split_figure
+from volery.exchange.uml.notations import quantity_text, stated_quantity
 from volery.exchange.uml.xmi import Element, local, tag, tags, uml_type, xmi_id
 
 SCHEDULERS = {
@@ -19,6 +19,7 @@ SCHEDULERS = {
 
 DEVICES = {"HWSensor": "sensor", "HWActuator": "actuator", "HwDevice": "device"}
 _PROCESSORS = ("HwProcessor", "HwPLD", "HwASIC", "GaExecHost", "SaExecHost")
+_QUANTITIES = ("frequency", "bandwidth", "latency", "memory")
 _MEDIA = ("HwMedia", "HwBus", "CommunicationMedia", "GaCommHost")
 
 
@@ -36,8 +37,8 @@ def read_platform(imp: Import, kinds: Mapping[str, str]) -> None:
         spaces = imp.section("memory_spaces")
         name = imp.name(element, spaces)
         imp.finish(f"memory:{name}", element)
-        size = figure(tag(_application(imp, element, "MemoryPartition"), "memorySizeFootprint"))
-        spaces[name] = {**({"memory": size} if size else {}), **imp.annotation(element)} or None
+        size = stated_quantity(tag(_application(imp, element, "MemoryPartition"), "memorySizeFootprint"))
+        spaces[name] = _joined({"memory": size} if size else {}, imp.annotation(element)) or None
     for element in _things(imp, "OS"):
         systems = imp.section("platform", "operating_systems")
         name = imp.name(element, systems)
@@ -99,7 +100,7 @@ def _operating_system(imp: Import, element: Element) -> dict[str, Any]:
     drivers = imp.file.references(application, "drivers")
     if drivers:
         made["drivers"] = [str(each.get("name") or xmi_id(each)) for each in drivers]
-    return {**made, **imp.annotation(element)}
+    return _joined(made, imp.annotation(element))
 
 
 def _processor(imp: Import, element: Element, kinds: Mapping[str, str]) -> dict[str, Any]:
@@ -111,7 +112,7 @@ def _processor(imp: Import, element: Element, kinds: Mapping[str, str]) -> dict[
     if made["is"] not in kinds.values():
         what = f"{kind!r} is not in the catalogue of processors; `--processor {kind}=NAME` says which it is"
         imp.note(element, what)
-    frequency = figure(tag(application, "frequency")) or figure(tag(of_kind, "frequency"))
+    frequency = stated_quantity(tag(application, "frequency")) or stated_quantity(tag(of_kind, "frequency"))
     if frequency:
         made["frequency"] = frequency
     else:
@@ -128,7 +129,9 @@ def _processor(imp: Import, element: Element, kinds: Mapping[str, str]) -> dict[
     caches = imp.file.references(application, "caches")
     if caches:
         made["caches"] = {imp.name(each): _cache(imp, each) for each in caches}
-    return {**made, **imp.annotation(element)}
+        for each in caches:
+            imp.finish(f"processor:{imp.names[element]}/cache:{imp.names[each]}", each)
+    return _joined(made, imp.annotation(element))
 
 
 def _cache(imp: Import, element: Element) -> dict[str, Any]:
@@ -138,7 +141,7 @@ def _cache(imp: Import, element: Element) -> dict[str, Any]:
         made["level"] = int(tag(application, "level"))
     if tag(application, "type") not in ("", "undef", "other"):
         made["type"] = tag(application, "type")
-    size = figure(tag(application, "memorySize"))
+    size = stated_quantity(tag(application, "memorySize"))
     return {**made, **({"size": size} if size else {})}
 
 
@@ -167,13 +170,16 @@ def _read_network(imp: Import, element: Element) -> None:
     name = imp.name(element, networks)
     imp.finish(f"network:{name}", element)
     made: dict[str, Any] = {"between": between}
-    bandwidth = figure(tag(application, "bandWidth")) or figure(next(iter(tags(application, "capacity")), ""))
+    bandwidth = stated_quantity(tag(application, "bandWidth")) or stated_quantity(
+        next(iter(tags(application, "capacity")), "")
+    )
     if bandwidth:
         made["bandwidth"] = bandwidth
     else:
         imp.note(element, "no bandwidth; a model needs one")
-    latency = figure(tag(application, "blockT"))
-    networks[name] = {**made, **({"latency": latency} if latency else {}), **imp.annotation(element)}
+    latency = stated_quantity(tag(application, "blockT"))
+    made |= {"latency": latency} if latency else {}
+    networks[name] = _joined(made, imp.annotation(element))
 
 
 # -- export
@@ -191,7 +197,7 @@ def write_platform(exp: Export, model: Element, tree: Mapping[str, Any]) -> dict
             made,
             "Namespace",
             "MemoryPartition",
-            memorySizeFootprint=_marte(rest.pop("memory", "")),
+            memorySizeFootprint=_take(rest, "memory"),
         )
         exp.annotate(f"memory:{name}", made, rest)
     software = exp.view("view:software", model, "SWPlatform", "SWPlatformView")
@@ -251,7 +257,7 @@ def _write_processor(exp: Export, system: Element, kinds: Element, name: str, re
             "HwCache",
             level=str(stated.get("level", "")),
             type=str(stated.get("type", "")),
-            memorySize=_marte(stated.get("size", "")),
+            memorySize=quantity_text(stated.get("size", ""))[0],
         )
         ids.append(xmi_id(exp.file.stereotype(one, "HwCache")))
     exp.apply(
@@ -259,7 +265,7 @@ def _write_processor(exp: Export, system: Element, kinds: Element, name: str, re
         made,
         base,
         "HwProcessor",
-        frequency=_marte(rest.pop("frequency", "")),
+        frequency=_take(rest, "frequency"),
         nbCores=str(rest.pop("cores", "")),
         caches=" ".join(ids),
     )
@@ -292,8 +298,8 @@ def _write_network(exp: Export, system: Element, name: str, rest: dict[str, Any]
         made,
         "Connector" if uml_type(made) == "Connector" else "Property",
         next((one for one in _MEDIA if exp.file.has(made, one)), "HwMedia"),
-        bandWidth=_marte(rest.pop("bandwidth", "")),
-        blockT=_marte(rest.pop("latency", "")),
+        bandWidth=_take(rest, "bandwidth"),
+        blockT=_take(rest, "latency"),
     )
     exp.annotate(key, made, rest)
 
@@ -314,11 +320,20 @@ def _change_ends(exp: Export, key: str, connector: Element, between: list[str]) 
         exp.element(f"{key}/end:{processor}", connector, "end", "ConnectorEnd", role=target)
 
 
-def _marte(value: Any) -> str:
-    """Return a quantity with MARTE's unit; a text that is none as it stands."""
-    text = str(value)
-    try:
-        number, unit = split_figure(text)
-    except ValueError:
-        return text
-    return f"{number} {unit}".strip()
+def _take(rest: dict[str, Any], key: str) -> str:
+    """Return the quantity of *key* for a tag; what the tag has no place for stays in *rest*."""
+    text, left = quantity_text(rest.pop(key, ""))
+    if left:
+        rest[key] = left
+    return text
+
+
+def _joined(made: dict[str, Any], annotation: dict[str, Any]) -> dict[str, Any]:
+    """Return what tags and the annotation state, together: the annotation adds to quantities."""
+    for key, value in annotation.items():
+        own = made.get(key)
+        if isinstance(value, dict) and isinstance(own, str | dict) and key in _QUANTITIES:
+            made[key] = {**(own if isinstance(own, dict) else {"value": own}), **value}
+        else:
+            made[key] = value
+    return made

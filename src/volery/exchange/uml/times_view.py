@@ -243,12 +243,14 @@ def write_times(
 def _figure_text(figure: dict[str, Any]) -> tuple[str, str, dict[str, Any]]:
     """Return the time and the energy of a figure as texts, and what they have no place for."""
     times = {tag_: str(figure[key]) for key, tag_ in _TIMES.items() if key in figure}
-    energy = str(figure.pop("energy", ""))
+    energy = "" if isinstance(figure.get("energy"), Mapping) else str(figure.pop("energy", ""))
     try:
         text = tagged_text(times)
     except ValueError:  # several units, or no number: the mean stays readable, the rest is annotated
-        text = str(figure.get("time", ""))
-        return text, energy, {key: value for key, value in figure.items() if key != "time"}
+        time = figure.get("time", "")
+        if isinstance(time, Mapping):
+            return str(time.get("value", "")), energy, figure
+        return str(time), energy, {key: value for key, value in figure.items() if key != "time"}
     rest = {key: value for key, value in figure.items() if key not in _TIMES}
     source = _PROVENANCES.get(str(rest.get("provenance", "")))
     if source:

@@ -12,6 +12,7 @@ from volery.base.errors import Location, ModelError
 from volery.exchange.uml import (
     allocation_view,
     components_view,
+    design_view,
     instances_view,
     interfaces_view,
     platform_view,
@@ -25,7 +26,6 @@ from volery.model.fields import entries
 from volery.model.text import parse as parse_yaml
 
 _BOUND = re.compile(r"\{?\s*(\S+)\s*(<=|>=|≤|≥)\s*(.+?)\s*\}?\s*\Z")
-HERE = PurePath()
 _RELATIONS = {"max": "<=", "min": ">="}
 _ELSEWHERE = ("interfaces", "types", "components", "application", "platform", "memory_spaces", "allocations")
 
@@ -43,7 +43,7 @@ class Imported:
 def import_uml(
     data: bytes,
     name: str,
-    rebase: PurePath = HERE,
+    rebase: components_view.Rebase = str,
     catalogue: Iterable[str] = (),
     processors: Mapping[str, str] | None = None,
 ) -> Imported:
@@ -52,7 +52,7 @@ def import_uml(
     Args:
         data: The bytes of the file.
         name: Its name in messages.
-        rebase: Path from the folder of the model to that of the file: paths in the file start there.
+        rebase: Makes a path of the file relative to the folder of the model.
         catalogue: Names of the processors of the catalogue.
         processors: The processor of the catalogue that each processor of the file is, by its name there.
 
@@ -77,6 +77,7 @@ def import_uml(
     platform_view.read_platform(imp, kinds)
     instances_view.read_instances(imp)
     allocation_view.read_allocations(imp)
+    design_view.read_design_parameters(imp)
     _read_packages(imp)
     _read_statements(imp)
     _add_references(imp)
@@ -196,14 +197,14 @@ def _note_what_is_left(imp: Import) -> None:
 
 
 def export_uml(
-    tree: Mapping[str, Any], name: str, rebase: PurePath = HERE, base: Imported | None = None
+    tree: Mapping[str, Any], name: str, rebase: components_view.Rebase = str, base: Imported | None = None
 ) -> tuple[str, tuple[Note, ...]]:
     """Return the text of a .uml file, and notes on what has no place in it.
 
     Args:
         tree: The model, as its file states it.
         name: Name of the file in messages.
-        rebase: Path from the folder of the file to that of the model.
+        rebase: Makes a path of the model relative to the folder of the file.
         base: The file as it is now. Its ids and everything that volery does not know are kept.
     """
     exp = Export(base.file, base.keys) if base is not None else Export(empty_file(name))
@@ -222,9 +223,22 @@ def export_uml(
     allocation_view.write_allocations(exp, model, tree)
     _write_scenarios(exp, model, tree)
     _write_statements(exp, model, tree)
-    own = (*_ELSEWHERE, "name", "description", "volery", "environment", "scenarios", "requirements", "chains")
+    designs = design_view.write_design_parameters(exp, model, tree)
+    own = (
+        *_ELSEWHERE,
+        "design_parameters",
+        "name",
+        "description",
+        "volery",
+        "environment",
+        "scenarios",
+        "requirements",
+        "chains",
+    )
     rest = {key: value for key, value in tree.items() if key not in own}
-    exp.annotate("model", model, {**rest, **({"platform": platform_rest} if platform_rest else {})})
+    rest |= {"platform": platform_rest} if platform_rest else {}
+    rest |= {"design_parameters": designs} if designs else {}
+    exp.annotate("model", model, rest)
     exp.remove_rest()
     return exp.file.text(NAMESPACES), tuple(exp.notes)
 

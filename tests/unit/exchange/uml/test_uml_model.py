@@ -1,12 +1,13 @@
 """Models of UML with MARTE and S3D: six hand-made files, examples there and back, and hostile files."""
 
 import re
-from pathlib import Path, PurePath
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 from lxml import etree
 
+from rigs.watch_model import write_watch_model
 from volery.base.errors import ModelError
 from volery.cli.commands.first_steps import example
 from volery.exchange.uml.uml_model import export_uml, import_uml
@@ -93,6 +94,11 @@ def test_all_views_are_read():
         "linux": "cpu0",
     }
     assert tree["environment"]["components"] == {"scene": {"is": "Scene"}}
+    head = "platform.processors."
+    assert tree["design_parameters"] == {
+        "clock": {"paths": f"{head}cpu0.frequency", "values": ["600 MHz", "900 MHz", "1200 MHz", "1500 MHz"]},
+        "both": {"paths": [f"{head}cpu0.frequency", f"{head}cpu1.frequency"], "values": ["1 GHz", "1.5 GHz"]},
+    }
 
 
 def test_empty_tags_and_expressions_are_noted_not_fatal():
@@ -176,6 +182,15 @@ def test_a_model_of_volery_is_the_same_after_uml(name):
     assert read("m", again.encode()).tree == tree
 
 
+def test_a_model_with_every_section_is_the_same_after_uml(tmp_path):
+    tree = read_tree(write_watch_model(tmp_path / "watch")).plain()
+    text, notes = export_uml(tree, "m.uml")
+    assert notes == ()
+    imported = read("m", text.encode())
+    assert said(imported) == []
+    assert imported.tree == tree
+
+
 def test_ids_depend_on_the_model_alone():
     tree = read_tree(example("delivery") / "model.yaml").plain()
     one, two = export_uml(tree, "a.uml")[0], export_uml(tree, "b.uml")[0]
@@ -207,6 +222,7 @@ def test_only_tags_of_the_profiles_are_written():
         "MemoryPartition": "memorySizeFootprint",
         "FlowPort": "direction",
         "HwCache": "level type memorySize",
+        "DseProcessorParameter": "name parameter unit items",
     }
     tree = read("all_views").tree
     text, _ = export_uml(tree, "m.uml")
@@ -217,16 +233,12 @@ def test_only_tags_of_the_profiles_are_written():
         assert stated <= set(tags.get(name, "").split()), name
 
 
-def test_paths_start_at_the_folder_of_each_file():
+def test_paths_are_rewritten_for_the_folder_of_each_file():
     tree = {"volery": 1, "name": "m", "components": {"A": {"language": "python", "path": "code/a.py"}}}
-    text, _ = export_uml(tree, "m.uml", PurePath("../model"))
+    text, _ = export_uml(tree, "m.uml", lambda path: f"../model/{path}")
     assert "$path=../model/code/a.py;" in text
-    back = import_uml(text.encode(), "m.uml", PurePath("../uml"))
-    assert back.tree["components"]["A"]["path"] == "../model/code/a.py"
-    assert (
-        import_uml(text.encode(), "m.uml", PurePath("../x")).tree["components"]["A"]["path"]
-        == "../model/code/a.py"
-    )
+    back = import_uml(text.encode(), "m.uml", lambda path: path.removeprefix("../model/"))
+    assert back.tree["components"]["A"]["path"] == "code/a.py"
 
 
 # -- hostile and wrong files
