@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from volery.base.errors import UsageError
-from volery.cli.command import Commands
-from volery.cli.console import Output
+from volery.cli.command import OK, Commands
+from volery.cli.console import Output, make_table, number_column
 from volery.cli.options import Out, Seed, Speed, parse_speed
 
 if TYPE_CHECKING:
@@ -161,6 +161,44 @@ def land(
     return _go(
         output, "land", lambda: Altitude([height], 0.1), on, by, height, gains, settings, seed, speed, out
     )
+
+
+@commands.add("quiet", "json", "debug")
+def cube(
+    output: Output,
+    graph: Annotated[
+        str | None,
+        typer.Option(
+            "--graph", metavar="ros1|ros2", help="Serve it on real ROS; by default in virtual time."
+        ),
+    ] = None,
+    controller: Annotated[bool, typer.Option(help="Fly it by the thesis's controller.")] = True,
+    rounds: Annotated[
+        int, typer.Option(help="How often the goals are flown; 0 without end, on real ROS.")
+    ] = 1,
+    out: Out = None,
+) -> int:
+    """Simulate a vehicle by its velocities (cmd_vel, poseupdate) and fly the thesis's cube of goals."""
+    from volery.cli.run_display import run_folder
+    from volery.run.velocity_cube import fly_cube, serve_cube
+
+    if rounds < 0 or (rounds == 0 and graph is None):
+        raise UsageError(f"--rounds {rounds}: give 1 or more; 0 is for a vehicle on real ROS")
+    if graph is not None:
+        output.note(f"on {graph}: cmd_vel, poseupdate, odom; Ctrl-C ends it")
+        serve_cube(graph, controlled=controller, rounds=rounds)
+        return OK
+    if not controller:
+        raise UsageError("--no-controller: in virtual time nothing else can fly it; add --graph")
+    with run_folder(out, "cube") as folder:
+        reached = fly_cube(folder, rounds)
+        table = make_table("goal", number_column("at"), number_column("distance"))
+        for number, (at, distance) in enumerate(reached, 1):
+            table.add_row(str(number), f"{at:.1f} s", f"{distance:.3f} m")
+        output.show(table)
+        output.give([{"at_s": at, "distance_m": distance} for at, distance in reached])
+        output.note(f"run folder: {folder}")
+    return OK
 
 
 def parse_switch(text: str, on_rc_loss: str, on_telemetry_loss: str) -> SwitchSettings | None:
