@@ -7,7 +7,6 @@ autopilots' projects decode DataFlash (pymavlink) and ULog (pyulog).
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
@@ -32,17 +31,6 @@ STATION = "station."
 DATAFLASH, ULOG, TLOG = "DataFlash", "ULog", "tlog"
 _ULOG_MAGIC = b"ULog\x01\x12\x35"
 _DATAFLASH_HEAD = b"\xa3\x95"
-_DAMAGE = (
-    struct.error,
-    EOFError,
-    OSError,
-    LookupError,
-    TypeError,
-    ValueError,
-    AttributeError,
-    ArithmeticError,
-)
-"""What the libraries raise at damaged bytes."""
 _NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
 
 
@@ -161,8 +149,8 @@ def _dataflash(path: Path, wanted: set[str]) -> Tables:
                     name = f"{name}[{instance}]"
                 if time is not None:
                     rows.add(name, time / 1e6, fields)
-        except _DAMAGE:
-            pass  # what was read up to the damage counts
+        except Exception:  # pymavlink raises bare ones at damage; what it read until then counts
+            pass
     return rows.tables()
 
 
@@ -173,7 +161,7 @@ def _ulog(path: Path, wanted: set[str]) -> Tables:
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         try:
             log = ULog(str(path), sorted(wanted) or None, disable_str_exceptions=True)
-        except _DAMAGE as error:
+        except Exception as error:  # pyulog has no class of its own for damage
             raise UsageError(f"{path} is a damaged ULog: {error}") from error
     tables: Tables = {}
     for data in sorted(log.data_list, key=lambda one: (one.name, one.multi_id)):

@@ -107,7 +107,7 @@ class MessageType:
 
 def _packed(field: Field, given: Any) -> bytes:
     if field.text:
-        octets = str(given or "").encode(errors="reat")
+        octets = str(given or "").encode(errors="replace")
         if field.length == _ANY:
             return bytes([len(octets)]) + octets
         return octets[: field.length].ljust(field.length, b"\0")
@@ -135,7 +135,7 @@ def _unpacked(field: Field, payload: bytes, at: int) -> tuple[Any, int] | None:
         return None
     values = struct.unpack_from(form, payload, at)
     if field.text:
-        return values[0].split(b"\0", 1)[0].decode(errors="reat"), end
+        return values[0].split(b"\0", 1)[0].decode(errors="replace"), end
     return (values[0] if field.length == 0 else values), end
 
 

@@ -16,6 +16,7 @@ from typing import Any, BinaryIO, NamedTuple
 
 from mcap import records
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 
 from volery.base.errors import UsageError
@@ -32,6 +33,8 @@ _FRAME = struct.Struct(f"<{MESSAGE_FRAME[2:]}")
 # start, end, uncompressed size, checksum, length of the name of the compression
 _CHUNK_HEAD = struct.Struct("<QQQII")
 _CHUNK_OVERHEAD = _CHUNK_HEAD.size + 8
+_DAMAGE = (McapError, struct.error, ValueError, LookupError, TypeError, OverflowError)
+"""What damaged records raise in ``mcap.records`` and here."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,7 @@ class Reading:
             self._file: BinaryIO = path.open("rb")
         except OSError as error:
             raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
+        self._size = path.stat().st_size
         if self._file.read(len(MAGIC)) != MAGIC:
             self._file.close()
             raise UsageError(f"{path} is not a trace: it does not begin as an MCAP file does")
@@ -111,7 +115,10 @@ class Reading:
         record = self._pending
         while record is not None:
             if record.opcode == Opcode.CHUNK:
-                yield from self._events_of_chunk(record)
+                try:
+                    yield from self._events_of_chunk(record)
+                except _DAMAGE as error:
+                    self._lose(f"a part that follows {clock(self._last)} is damaged: {error}")
             elif record.opcode == Opcode.DATA_END:
                 self.complete = not record.missing
             record = self._next()
@@ -146,7 +153,7 @@ class Reading:
             if len(head) < _HEAD.size:
                 return
             opcode, length = _HEAD.unpack(head)
-            content = self._file.read(min(length, 1 << 40))
+            content = self._file.read(min(length, self._size))
             yield _Record(opcode, content, length - len(content))
             if opcode in (Opcode.DATA_END, Opcode.FOOTER) or len(content) < length:
                 return
@@ -156,12 +163,15 @@ class Reading:
         record = next(self._records, None)
         if record is None or record.missing:
             return record
-        if record.opcode == Opcode.ATTACHMENT:
-            found = records.Attachment.read(_stream(record.content))
-            self.attachments[found.name] = Attachment(found.name, found.media_type, found.data)
-        elif record.opcode == Opcode.METADATA:
-            words = records.Metadata.read(_stream(record.content))
-            self.metadata[words.name] = dict(words.metadata)
+        try:
+            if record.opcode == Opcode.ATTACHMENT:
+                found = records.Attachment.read(_stream(record.content))
+                self.attachments[found.name] = Attachment(found.name, found.media_type, found.data)
+            elif record.opcode == Opcode.METADATA:
+                words = records.Metadata.read(_stream(record.content))
+                self.metadata[words.name] = dict(words.metadata)
+        except _DAMAGE as error:
+            self._lose(f"an attachment is damaged: {error}")
         return record
 
     def _ends_well(self) -> bool:

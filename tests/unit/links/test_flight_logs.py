@@ -79,6 +79,15 @@ def test_damage_inside_a_log_does_not_end_it(copter: Path) -> None:
     assert len(read_flight_log(copter)["ATT"]["time"]) >= 15
 
 
+def test_a_format_that_does_not_exist_ends_the_log_there(copter: Path) -> None:
+    data = copter.read_bytes()
+    copter.write_bytes(
+        data.replace(b"Qff", b"tff", 1) if b"Qff" in data else data.replace(b"BBnNZ", b"FMTnN")
+    )
+    with pytest.raises(UsageError, match="holds no message"):
+        read_flight_log(copter, ["NONE"])
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [

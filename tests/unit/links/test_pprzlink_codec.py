@@ -75,6 +75,19 @@ def test_texts_and_arrays_arrive_as_they_were() -> None:
     assert quantised(channels) == channels
 
 
+def test_a_text_that_is_no_utf_8_is_decoded_with_replacements() -> None:
+    data = bytearray(encode(Frame("INFO_MSG", {"msg": "wind"}, 7, 0)))
+    data[data.index(b"w")] = 0xFF
+    data[-2:] = checksum(data[1:-2])
+    (arrived,) = PprzlinkParser().feed(bytes(data))
+    assert arrived.fields["msg"] == "\ufffdind"
+
+
+def test_a_text_that_has_no_utf_8_is_encoded_with_replacements() -> None:
+    (arrived,) = PprzlinkParser().feed(encode(Frame("INFO_MSG", {"msg": "a\ud800"}, 7, 0)))
+    assert arrived.fields["msg"] == "a?"
+
+
 def test_arrays_of_fixed_length_have_no_count() -> None:
     (kind,) = parse_definitions("=== telemetry 1\n9 POSE: quat float[4], tag char[3], flag char\n")
     payload = kind.pack({"quat": (1.0, 0.5), "tag": "abcdef", "flag": "x"})

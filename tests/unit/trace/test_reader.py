@@ -1,10 +1,13 @@
 """What is written is what is read, byte for byte the same each time, and whatever happens to the file."""
 
 import hashlib
+import struct
 from io import BytesIO
 from pathlib import Path
+from zlib import crc32
 
 import pytest
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
@@ -151,9 +154,37 @@ def test_events_of_a_channel_that_was_introduced_in_a_damaged_part_are_missing(t
     assert second.startswith("what a channel carries")
 
 
+def test_a_damaged_attachment_is_left_out_and_said(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    write_sample(path, 2.0)
+    data = bytearray(path.read_bytes())
+    place = data.index(b"world.json") - 4
+    data[place : place + 4] = b"\xff\xff\xff\xff"  # the length of its name
+    path.write_bytes(data)
+    trace = read(path)
+    assert "world.json" not in trace.attachments
+    assert trace.lost.startswith("an attachment is damaged")
+    assert not trace.complete
+
+
+def test_a_message_that_is_shorter_than_its_frame_is_damage(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    write_sample(path, 2.0)
+    data, place = path.read_bytes(), 8
+    while data[place] != Opcode.CHUNK:
+        place += 9 + int.from_bytes(data[place + 1 : place + 9], "little")
+    body = struct.pack("<BQ", Opcode.MESSAGE, 4) + bytes(4)
+    chunk = bytes(24) + struct.pack("<IIQ", crc32(body), 0, len(body)) + body
+    path.write_bytes(data[:place] + struct.pack("<BQ", Opcode.CHUNK, len(chunk)) + chunk)
+    trace = read(path)
+    assert not trace.events
+    assert "is damaged" in trace.lost
+
+
 @pytest.mark.parametrize(
     ("content", "says"),
     [
+        (b"\x89MCAP0\r\n" * 2 + b"\n\n\n", "does not contain the set-up of its run"),
         (b"", "not a trace"),
         (b"hello, I am a text", "not a trace"),
         (b"\x89MCAP0\r\n", "does not contain the set-up of its run"),

@@ -160,3 +160,68 @@ def test_limits_and_fences_do_not_change() -> None:
     for stated in (Limits(), Fence(SQUARE)):
         with pytest.raises(FrozenInstanceError):
             stated.lowest = -1000.0  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("where", "bound"),
+    [
+        ((0, 0, 4), ""),
+        ((0, 0, 30), ""),
+        ((54, 70, 10), "polygon"),
+        ((52.5, 70, 10), ""),
+        ((0, 70, 33.5), "ceiling"),
+        ((0, 70, 32.5), ""),
+        ((0, 70, 1.5), "floor"),
+        ((0, 70, 2.5), ""),
+        ((0, 100, 10), "zone masts"),
+        ((0, 100, 20), "zone masts"),
+        ((0, 100, 20.5), ""),
+    ],
+)
+def test_bounds_in_flight_have_three_metres_of_tolerance(
+    where: tuple[float, float, float], bound: str
+) -> None:
+    area = corners((-50, -20), (50, -20), (50, 120), (-50, 120))
+    masts = Zone("masts", corners((-20, 90), (20, 90), (20, 110), (-20, 110)), ceiling=AboveHome(20))
+    fence = Fence(polygon=area, floor=AboveHome(5), ceiling=AboveHome(30), no_fly=(masts,))
+    assert list(Bounds(HOME, Limits(), fence).violations(at(*where))) == ([bound] if bound else [])
+
+
+@pytest.mark.parametrize(
+    ("where", "bound"),
+    [
+        ((0, 202.5, 10), ""),
+        ((0, 203.5, 10), "farthest"),
+        ((0, 0, 52.5), ""),
+        ((0, 0, 53.5), "highest"),
+        ((0, 0, -12.5), ""),
+        ((0, 0, -13.5), "lowest"),
+    ],
+)
+def test_limits_in_flight_have_three_metres_of_tolerance(
+    where: tuple[float, float, float], bound: str
+) -> None:
+    limits = Limits(farthest=200.0, highest=50.0, lowest=-10.0)
+    assert list(Bounds(HOME, limits, None).violations(at(*where))) == ([bound] if bound else [])
+
+
+def test_home_is_below_the_ceiling_and_outside_the_zones_or_no_flight_starts() -> None:
+    around = corners((-20, -20), (20, -20), (20, 20), (-20, 20))
+    for ceiling, low, high, said in (
+        (AMSL(900.0), 50, 60, "is not below the fence's ceiling"),
+        (AMSL(901.0), 0, 60, "is in the no-fly zone 'here'"),
+        (AMSL(901.0), 1, 60, ""),
+        (AMSL(901.0), -9, 0, "is in the no-fly zone 'here'"),
+    ):
+        zone = Zone("here", around, floor=AMSL(900.0 + low), ceiling=AMSL(900.0 + high))
+        bounds = Bounds(HOME, Limits(), Fence(ceiling=ceiling, no_fly=(zone,)))
+        assert said in bounds.home_violation
+        assert bool(said) == bool(bounds.home_violation)
+
+
+def test_a_slanted_path_meets_a_zone_only_between_its_floor_and_its_ceiling() -> None:
+    high = Zone("high", corners((40, -10), (60, -10), (60, 10), (40, 10)), floor=AboveHome(40))
+    fence = Fence(no_fly=(high,))
+    assert "no-fly zone 'high'" in check(at(0, 0, 0), at(100, 0, 90), fence)
+    assert "no-fly zone 'high'" in check(at(100, 0, 90), at(0, 0, 0), fence)
+    assert check(at(0, 0, 0), at(100, 0, 60), fence) == ""  # 24 to 36 m

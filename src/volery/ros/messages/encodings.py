@@ -9,6 +9,7 @@ error says so. The field layouts are for code generators.
 from __future__ import annotations
 
 import struct
+from copy import copy
 from functools import cache
 from hashlib import md5
 from typing import Any, NamedTuple
@@ -99,12 +100,25 @@ def _fits(base: str, value: Any) -> bool:
     return True
 
 
+def _types_for(name: str, size: int) -> rosbags.Typestore:
+    """Return the store that decodes a message of `size` bytes.
+
+    rosbags repeats a nested type as often as the bytes say, 2^32 times if they are damaged; no list can have
+    more elements than the message has bytes.
+    """
+    if not _has_lists(name):
+        return store()
+    bounded = copy(store())
+    bounded.max_sequence_length = max(size, 1)
+    return bounded
+
+
 def from_cdr(name: str, data: bytes | memoryview) -> Any:
     """Decode a message of type `name`; raise ``UsageError`` if the bytes are no such message."""
     full = message_name(name)
     _codec(full)
     try:
-        return store().deserialize_cdr(data, full)
+        return _types_for(full, len(data)).deserialize_cdr(data, full)
     except rosbags.SerdeError as error:
         raise UsageError(f"these {len(data)} bytes are no {full}: {error}") from error
 
@@ -246,7 +260,7 @@ def from_ros1(name: str, data: bytes | memoryview) -> Any:
     full = message_name(name)
     message_class(full)
     try:
-        return from_cdr(full, store().ros1_to_cdr(data, full))
+        return from_cdr(full, _types_for(full, len(data)).ros1_to_cdr(data, full))
     except (rosbags.SerdeError, IndexError) as error:
         raise UsageError(f"these {len(data)} bytes are no {full} of ROS 1: {error}") from error
 

@@ -1,5 +1,8 @@
 """ROS 1's names, checksums and bytes; the sums are those that Debian's packages state."""
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
 
 from volery.base.errors import UsageError
@@ -79,3 +82,12 @@ def test_a_type_that_differs_is_refused(name: str) -> None:
 def test_bytes_that_are_no_message(data: bytes) -> None:
     with pytest.raises(UsageError, match=r"are no std_msgs/msg/String"):
         messages.from_ros1("std_msgs/String", data)
+
+
+@pytest.mark.parametrize("decode", [messages.from_cdr, messages.from_ros1])
+@pytest.mark.parametrize("name", ["geometry_msgs/PolygonStamped", "tf2_msgs/TFMessage"])
+def test_a_count_of_elements_that_the_bytes_cannot_hold(decode: Callable[..., Any], name: str) -> None:
+    """A count of 2^32 is refused at once."""
+    data = bytes(4 if decode is messages.from_cdr else 0) + bytes(12) + b"\xff" * 40
+    with pytest.raises(UsageError, match="bytes are no"):
+        decode(name, data)

@@ -1,0 +1,248 @@
+"""Coverage-guided fuzzing of every parser: only errors of this project may leave it.
+
+    pip install atheris
+    python scripts/fuzz_parsers.py TARGET [-runs=N] [-max_total_time=SECONDS] [CORPUS]
+
+TARGET is a name of TARGETS; the options are those of libFuzzer. An input that raises anything else is written
+to the current folder as ``crash-…``. tests/properties/test_hostile_bytes.py keeps what was found.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from importlib.resources import files
+from itertools import islice
+from pathlib import Path
+
+import atheris
+
+with atheris.instrument_imports(include=["volery", "mcap", "rosbags"]):
+    from volery.base.errors import VoleryError
+    from volery.base.units import QuantityError, parse
+    from volery.cost.catalogue import read_catalogue
+    from volery.links.flight_logs import read_flight_log
+    from volery.links.link import Frame
+    from volery.links.mavlink_codec import MavlinkParser, SignedMavlink
+    from volery.links.pprzlink_codec import PPRZLINK, PprzlinkParser
+    from volery.links.pprzlink_messages import DATALINK, TELEMETRY
+    from volery.links.pprzlink_messages import message_type_of as pprz_type_of
+    from volery.links.tlog import read_tlog
+    from volery.model.system_loader import load
+    from volery.ros.messages import Message, new
+    from volery.ros.messages.bags import create_bag, open_bag
+    from volery.ros.messages.encodings import from_cdr, from_ros1, to_cdr, to_ros1
+    from volery.ros.messages.store import idl_fields, interface_messages
+    from volery.run.assembly.model_checks import vocabulary
+    from volery.testing.fuzzing import SEALS
+    from volery.testing.sample_run import sample_events, sample_setup
+    from volery.trace.mcap_writer import McapWriter
+    from volery.trace.reader import Reading
+    from volery.vehicles import address
+
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "tests"))
+from rigs.flight_log_files import dataflash, ulog  # noqa: E402
+
+FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-"))
+VOCABULARY = vocabulary()
+MESSAGES = 200
+"""Messages read of one file: a longer one shows nothing new."""
+TYPES = (
+    "sensor_msgs/msg/NavSatFix",
+    "sensor_msgs/msg/PointCloud2",
+    "diagnostic_msgs/msg/DiagnosticArray",
+    "mavros_msgs/msg/State",
+    "geometry_msgs/msg/PolygonStamped",
+    "tf2_msgs/msg/TFMessage",
+)
+
+
+def _file(suffix: str, read: Callable[[Path], object]) -> Callable[[bytes], None]:
+    """Return a target that reads its input from a file."""
+    path = FOLDER / f"input{suffix}"
+
+    def run(data: bytes) -> None:
+        path.write_bytes(data)
+        with suppress(VoleryError):
+            read(path)
+
+    return run
+
+
+def _mavlink(data: bytes) -> None:
+    MavlinkParser().feed(data)
+
+
+_KEYED = SignedMavlink(bytes(32))
+
+
+def _mavlink_signed(data: bytes) -> None:
+    """A frame is forged here: the fuzzer has no key, so none may be received."""
+    assert not _KEYED.parser().feed(data), "a forged frame was received"
+
+
+def _pprzlink(data: bytes) -> None:
+    PprzlinkParser().feed(data)
+
+
+def _cdr(data: bytes) -> None:
+    with suppress(VoleryError):
+        from_cdr(TYPES[data[0] % len(TYPES)] if data else TYPES[0], data[1:])
+
+
+def _ros1(data: bytes) -> None:
+    with suppress(VoleryError):
+        from_ros1(TYPES[data[0] % len(TYPES)] if data else TYPES[0], data[1:])
+
+
+def _definition(data: bytes) -> None:
+    with suppress(VoleryError):
+        interface_messages("fuzz/msg/Fuzz", data.decode("utf-8", "replace"))
+
+
+def _address(data: bytes) -> None:
+    text = data.decode("utf-8", "surrogateescape")
+    for parse_address in (address.parse, address.parse_listen):
+        with suppress(VoleryError):
+            parse_address(text)
+
+
+def _quantity(data: bytes) -> None:
+    with suppress(QuantityError):
+        parse(data.decode("utf-8", "replace"))
+
+
+def _trace(path: Path) -> None:
+    with Reading(path) as reading:
+        for _ in islice(reading.events(), MESSAGES):
+            pass
+
+
+def _bag(path: Path) -> None:
+    for _ in islice(open_bag(path).messages(), MESSAGES):
+        pass
+
+
+def _tlog(path: Path) -> None:
+    for _ in islice(read_tlog(path), MESSAGES):
+        pass
+
+
+TARGETS: dict[str, Callable[[bytes], None]] = {
+    "mavlink": _mavlink,
+    "mavlink-signed": _mavlink_signed,
+    "pprzlink": _pprzlink,
+    "cdr": _cdr,
+    "ros1": _ros1,
+    "definition": _definition,
+    "address": _address,
+    "quantity": _quantity,
+    "trace": _file(".mcap", _trace),
+    "mcap": _file(".mcap", _bag),
+    "rosbag": _file(".bag", _bag),
+    "tlog": _file(".tlog", _tlog),
+    "flight-log": _file(".bin", read_flight_log),
+    "model": _file(".yaml", lambda path: load(path, VOCABULARY)),
+    "catalogue": _file(".yaml", read_catalogue),
+}
+
+
+def _filled(name: str) -> Message:
+    """Return a message with one element in each of its lists."""
+    message = new(name)
+    for label, kind in idl_fields(name).items():
+        if kind.startswith("sequence<") and "/" in kind:
+            setattr(message, label, [new(kind[9:-1])])
+    return message
+
+
+def _recorded() -> list[bytes]:
+    lines = (ROOT / "tests/golden/frames/mavlink.txt").read_text(encoding="ascii").splitlines()
+    return [bytes.fromhex(line.split()[1]) for line in lines]
+
+
+def _signed() -> list[bytes]:
+    """Return a frame that is signed with another key."""
+    (frame,) = MavlinkParser().feed(_recorded()[0])
+    return [*_recorded(), SignedMavlink(bytes(31) + b"\1").encode(frame, 0)]
+
+
+def _every_pprzlink_message() -> list[bytes]:
+    kinds = [pprz_type_of(sort, number) for sort in (TELEMETRY, DATALINK) for number in range(256)]
+    return [PPRZLINK.encode(Frame(kind.name, {}, 1, 0), 0) for kind in kinds if kind is not None]
+
+
+def _written_trace() -> list[bytes]:
+    path = FOLDER / "seed-trace.mcap"
+    writer = McapWriter(path, sample_setup(7))
+    for event in sample_events(7, 1.0):
+        writer(event)
+    writer.close()
+    return [path.read_bytes()]
+
+
+def _written_bag(name: str, pattern: str) -> list[bytes]:
+    with create_bag(FOLDER / name) as bag:
+        for at, kind in enumerate(TYPES):
+            bag.write(f"/topic{at}", at, _filled(kind))
+    return [next(FOLDER.glob(pattern)).read_bytes()]
+
+
+def _flight_logs() -> list[bytes]:
+    tables = {"ATT": ("Roll,Pitch", [(0.1, 1.0, 2.0), (0.2, 1.0, 2.0)])}
+    columns = {"attitude": ("float[4] q", [(0.1, 1.0, 0.0, 0.0, 0.0)])}
+    logs = (dataflash(FOLDER / "seed.bin", tables), ulog(FOLDER / "seed.ulg", columns))
+    return [log.read_bytes() for log in logs]
+
+
+SEEDS: dict[str, Callable[[], list[bytes]]] = {
+    "mavlink": _recorded,
+    "mavlink-signed": _signed,
+    "pprzlink": _every_pprzlink_message,
+    "cdr": lambda: [bytes([at]) + to_cdr(_filled(name)) for at, name in enumerate(TYPES)],
+    "ros1": lambda: [bytes([at]) + to_ros1(_filled(name)) for at, name in enumerate(TYPES)],
+    "definition": lambda: [
+        b'uint8 A=1\nstd_msgs/Header header\nstring<=5 s "x"\nfloat64[3] v\nint32[<=4] w\n'
+    ],
+    "address": lambda: [b"px4:udp://:14540?system=1", b"ardupilot:serial:///dev/ttyUSB0?baud=57600"],
+    "quantity": lambda: [b"2 ms", b"57600 bit/s", b"0.5 %", b"1e3 kg*m/s^2"],
+    "trace": _written_trace,
+    "mcap": lambda: _written_bag("seed", "seed/*.mcap"),
+    "rosbag": lambda: _written_bag("seed.bag", "seed.bag"),
+    "tlog": lambda: [b"".join(bytes(8) + frame for frame in _recorded()[:10])],
+    "flight-log": _flight_logs,
+    "model": lambda: [(ROOT / "examples/starter/model.yaml").read_bytes()],
+    "catalogue": lambda: [files("volery.cost").joinpath("catalogue.yaml").read_bytes()],
+}
+"""Valid inputs, from which mutations start."""
+
+
+def _sealed(seal: Callable[[bytearray], bytes]) -> Callable[[bytes, int, int], bytes]:
+    """Return a mutator that corrects the checksum of half of its frames, as parsers drop the others."""
+
+    def mutate(data: bytes, size: int, seed: int) -> bytes:
+        mutated = bytes(atheris.Mutate(data, len(data)))
+        return mutated if seed % 2 else seal(bytearray(mutated))[:size]
+
+    return mutate
+
+
+def main() -> None:
+    """Fuzz the target that the command line names."""
+    if len(sys.argv) < 2 or sys.argv[1] not in TARGETS:
+        sys.exit(f"{__doc__}\nTargets: {', '.join(TARGETS)}")
+    name = sys.argv.pop(1)
+    corpus = Path(tempfile.mkdtemp(prefix="seeds-"))
+    for number, seed in enumerate(SEEDS[name]()):
+        (corpus / str(number)).write_bytes(seed)
+    mutators = {"mavlink": SEALS["MAVLink"], "pprzlink": SEALS["pprzlink"]}
+    options = {"custom_mutator": _sealed(mutators[name])} if name in mutators else {}
+    atheris.Setup([*sys.argv, str(corpus)], TARGETS[name], **options)
+    atheris.Fuzz()
+
+
+if __name__ == "__main__":
+    main()
