@@ -1,4 +1,4 @@
-"""How drawing and analysing a model grow with its size: seconds and memory, and the ratio to a tenth of it.
+"""How the work on a model grows with its size: seconds and memory, and the ratio to a tenth of it.
 
 python bench/large_models.py [INSTANCES]
 """
@@ -15,8 +15,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from volery.analysis.system_analysis import analyse
-from volery.drawing.computers import deployment_svg
+from volery.checks.findings import check
+from volery.drawing.deployment import deployment_svg
 from volery.drawing.shapes import functional_svg
+from volery.exchange.uml.uml_model import export_uml, import_uml
+from volery.model.assembly import read_tree
 from volery.model.differences import differences
 from volery.model.system import System
 from volery.model.system_loader import load
@@ -78,8 +81,13 @@ def main() -> None:
             file = Path(folder) / "model.yaml"
             file.write_text(text(instances))
             system = load(file, vocabulary())
+            tree = read_tree(file).plain()
+            uml = export_uml(tree, "large.uml")[0].encode()
             works: dict[str, Callable[[], object]] = {
                 "load": lambda file=file: load(file, vocabulary()),
+                "check": lambda file=file: check(file, vocabulary()),
+                "export": lambda tree=tree: export_uml(tree, "large.uml"),
+                "import": lambda uml=uml: import_uml(uml, "large.uml"),
                 "functional": lambda system=system: functional_svg(system),
                 "deployment": lambda system=system: deployment_svg(system),
                 "analyse": lambda system=system: analyse(system),

@@ -19,10 +19,16 @@ from typer.main import get_command
 
 from volery.cli.main import app
 from volery.cost import load_catalogue
+from volery.drawing.deployment import deployment_svg
+from volery.drawing.page import page
+from volery.drawing.shapes import functional_svg, verification_svg
 from volery.model.document import schema
 from volery.model.faults import FAULTS, TRIAL_FAULTS, Fault
 from volery.model.fields import entries, summary
+from volery.model.system_loader import load
+from volery.report.graph_picture import graph_of_model, graph_svg
 from volery.requirements.observables import NOTED, OBSERVABLES
+from volery.run.assembly.model_checks import vocabulary
 from volery.simulation.autopilots.ardupilot import FIRMWARE as ARDUPILOT
 from volery.simulation.autopilots.autopilot import FirmwareFamily
 from volery.simulation.autopilots.px4 import FIRMWARE as PX4
@@ -376,6 +382,23 @@ def _cell(one: dict[str, Any]) -> str:
     return f"{one['caller']}<br>{' → '.join(one['aircraft'])}{broken}"
 
 
+def delivery_model() -> dict[Path, str]:
+    """The delivery example: its page, and its pictures."""
+    system = load(ROOT / "examples" / "delivery", vocabulary())
+    drawers = {
+        "functional": functional_svg,
+        "deployment": deployment_svg,
+        "verification": verification_svg,
+        "topics": lambda system: graph_svg(graph_of_model(system)),
+    }
+    images = {f"delivery-{view}.svg": draw(system) for view, draw in drawers.items()}
+    links = {view: f"../images/delivery-{view}.svg" for view in drawers}
+    return {
+        **{ROOT / "docs" / "images" / name: text for name, text in images.items()},
+        REFERENCE / "delivery-model.md": MADE + page(system, links),
+    }
+
+
 def pages() -> dict[Path, str]:
     """Return each generated file with its content."""
     reference = {
@@ -391,6 +414,7 @@ def pages() -> dict[Path, str]:
     }
     return {
         **{REFERENCE / name: text for name, text in reference.items()},
+        **delivery_model(),
         ROOT / "docs" / "images" / "packages.svg": package_map(),
     }
 

@@ -11,7 +11,7 @@ from volery.model.system import System
 PICTURES = {
     "functional": "Components with their ports. A ball is a provided interface, a socket a required one.",
     "deployment": "What each computer executes, on board of which vehicle, and the networks between them.",
-    "verification": "The system in its verification environment: who uses it, and the vehicles that it commands.",
+    "verification": "The system in its verification environment, with the vehicles that it commands.",
     "topics": "Who publishes and who subscribes. The nodes of vehicles have MAVROS's topics.",
 }
 """The pictures of a page with their captions."""
@@ -29,7 +29,8 @@ def _lines(system: System, pictures: Mapping[str, str]) -> Iterator[str]:
     variants = [f"allocations: {', '.join(system.allocations)}"] if system.allocations else []
     variants += [f"scenarios: {', '.join(system.scenarios)}"] if system.scenarios else []
     if variants:
-        yield f"\nVariants: {_cell('; '.join(variants))}. This page shows allocation {_cell(system.allocation)}."
+        shown = f"This page shows allocation {system.allocation}." if system.allocation else ""
+        yield f"\nVariants: {_cell('; '.join(variants))}. {_cell(shown)}"
     for view, caption in PICTURES.items():
         if view in pictures:
             yield f"\n![{caption}]({pictures[view]})"

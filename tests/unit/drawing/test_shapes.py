@@ -9,7 +9,7 @@ import pytest
 from lxml import etree
 
 from volery.analysis.system_analysis import analyse
-from volery.drawing.computers import deployment_svg
+from volery.drawing.deployment import deployment_svg
 from volery.drawing.layers import place
 from volery.drawing.mermaid import deployment_mermaid, functional_mermaid, verification_mermaid
 from volery.drawing.shapes import functional_svg, verification_svg

@@ -37,12 +37,14 @@ def draw(
     picture: Annotated[
         str, typer.Option("--format", metavar="svg|mermaid", help="SVG, or Mermaid text.")
     ] = "svg",
+    page: Annotated[
+        bool, typer.Option(help="Also write <model>.md: the pictures with tables of the model.")
+    ] = False,
     allocation: Allocation = None,
     scenario: Scenario = None,
     overrides: Overrides = None,
 ) -> int:
     """Draw a model: its components and ports, its deployment, its verification environment, its topics."""
-    from volery.base.files import write_text
     from volery.model.system_loader import load
     from volery.run.assembly.model_checks import vocabulary
 
@@ -54,6 +56,7 @@ def draw(
     name = re.sub(r"[^A-Za-z0-9._-]+", "-", system.name).strip("-.") or "model"
     drawers = _svg_drawers() if picture == "svg" else _mermaid_drawers()
     wanted = [one for one in VIEWS if one in drawers] if view == "all" else [view]
+    drawn: dict[str, str] = {}
     for one in wanted:
         if one not in drawers:
             raise UsageError(f"--view {one}: as Mermaid text there is {choices(drawers)}")
@@ -63,18 +66,28 @@ def draw(
             if view != "all":  # a model without topics has no such view
                 raise
             continue
-        file = to / f"{name}-{one}.{_SUFFIX[picture]}"
-        try:
-            to.mkdir(parents=True, exist_ok=True)
-            write_text(file, text)
-        except OSError as error:
-            raise UsageError(f"cannot write {file}: {error.strerror or error}") from error
-        output.note(f"written: {file}")
+        drawn[one] = f"{name}-{one}.{_SUFFIX[picture]}"
+        _write(output, to / drawn[one], text)
+    if page:
+        from volery.drawing.page import page as page_of
+
+        _write(output, to / f"{name}.md", page_of(system, drawn if picture == "svg" else {}))
     return OK
 
 
+def _write(output: Output, file: Path, text: str) -> None:
+    from volery.base.files import write_text
+
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_text(file, text)
+    except OSError as error:
+        raise UsageError(f"cannot write {file}: {error.strerror or error}") from error
+    output.note(f"written: {file}")
+
+
 def _svg_drawers() -> dict[str, Callable[[System], str]]:
-    from volery.drawing.computers import deployment_svg
+    from volery.drawing.deployment import deployment_svg
     from volery.drawing.shapes import functional_svg, verification_svg
     from volery.report.graph_picture import graph_of_model, graph_svg
 
