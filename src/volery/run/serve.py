@@ -9,13 +9,15 @@ from volery.base.errors import UsageError
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.links.coded_link import CodedLink
+from volery.links.link import Codec
+from volery.links.mavlink_codec import MAVLINK
 from volery.run.assembly.ros_graphs import open_graph
 from volery.run.assembly.simulated_fleet import SimulatedFleet, fleet_of
 from volery.run.assembly.simulated_vehicles import SimulatedVehicle
 from volery.run.assembly.vehicle_nodes import graph_access
 from volery.simulation.autopilots.autopilot import firmwares
 from volery.trace.events import Event, LinkState
-from volery.vehicles.address import SIGNING, Address, listen, parse_listen
+from volery.vehicles.address import LOCAL_PORT, SIGNING, Address, listen, parse_listen
 
 
 def has_links(autopilot: str) -> bool:
@@ -64,9 +66,27 @@ class VehicleServer:
         self.addresses = [one for one, _ in stations]
         self.links: list[CodedLink] = []
         for place, (one, use) in enumerate(stations):
-            link = listen(self.kernel, one, on_connect=partial(self._greet, place), codec=codec)
+            link = self._open(one, place, codec, usual=address is None)
             self.links.append(link)
             self._autopilot.connect(link, use=use)
+
+    def _open(self, address: Address, place: int, codec: Codec, *, usual: bool) -> CodedLink:
+        """Open a link.
+
+        A usual MAVLink address falls back to any local port where its own is in use; a ground station of
+        pprzlink must know the port to send to.
+        """
+        greet = partial(self._greet, place)
+        try:
+            return listen(self.kernel, address, on_connect=greet, codec=codec)
+        except UsageError:
+            port = address.options.get(LOCAL_PORT)
+            if not usual or port is None or codec is not MAVLINK:
+                raise
+            self._notice(
+                f"UDP port {port} is in use: {address.host}:{address.port} is served from another port"
+            )
+            return listen(self.kernel, address.with_option(LOCAL_PORT, "0"), on_connect=greet, codec=codec)
 
     def _record(self, event: Event) -> None:
         if isinstance(event, LinkState) and event.state == "full":

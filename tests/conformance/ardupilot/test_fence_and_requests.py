@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi
 from typing import Any
 
 import pytest
@@ -214,6 +215,72 @@ def test_messages_that_want_an_answer_get_one(
     if answer == "FILE_TRANSFER_PROTOCOL":
         payload = rig.latest[answer]["payload"]
         assert (payload[0], payload[3], payload[5], payload[12]) == (2, NAK, 4, 10)
+
+
+def test_the_deprecated_form_of_rally_points_is_stored_and_read_back(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    place = {"lat": -353612350, "lng": 1491610520, "alt": 100, "break_alt": 0, "land_dir": 0, "flags": 0}
+    rig.send("RALLY_POINT", **TARGET, idx=0, count=2, **place)
+    rig.run(0.05)
+    assert rig.texts()[-1] == "Bad rally point message ID"
+    rig.send("PARAM_SET", **TARGET, param_id="RALLY_TOTAL", param_value=2.0, param_type=2)
+    rig.run(0.05)
+    rig.send("RALLY_POINT", **TARGET, idx=0, count=1, **place)
+    rig.run(0.05)
+    assert rig.texts()[-1] == "Bad rally point message count"
+    for index in (0, 1):
+        rig.send("RALLY_POINT", **TARGET, idx=index, count=2, **{**place, "alt": 100 + index})
+        rig.send("RALLY_FETCH_POINT", **TARGET, idx=index)
+        rig.run(0.05)
+        read = rig.latest["RALLY_POINT"]
+        assert (read["idx"], read["count"], read["lat"], read["alt"]) == (index, 2, place["lat"], 100 + index)
+
+
+ON_THE_GROUND: list[tuple[str, tuple[float, ...], int]] = [
+    ("the first relay has a pin", (181, 0, 1), ACCEPTED),
+    ("the second has none", (181, 1, 1), FAILED),
+    ("a relay again and again", (182, 0, 3, 1), ACCEPTED),
+    ("a servo again and again", (184, 9, 1700, 3, 1), ACCEPTED),
+    ("a servo that is a motor", (184, 1, 1700, 3, 1), FAILED),
+    ("a motor test", (209, 1, 0, 5, 1), ACCEPTED),
+    ("a motor that is not there", (209, 9, 0, 5, 1), FAILED),
+    ("calibration of the compass", (42424, 0, 1, 1), ACCEPTED),
+    ("its end", (42426,), ACCEPTED),
+    ("a place to look at", (201, 0, 0, 0, 0, LATITUDE, LONGITUDE, 0), ACCEPTED),
+    ("no place on the globe", (201, 0, 0, 0, 0, 91.0, LONGITUDE, 0), FAILED),
+]
+
+
+def test_commands_of_ground_stations_are_answered(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    for what, command, result in ON_THE_GROUND:
+        assert rig.command(*command) == result, what
+    before = len(rig.texts())
+    assert rig.command(42428) == ACCEPTED
+    assert rig.texts()[before].startswith("ArduCopter V4.5.6")
+
+
+def test_nothing_is_tested_or_calibrated_in_the_air(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    assert rig.command(209, 1, 0, 5, 1) == FAILED
+    assert rig.texts()[-1] == "Motor Test: vehicle not landed"
+    assert rig.command(42424, 0, 1, 1) == FAILED
+
+
+def test_the_nose_follows_a_region_of_interest_until_it_is_cleared(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    assert rig.command(195, 0, 0, 0, 0, LATITUDE, LONGITUDE + 0.001, 0) == ACCEPTED
+    rig.run(6.0)
+    assert rig.vehicle.estimate.attitude[2] == pytest.approx(pi / 2, abs=0.05)
+    rig.send("SET_POSITION_TARGET_LOCAL_NED", **TARGET, coordinate_frame=1, type_mask=3576, x=90.8, z=-10.0)
+    rig.run(25.0)
+    assert rig.vehicle.estimate.attitude[2] == pytest.approx(3 * pi / 4, abs=0.1)
+    assert rig.command(197) == ACCEPTED
+    assert rig.vehicle.commanded.look_at is None
 
 
 def test_terrain_is_unknown_on_board(bench: Any) -> None:

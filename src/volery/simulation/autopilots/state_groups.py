@@ -136,6 +136,8 @@ class CommandedLimits:
     """Angle by which ``yaw`` still turns, clockwise [rad], for firmwares that turn it at a rate."""
     yaw_rate: float = 0.0
     """That rate [rad/s]."""
+    look_at: Vector | None = None
+    """Region of interest that the nose follows, for firmwares that turn it: north, east, down [m]."""
 
 
 @dataclass

@@ -22,6 +22,7 @@ from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.manoeuvres.rover_driving import GuidedRover
+from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.mavlink.messages import (
     ACCEPTED,
     DENIED,
@@ -38,7 +39,16 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 LOITER_UNLIMITED, RETURN, LAND, TAKEOFF = 17, 20, 21, 22
 CONDITION_YAW, DO_SET_MODE, CHANGE_SPEED, SET_HOME = 115, 176, 178, 179
 FLIGHT_TERMINATION, REPOSITION, PAUSE_CONTINUE, SET_YAW_SPEED, SET_MISSION_CURRENT = 185, 192, 193, 213, 224
-SET_SERVO, FENCE_ENABLE, RUN_PREARM_CHECKS = 183, 207, 401
+SET_RELAY, REPEAT_RELAY, SET_SERVO, REPEAT_SERVO, FENCE_ENABLE, RUN_PREARM_CHECKS = (
+    181,
+    182,
+    183,
+    184,
+    207,
+    401,
+)
+ROI_LOCATION, ROI_NONE, ROI, MOTOR_TEST = 195, 197, 201, 209
+START_MAG_CAL, ACCEPT_MAG_CAL, CANCEL_MAG_CAL = 42424, 42425, 42426
 CALIBRATION, STORAGE, REBOOT, MISSION_START, ARM_DISARM, GET_HOME = 241, 245, 246, 300, 400, 410
 
 HIGHEST = 83_000.0
@@ -48,6 +58,9 @@ FARTHEST_POINT = 2.1e7
 """Largest distance of a target that is flown towards [m]: any point of the globe."""
 
 LONGEST_PULSE = 65_535
+RELAY_FUNCTION = 1
+"""RELAYn_FUNCTION of a relay that commands switch."""
+MOTORS = 4
 
 Problems = Callable[[Vehicle], list[str]]
 
@@ -159,6 +172,7 @@ def turn_to(vehicle: Vehicle, degrees: float, rate: float, direction: float, rel
         relative: Whether ``degrees`` counts from the present heading.
     """
     commanded = vehicle.commanded
+    commanded.look_at = None
     now = vehicle.estimate.attitude[2] if commanded.yaw is None else commanded.yaw
     if relative:
         left = -radians(degrees) if direction < 0.0 else radians(degrees)
@@ -173,8 +187,10 @@ def turn_to(vehicle: Vehicle, degrees: float, rate: float, direction: float, rel
 
 
 def continue_turn(vehicle: Vehicle, seconds: float) -> None:
-    """Move the commanded heading along its turn by some seconds."""
+    """Move the commanded heading along its turn by some seconds, or keep it on the region of interest."""
     commanded = vehicle.commanded
+    if commanded.look_at is not None:
+        commanded.yaw, commanded.yaw_left = bearing(vehicle.estimate.position, commanded.look_at), 0.0
     if commanded.yaw is None or not commanded.yaw_left:
         return
     most = commanded.yaw_rate * seconds
@@ -273,7 +289,7 @@ def on_set_current(vehicle: Vehicle, command: Command) -> int:
 
 
 def on_calibration(vehicle: Vehicle, _command: Command) -> int:
-    """Handle PREFLIGHT_CALIBRATION and PREFLIGHT_STORAGE: accepted without effect while disarmed."""
+    """Handle PREFLIGHT_CALIBRATION, PREFLIGHT_STORAGE and those of the compass: no effect while disarmed."""
     return FAILED if vehicle.armed else ACCEPTED
 
 
@@ -328,6 +344,32 @@ def on_set_servo(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
+def on_relay(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_SET_RELAY and DO_REPEAT_RELAY: a relay exists where a pin is assigned to it."""
+    function = f"RELAY{round(command.param1) + 1}_FUNCTION"
+    exists = function in vehicle.parameters and vehicle.parameters[function] == RELAY_FUNCTION
+    return ACCEPTED if exists else FAILED
+
+
+def on_region(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_SET_ROI and its two forms: without a mount the nose turns to the place."""
+    if command.number == ROI_NONE or (command.x == 0.0 and command.y == 0.0):
+        vehicle.commanded.look_at = None
+        return ACCEPTED
+    if not _is_place(command):
+        return FAILED
+    vehicle.commanded.look_at = vehicle.point(command.frame, command.x, command.y, command.z)
+    return ACCEPTED
+
+
+def on_motor_test(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_MOTOR_TEST: only on the ground and disarmed; the test does not move anything."""
+    if vehicle.armed or not vehicle.landed:
+        vehicle.send_text(CRITICAL, "Motor Test: vehicle not landed")
+        return FAILED
+    return ACCEPTED if 1.0 <= command.param1 <= MOTORS else FAILED
+
+
 def shared_commands(
     problems: Problems, prearm: Problems, words: tuple[str, str], guided: int
 ) -> dict[int, Handler]:
@@ -354,6 +396,16 @@ def shared_commands(
         REBOOT: on_reboot,
         RUN_PREARM_CHECKS: partial(on_prearm_checks, problems=prearm),
         SET_SERVO: on_set_servo,
+        REPEAT_SERVO: on_set_servo,
+        SET_RELAY: on_relay,
+        REPEAT_RELAY: on_relay,
+        ROI: on_region,
+        ROI_LOCATION: on_region,
+        ROI_NONE: on_region,
+        MOTOR_TEST: on_motor_test,
+        START_MAG_CAL: on_calibration,
+        ACCEPT_MAG_CAL: on_calibration,
+        CANCEL_MAG_CAL: on_calibration,
         FENCE_ENABLE: on_fence_enable,
     }
 

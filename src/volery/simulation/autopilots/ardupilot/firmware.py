@@ -1,7 +1,6 @@
 """MAVLink tables that ArduPilot's copter and rover share: messages, telemetry streams, answers to requests.
 
-There are no logs and no files on board; requests for them are answered as the original answers for what is
-not there.
+Fence and rally points are served in their deprecated messages, too.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED
 from volery.simulation.autopilots.ardupilot.telemetry import Health
 from volery.simulation.autopilots.flight_stack.flight import Flight
-from volery.simulation.autopilots.mavlink import messages
+from volery.simulation.autopilots.mavlink import messages, onboard_files
 from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.mavlink.firmware import (
     Builder,
@@ -31,63 +30,22 @@ from volery.simulation.autopilots.mavlink.firmware import (
     QuestionHandler,
     TelemetryPolicy,
 )
-from volery.simulation.autopilots.mavlink.messages import DENIED, FAILED, Handler
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED, Command, Handler
+from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
 
 WARNING = 4
 """MAV_SEVERITY."""
 
-SESSION_END, SESSION_RESET, LIST, OPEN_READ, CHECKSUM = 1, 2, 3, 4, 14
-ACK, NAK = 128, 129
-"""Operations of FILE_TRANSFER_PROTOCOL."""
-
-FAIL, END_OF_FILE, UNKNOWN, NOT_FOUND = 1, 6, 7, 10
-"""Error codes of a NAK."""
-
-READS = frozenset({5, 15})
-WRITES = frozenset({6, 7, 8, 9, 10, 11, 12, 13})
-FTP_SIZE, HEADER = 251, 12
+SEND_BANNER = 42_428
 
 
-def _ftp_reply(asked: list[int], error: int | None) -> list[int]:
-    """Return the payload of a reply.
-
-    Args:
-        asked: Payload of the request.
-        error: Error code of a refusal; ``None``: an acknowledgement.
-    """
-    number = (asked[0] | asked[1] << 8) + 1 & 0xFFFF
-    data = [] if error is None else [error]
-    head = [number & 0xFF, number >> 8, asked[2], ACK if error is None else NAK, len(data), asked[3]]
-    return [*head, 0, 0, *asked[8:HEADER], *data, *([0] * (FTP_SIZE - HEADER - len(data)))]
-
-
-def _ftp_error(asked: list[int]) -> int | None:
-    """Return the error of an operation on an empty file system."""
-    operation = asked[3]
-    if operation in (0, SESSION_END, SESSION_RESET):
-        return None
-    if operation == LIST:
-        name = bytes(asked[HEADER : HEADER + asked[4]]).strip(b"/\0")
-        return END_OF_FILE if name in (b"", b".") else NOT_FOUND
-    if operation in (OPEN_READ, CHECKSUM):
-        return NOT_FOUND
-    return FAIL if operation in READS | WRITES else UNKNOWN
-
-
-def on_file_transfer(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
-    """Handle FILE_TRANSFER_PROTOCOL: the directory is empty."""
-    asked = [int(byte) for byte in fields["payload"]]
-    asked += [0] * (FTP_SIZE - len(asked))
-    sender.answer("FILE_TRANSFER_PROTOCOL", target_network=0, payload=_ftp_reply(asked, _ftp_error(asked)))
-
-
-def on_log_list(vehicle: Vehicle, _fields: dict[str, Any], sender: Peer) -> None:
-    """Handle LOG_REQUEST_LIST: one LOG_ENTRY says that there is none; an armed vehicle sends nothing."""
+def on_log_list(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
+    """Handle LOG_REQUEST_LIST: an armed vehicle sends no list."""
     if vehicle.armed:
         vehicle.send_text(WARNING, "Disarm for log download")
-        return
-    sender.send("LOG_ENTRY", {"id": 0, "num_logs": 0, "last_log_num": 0, "time_utc": 0, "size": 0})
+    else:
+        onboard_files.on_log_list(vehicle, fields, sender)
 
 
 def on_terrain_check(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
@@ -113,7 +71,21 @@ def on_rally_fetch(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> No
         return
     point = points[index]
     place = {"lat": point.x, "lng": point.y, "alt": round(point.z), "break_alt": 0, "land_dir": 0, "flags": 0}
-    sender.answer("RALLY_POINT", idx=index, count=len(points), **place)
+    sender.answer("RALLY_POINT", idx=index, count=round(vehicle.parameters["RALLY_TOTAL"]), **place)
+
+
+def on_rally_point(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """Handle RALLY_POINT, the deprecated form: RALLY_TOTAL states the number of points first."""
+    points, index = vehicle.points.get(RALLY, []), fields["idx"]
+    if index >= vehicle.parameters["RALLY_TOTAL"]:
+        vehicle.send_text(WARNING, "Bad rally point message ID")
+    elif fields["count"] != vehicle.parameters["RALLY_TOTAL"]:
+        vehicle.send_text(WARNING, "Bad rally point message count")
+    else:
+        blank = MissionItem(failsafes.RALLY_POINT, GLOBAL_RELATIVE)
+        points = [*points, *([blank] * (index + 1 - len(points)))]
+        points[index] = blank._replace(x=fields["lat"], y=fields["lng"], z=float(fields["alt"]))
+        vehicle.points[RALLY] = points
 
 
 def questions(version: Builder) -> dict[str, QuestionHandler]:
@@ -125,7 +97,7 @@ def questions(version: Builder) -> dict[str, QuestionHandler]:
     return {
         "AUTOPILOT_VERSION_REQUEST": on_version,
         "FENCE_FETCH_POINT": on_fence_fetch,
-        "FILE_TRANSFER_PROTOCOL": on_file_transfer,
+        "FILE_TRANSFER_PROTOCOL": onboard_files.on_file_transfer,
         "LOG_REQUEST_LIST": on_log_list,
         "RALLY_FETCH_POINT": on_rally_fetch,
         "TERRAIN_CHECK": on_terrain_check,
@@ -332,6 +304,7 @@ def builders(
 
 MESSAGE_HANDLERS = {
     "HEARTBEAT": pilot_input.on_heartbeat,
+    "RALLY_POINT": on_rally_point,
     "MANUAL_CONTROL": pilot_input.on_manual_control,
     "RC_CHANNELS_OVERRIDE": pilot_input.on_override,
 }
@@ -350,6 +323,11 @@ def ardupilot_mavlink(
     least_period: Ns = 3 * MS,
 ) -> MavlinkFirmware:
     """Return the MAVLink rules of one kind of vehicle: the shared ones, and the arguments."""
+
+    def on_banner(vehicle: Vehicle, _command: Command) -> int:
+        on_parameter_list(vehicle)
+        return ACCEPTED
+
     return MavlinkFirmware(
         start=start._replace(timesync_every=10 * S),
         telemetry=TelemetryPolicy(
@@ -363,7 +341,7 @@ def ardupilot_mavlink(
             unknown_message=FAILED,
         ),
         commands=CommandPolicy(
-            commands=commands,
+            commands={**commands, SEND_BANNER: on_banner},
             handlers={**MESSAGE_HANDLERS, **handlers},
             set_mode=set_mode,
             set_mode_ack=11,

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.mavlink.channel import Peer, StatusTextPolicy
-from volery.simulation.autopilots.mavlink.messages import Handler
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, Handler
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction, do_nothing
 
@@ -117,6 +117,8 @@ class TelemetryPolicy:
     """Return the MAV_RESULT of an interval for an unknown message number."""
     unknown_message: int
     """MAV_RESULT of a request for an unknown message."""
+    nothing_to_send: int = ACCEPTED
+    """MAV_RESULT of a request for a message that the firmware does not send now."""
     on_mode_change: Sequence[str] = ("HEARTBEAT",)
     """Messages that a change of mode sends at once on all links."""
     on_home_change: Sequence[str] = ("GPS_GLOBAL_ORIGIN", "HOME_POSITION")

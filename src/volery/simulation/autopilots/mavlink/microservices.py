@@ -99,6 +99,8 @@ class CommandService:
         name = self._name(round(finite(command.param1)))
         if name is None:
             return self._firmware.telemetry.unknown_message
+        if self._firmware.telemetry.messages[name](self._vehicle) is None:
+            return self._firmware.telemetry.nothing_to_send
         return self._send(peer, name)
 
     def _send(self, peer: Peer, name: str) -> int:

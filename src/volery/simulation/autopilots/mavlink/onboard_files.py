@@ -1,0 +1,83 @@
+"""Files, logs and the shell of a simulated autopilot: there are none, and each request is answered so.
+
+A request without an answer makes a client wait for its time-out, or for ever. What an original leaves
+unanswered for what does not exist (LOG_REQUEST_DATA of a log that is not in the list) is not answered here
+either.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from volery.simulation.autopilots.mavlink.channel import Peer
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+SESSION_END, SESSION_RESET, LIST, OPEN_READ, CHECKSUM = 1, 2, 3, 4, 14
+ACK, NAK = 128, 129
+"""Operations of FILE_TRANSFER_PROTOCOL."""
+
+FAIL, END_OF_FILE, UNKNOWN, NOT_FOUND = 1, 6, 7, 10
+"""Error codes of a NAK."""
+
+READS = frozenset({5, 15})
+WRITES = frozenset({6, 7, 8, 9, 10, 11, 12, 13})
+FTP_SIZE, HEADER = 251, 12
+
+SHELL, REPLY = 10, 1
+"""SERIAL_CONTROL_DEV of the shell, SERIAL_CONTROL_FLAG of an answer."""
+
+SHELL_SIZE = 70
+PROMPT = b"nsh> "
+
+
+def _ftp_reply(asked: list[int], error: int | None) -> list[int]:
+    """Return the payload of a reply.
+
+    Args:
+        asked: Payload of the request.
+        error: Error code of a refusal; ``None``: an acknowledgement.
+    """
+    number = (asked[0] | asked[1] << 8) + 1 & 0xFFFF
+    data = [] if error is None else [error]
+    head = [number & 0xFF, number >> 8, asked[2], ACK if error is None else NAK, len(data), asked[3]]
+    return [*head, 0, 0, *asked[8:HEADER], *data, *([0] * (FTP_SIZE - HEADER - len(data)))]
+
+
+def _ftp_error(asked: list[int]) -> int | None:
+    """Return the error of an operation on an empty file system."""
+    operation = asked[3]
+    if operation in (0, SESSION_END, SESSION_RESET):
+        return None
+    if operation == LIST:
+        name = bytes(asked[HEADER : HEADER + asked[4]]).strip(b"/\0")
+        return END_OF_FILE if name in (b"", b".") else NOT_FOUND
+    if operation in (OPEN_READ, CHECKSUM):
+        return NOT_FOUND
+    return FAIL if operation in READS | WRITES else UNKNOWN
+
+
+def on_file_transfer(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
+    """Handle FILE_TRANSFER_PROTOCOL: the directory is empty."""
+    asked = [int(byte) for byte in fields["payload"]]
+    asked += [0] * (FTP_SIZE - len(asked))
+    sender.answer("FILE_TRANSFER_PROTOCOL", target_network=0, payload=_ftp_reply(asked, _ftp_error(asked)))
+
+
+def on_log_list(_vehicle: Vehicle, _fields: dict[str, Any], sender: Peer) -> None:
+    """Handle LOG_REQUEST_LIST: one LOG_ENTRY says that there is no log."""
+    sender.send("LOG_ENTRY", {"id": 0, "num_logs": 0, "last_log_num": 0, "time_utc": 0, "size": 0})
+
+
+def on_shell(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
+    """Handle SERIAL_CONTROL: the shell has no commands; other devices do not exist."""
+    if fields["device"] != SHELL or fields["flags"] & REPLY:
+        return
+    typed = bytes(int(byte) for byte in fields["data"][: fields["count"]])
+    lines = typed.decode("ascii", "replace").splitlines()
+    words = [line.split(maxsplit=1)[0] for line in lines if line.strip()]
+    reply = b"".join(f"nsh: {word}: command not found\n".encode() for word in words) + PROMPT
+    for start in range(0, len(reply), SHELL_SIZE):
+        piece = reply[start : start + SHELL_SIZE]
+        data = [*piece, *([0] * (SHELL_SIZE - len(piece)))]
+        fields = {"device": SHELL, "flags": REPLY, "timeout": 0, "baudrate": 0, "count": len(piece)}
+        sender.send("SERIAL_CONTROL", {**fields, "data": data})
