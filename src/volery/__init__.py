@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from volery.base.errors import CapabilityError as CapabilityError
     from volery.base.errors import ComponentError as ComponentError
+    from volery.base.errors import ControlLost as ControlLost
     from volery.base.errors import Deadlock as Deadlock
     from volery.base.errors import EstimateError as EstimateError
     from volery.base.errors import Failsafe as Failsafe

@@ -124,6 +124,10 @@ class PositionLost(VehicleError):
     """The vehicle has lost its position in the air: no satellites, or no estimate is reported any more."""
 
 
+class ControlLost(VehicleError):
+    """The vehicle falls or has turned over in the air, as with a motor lost."""
+
+
 class LowBattery(VehicleError):
     """The battery is below its reserve: only landing and returning home may be started."""
 

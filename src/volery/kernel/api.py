@@ -59,6 +59,13 @@ class Kernel(Protocol):
         Virtual time runs while that task blocks and stands still while it does not.
         """
 
+    def joined(self) -> AbstractContextManager[None]:
+        """Let a thread that the kernel did not start wait while the context manager lasts.
+
+        On the wall clock the thread is a task meanwhile. Raises ``UsageError`` in a framework callback; also
+        in virtual time, which only the thread of its script can pass.
+        """
+
     def current(self) -> Task | None:
         """Return the running task; None in a framework callback."""
 

@@ -409,6 +409,7 @@ class VirtualKernel:
         task = Task(name, ExecutionContext(name), self.root)
         task.adopted = True
         task.flow = self._owner = getcurrent()
+        self._script_thread = threading.get_ident()
         self._until = FOREVER
         self._adopted = self._current = task
         try:
@@ -420,6 +421,17 @@ class VirtualKernel:
             self._adopted = self._current = None
             self._horizon = NEVER
             self._bury(task)
+
+    @contextmanager
+    def joined(self) -> Iterator[None]:
+        """Raise ``UsageError`` in a thread of a script: it cannot pass virtual time."""
+        if self._adopted is not None and threading.get_ident() != self._script_thread:
+            raise UsageError(
+                f"the thread {threading.current_thread().name!r} cannot wait in virtual time: call simulated "
+                "vehicles from the thread that has connected to them; several at once by connect_fleet() and "
+                "Fleet.each(), or as components of a model"
+            )
+        yield
 
     # -- the end
 

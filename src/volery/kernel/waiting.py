@@ -27,7 +27,7 @@ Predicate = Callable[[], object]
 MAX_PERIODS_LATE = 2
 """A loop that is later than this does not catch up but counts anew, as rospy's ``Rate`` does."""
 
-_NO_TASK = "only a task can wait: call this from a component, or from a script within adopt()"
+_NO_TASK = "only a task can wait: call this from a component, or from the thread that has called connect()"
 _FRAMEWORK = __name__.partition(".")[0] + "."
 
 

@@ -248,9 +248,13 @@ class WallKernel:
             raise UsageError("run() from inside a task: time runs by itself")
         self._stop()
         self._begin()
-        with self._interrupts:
-            while self._step(until):
-                pass
+        self._local.runs = True
+        try:
+            with self._interrupts:
+                while self._step(until):
+                    pass
+        finally:
+            self._local.runs = False
 
     def _step(self, until: Ns) -> bool:
         """Execute one due event, or wait for one; return False if there will be none."""
@@ -342,6 +346,31 @@ class WallKernel:
             pass
         finally:
             self._local.task = self._adopted = None
+            self._bury(task)
+
+    @contextmanager
+    def joined(self) -> Iterator[None]:
+        """Make the calling thread a task, unless it is one, until the context ends.
+
+        Raises:
+            UsageError: In a framework callback; or the kernel is closed meanwhile.
+        """
+        if self.current() is not None:
+            yield
+            return
+        if threading.current_thread() is self._hub or getattr(self._local, "runs", False):
+            raise UsageError("a framework callback must not wait")
+        name = threading.current_thread().name
+        with self._monitor:
+            task = Task(name, ExecutionContext(name), self.root)
+            task.flow = Flow(threading.Condition(self._monitor))
+        self._local.task = task
+        try:
+            yield
+        except Cancelled as cancelled:
+            raise UsageError(f"{name}: the connection was closed meanwhile: {cancelled}") from None
+        finally:
+            self._local.task = None
             self._bury(task)
 
     # -- the end

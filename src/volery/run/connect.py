@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from logging import getLogger
 from typing import TypeVar
 
 from volery.base.errors import UsageError, VoleryError
@@ -16,6 +17,9 @@ V = TypeVar("V", bound=Vehicle)
 
 SCRIPT = "script"
 
+LOCATED_WITHIN_S = 90.0
+"""Longest wait for a position: a receiver that has just been switched on takes about a minute."""
+
 
 @contextmanager
 def connect(
@@ -25,8 +29,11 @@ def connect(
     seed: int = 1,
     limits: Limits | None = None,
     fence: Fence | None = None,
+    within: float = LOCATED_WITHIN_S,
 ) -> Iterator[V]:
-    """Connect to the vehicle at *url* and yield it as soon as its telemetry arrives.
+    """Connect to the vehicle at *url* and yield it as soon as it knows where it is.
+
+    While a real one does not, the logger ``volery`` says every few seconds what is missing.
 
     Works in a plain script and in an interactive session. A simulated vehicle (``sim:ardupilot``) lives in
     virtual time, which passes only while a call blocks. A real vehicle lives in real time. At the end of the
@@ -38,9 +45,11 @@ def connect(
         seed: Seed of the simulation.
         limits: Limits that every operation must keep.
         fence: Geofence that every operation must keep.
+        within: Longest time to wait for position and home, s; 0 does not wait, as indoors.
 
     Raises:
         UsageError: The address is wrong, or the fence excludes home.
+        NotArrived: Position or home are not known in time.
         LinkSilent: No autopilot answers at the address.
         LinkGarbled: Something else than the expected protocol arrives.
         CapabilityError: The autopilot that answers is of another kind.
@@ -50,6 +59,7 @@ def connect(
         vehicle = opened.vehicles[0]
         assert isinstance(vehicle, kind)
         vehicle.wait_connected()
+        vehicle.wait_located(within, _teller(opened))
         with _ending(vehicle.come_to_rest):
             yield vehicle
 
@@ -62,6 +72,7 @@ def connect_fleet(
     seed: int = 1,
     limits: Limits | None = None,
     fence: Fence | None = None,
+    within: float = LOCATED_WITHIN_S,
 ) -> Iterator[Fleet]:
     """Connect to several vehicles, as ``connect`` does to one, and yield them as a fleet.
 
@@ -80,9 +91,10 @@ def connect_fleet(
         seed: Seed of the simulation.
         limits: Limits of each vehicle.
         fence: Geofence of each vehicle.
+        within: Longest time to wait for positions and homes, s; 0 does not wait.
 
     Raises:
-        FleetError: Some of the vehicles do not answer.
+        FleetError: Some of the vehicles do not answer, or do not know where they are in time.
         VoleryError: As for ``connect``.
     """
     if not urls:
@@ -91,8 +103,14 @@ def connect_fleet(
     with _opened(urls, kinds, VehicleSettings(seed=seed, limits=limits, fence=fence)) as opened:
         fleet = Fleet({vehicle.name: vehicle for vehicle in opened.vehicles})
         fleet.each(lambda vehicle: vehicle.wait_connected(), "connect")
+        fleet.each(lambda vehicle: vehicle.wait_located(within, _teller(opened)), "know where they are")
         with _ending(lambda: fleet.each(lambda vehicle: vehicle.come_to_rest(), "come to rest")):
             yield fleet
+
+
+def _teller(opened: OpenedVehicles) -> Callable[[str], object] | None:
+    """Return what reports a wait; None in virtual time, where it takes no time."""
+    return getLogger("volery").warning if isinstance(opened.kernel, WallKernel) else None
 
 
 @contextmanager

@@ -109,6 +109,10 @@ class _GroupOperation:
 
     def run(self) -> dict[str, Any]:
         """Start all tasks and wait for all of them."""
+        with self._kernel.joined():
+            return self._run()
+
+    def _run(self) -> dict[str, Any]:
         with self._kernel as kernel:
             caller = current_task(kernel)
             scope = caller.scope.child(self._asked)

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from math import inf, nan
 from typing import NamedTuple
 
+from volery.base.errors import ControlLost
 from volery.base.position import Position
-from volery.base.time import Ns, S
+from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
 
@@ -81,6 +82,12 @@ _CAUSES: Mapping[str, tuple[str, ...]] = {
 }
 """Words in an autopilot's texts that tell the cause of a failsafe."""
 _LOW_SHARE = 0.15
+
+FALLING_M_S = 8.0
+"""Sink rate that no autopilot commands by itself, m/s."""
+OVERTURNED_DEG = 70.0
+OVERTURNED_FOR: Ns = 300 * MS
+_UPSET_TEXTS = ("thrust loss", "crash: disarm", "motor failure", "attitude failure", "failure detected")
 
 
 class Telemetry:
@@ -254,6 +261,57 @@ def failsafe_cause(telemetry: Telemetry, now: Ns) -> str:
     if telemetry.battery.remaining <= _LOW_SHARE:
         return "battery"
     return "not stated by the autopilot"
+
+
+class UpsetMonitor:
+    """Notices a multirotor that falls or has turned over, from its telemetry and recent texts.
+
+    With one of four motors lost it turns over within half a second and falls: 8 m/s after 0.8 s.
+
+    Args:
+        telemetry: telemetry of the vehicle.
+    """
+
+    def __init__(self, telemetry: Telemetry) -> None:
+        self._telemetry = telemetry
+        self._checked: Ns = -1
+        self._tilted_since: Ns | None = None
+
+    def check(self, operation: str, now: Ns) -> ControlLost | None:
+        """Return the error that must end the operation, or ``None``.
+
+        Args:
+            operation: what the vehicle is doing, for the error message.
+            now: the present time, ns.
+        """
+        seen, before = self._telemetry, self._checked
+        self._checked = now
+        if now - before > OVERTURNED_FOR:
+            self._tilted_since = None
+        if not (seen.flying and seen.armed) or seen.kind != "drone" or seen.stale:
+            self._tilted_since = None
+            return None
+        what = self._upset(now)
+        if not what:
+            return None
+        return ControlLost(seen.name, operation, f"{what}; {describe_state(seen)}; its motors may still turn")
+
+    def _upset(self, now: Ns) -> str:
+        """Return how the vehicle is upset; empty if it is not."""
+        seen = self._telemetry
+        for text in seen.texts_since(now - RECENT_CAUSE, severity=3):
+            if any(words in text.lower() for words in _UPSET_TEXTS):
+                return f"the autopilot said {text!r}"
+        sink = -seen.velocity.up
+        if sink > FALLING_M_S:
+            return f"it falls at {sink:.0f} m/s"
+        roll, pitch, _ = seen.attitude
+        if not (abs(roll) > OVERTURNED_DEG or abs(pitch) > OVERTURNED_DEG):
+            self._tilted_since = None
+            return ""
+        self._tilted_since = now if self._tilted_since is None else self._tilted_since
+        held = now - self._tilted_since >= OVERTURNED_FOR
+        return f"it has turned over (roll {roll:.0f}, pitch {pitch:.0f} degrees)" if held else ""
 
 
 def describe_state(telemetry: Telemetry) -> str:

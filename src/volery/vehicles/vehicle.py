@@ -9,6 +9,7 @@ operation runs at a time, only while no other station has control, within the bo
 | limits or fence are violated | ``OutOfBounds`` | holds where it has stopped |
 | the battery falls below the reserve | ``LowBattery`` | holds where it has stopped |
 | the position is lost for 10 s in the air | ``PositionLost`` | is commanded to hold |
+| it falls or has turned over, as with a motor lost | ``ControlLost`` | is left to its autopilot |
 | a pilot or another station changes mode or target | ``Overridden``, ``Failsafe`` | gets no more messages |
 | another task of this program holds, returns, lands or kills | ``Overridden`` | does that |
 | the link times out | ``LinkLost`` | does what its parameters state: ``on_link_loss`` |
@@ -23,12 +24,15 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import hypot, isfinite
+from numbers import Real
 
 from volery.base.errors import (
     CapabilityError,
+    ControlLost,
     LinkLost,
     LinkSilent,
     LowBattery,
+    NotArrived,
     OutOfBounds,
     PositionLost,
     Refused,
@@ -62,6 +66,7 @@ from volery.vehicles.executor import (
     PLAIN,
     TO_SAFETY,
     UNGUARDED,
+    Check,
     Goal,
     OperationPolicy,
     StepExecutor,
@@ -74,6 +79,7 @@ from volery.vehicles.telemetry import (
     Battery,
     StatusText,
     Telemetry,
+    UpsetMonitor,
     Velocity,
     describe_state,
 )
@@ -84,6 +90,10 @@ MISSION_WITHIN_S = 3600.0
 BATTERY_MEASURED_WITHIN_S = 10.0
 LINK_RETURN_S = 30.0
 """How long the end of a program waits for a lost link."""
+
+SAID_AFTER: Ns = 5 * S
+SAID_AGAIN_AFTER: Ns = 15 * S
+"""Times after which a wait for a position is reported."""
 
 ASK_PERIOD: Ns = 500 * MS
 ASK_FOR: Ns = MINUTE
@@ -160,6 +170,7 @@ class Vehicle(ABC):
         self._driver = driver
         driver.telemetry.detects_silence = driver.cycle is None
         self._executor = StepExecutor(kernel, driver, link_timeout)
+        self._upset = UpsetMonitor(driver.telemetry)
         self._truth = truth
         self._supported: frozenset[Capability] = frozenset()  # as known once the vehicle was connected
         self._bounds: Bounds | None = None
@@ -290,7 +301,9 @@ class Vehicle(ABC):
         def connected() -> bool:
             return telemetry.last_message_ns >= 0 and self._driver.problem() is None
 
-        if not self._executor.wait(connected, from_seconds(within)):
+        with self.kernel.joined():
+            is_connected = self._executor.wait(connected, from_seconds(within))
+        if not is_connected:
             with self.kernel:
                 problem = self._driver.problem()
             if problem is not None:
@@ -302,6 +315,42 @@ class Vehicle(ABC):
         if telemetry.kind != self.kind:
             raise CapabilityError(f"{self.name} is a {telemetry.kind}, not a {self.kind}")
         self._record_link_loss_reaction()
+
+    def wait_located(self, within: float, tell: Callable[[str], object] | None = None) -> None:
+        """Wait until the autopilot reports position and home.
+
+        Args:
+            within: longest time to wait, s; 0 does not wait.
+            tell: receives what is missing, every few seconds.
+
+        Raises:
+            NotArrived: they are not known in time; the error names what is missing and what its GPS reports.
+        """
+        if within == 0.0 or not self._missing_place():
+            return
+        began = self.kernel.now()
+        until, say_after = began + from_seconds(within), SAID_AFTER
+        with self.kernel.joined():
+            while self._missing_place():
+                now = self.kernel.now()
+                if now >= until:
+                    what = f"{self._missing_place()} within {within:g} s; a wait of 0 s does not need it"
+                    raise NotArrived(self.name, "connect", what)
+                self._executor.wait(lambda: not self._missing_place(), min(until - now, say_after))
+                missing, say_after = self._missing_place(), SAID_AGAIN_AFTER
+                if missing and tell is not None:
+                    tell(f"{self.name}: {missing} after {to_seconds(self.kernel.now() - began):.0f} s")
+
+    def _missing_place(self) -> str:
+        """Return what of position and home the autopilot does not report, in words; empty for nothing."""
+        seen = self._poll()
+        missing = [
+            name for name, known in (("position", seen.position), ("home", seen.home)) if known is None
+        ]
+        if not missing:
+            return ""
+        gps = f"its GPS reports {seen.fix or 'nothing'}, {seen.satellites} satellites"
+        return f"it has not reported its {' and its '.join(missing)} ({gps})"
 
     def _record_link_loss_reaction(self) -> None:
         """Record the reaction to a lost link as soon as it is known, without blocking."""
@@ -510,9 +559,24 @@ class Vehicle(ABC):
         if isinstance(goal.altitude, AMSL) and not seen.amsl_known:
             raise Refused(self.name, f"go to {goal}", seen.amsl_remedy)
 
+    def _check_numbers(self, call: str, *numbers: object, example: str) -> None:
+        """Raise ``UsageError`` unless all are finite numbers: programs and consoles have no type checker.
+
+        Args:
+            call: the call as it was written.
+            numbers: the arguments that are numbers.
+            example: a valid call.
+        """
+        for number in numbers:
+            if isinstance(number, bool) or not isinstance(number, Real) or not isfinite(number):
+                raise UsageError(
+                    f"{self.name}: {call}: {number!r} is not a finite number; write it as in {example}"
+                )
+
     def _check_speed(self, asked: str, speed: float) -> None:
         self._connect(Capability.SPEED)
-        if not (isfinite(speed) and speed > 0):
+        self._check_numbers(f"{asked}: speed={speed!r}", speed, example="speed=5.0, in m/s")
+        if speed <= 0:
             raise UsageError(f"{self.name}: {asked}: a speed of {speed:g} m/s; give one above 0")
 
     def _check_mission(self, items: Sequence[MissionItem]) -> None:
@@ -590,6 +654,18 @@ class Vehicle(ABC):
             goal: where the vehicle should be at the end.
             restarts: how often to start again after the sequence was undone before lift-off.
         """
+        with self.kernel.joined():
+            self._operate_as_task(operation, asked, plan, policy, goal, restarts)
+
+    def _operate_as_task(
+        self,
+        operation: str,
+        asked: str,
+        plan: Callable[[], Sequence[Step]],
+        policy: OperationPolicy,
+        goal: Callable[[], Goal],
+        restarts: int,
+    ) -> None:
         with self.kernel as kernel:
             task = kernel.current()
             if self._in_progress is not None:
@@ -644,17 +720,27 @@ class Vehicle(ABC):
         if self._monitor is not None:
             self._monitor.cancel()
             self._monitor = None
-        if not policy.bounded:
+        if policy.to_safety:
             self._executor.execute(asked, plan, restarts=restarts)
+            return
+        upset = self._upset.check(asked, self.kernel.now())
+        if upset is not None:
+            raise upset
+        if not policy.bounded:
+            self._executor.execute(asked, plan, restarts=restarts, check=self._upset.check)
             return
         seen, bounds = self._driver.telemetry, self._home_bounds()
         monitor = BoundsMonitor(seen, bounds, reserve, policy.ignored, needs_position=policy.travels)
+
+        def check(operation: str, now: Ns) -> VehicleError | None:
+            return self._upset.check(operation, now) or monitor.check(operation, now)
+
         try:
-            self._executor.execute(asked, plan, restarts=restarts, check=monitor.check)
+            self._executor.execute(asked, plan, restarts=restarts, check=check)
         except (OutOfBounds, LowBattery, PositionLost) as error:
             raise type(error)(self.name, asked, f"{error.what}; {self._hold_back()}") from None
         if policy.goes_on and self._driver.cycle is None:
-            self._keep_monitoring(asked, monitor)
+            self._keep_monitoring(asked, check)
 
     def _record(self, start: Ns, operation: str, asked: str, end: tuple[str, str], goal: Goal) -> None:
         estimate = distance_to(goal, self._driver.telemetry.position)
@@ -680,18 +766,21 @@ class Vehicle(ABC):
 
     # -- monitoring after the call has returned: velocities and manual flight
 
-    def _keep_monitoring(self, asked: str, monitor: BoundsMonitor) -> None:
-        def check() -> None:
-            error = monitor.check(asked, self.kernel.now())
+    def _keep_monitoring(self, asked: str, check: Check) -> None:
+        def look() -> None:
+            error = check(asked, self.kernel.now())
             if error is None or self._in_progress is not None:
                 return
             handle.cancel()
+            if isinstance(error, ControlLost):
+                self._bounds_error = error
+                return
             self._bounds_error = type(error)(self.name, asked, f"{error.what}; it was commanded to hold")
             name = f"safety of {self.name}"
             self.kernel.spawn(self._hold_out_of_bounds, name, ExecutionContext(name))
 
         with self.kernel.guard:
-            self._monitor = handle = self.kernel.every(BOUNDS_PERIOD, check)
+            self._monitor = handle = self.kernel.every(BOUNDS_PERIOD, look)
 
     def _hold_out_of_bounds(self) -> None:
         error = self._straying = self._bounds_error
