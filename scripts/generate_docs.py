@@ -25,6 +25,7 @@ from volery.drawing.shapes import functional_svg, verification_svg
 from volery.model.document import schema
 from volery.model.faults import FAULTS, TRIAL_FAULTS, Fault
 from volery.model.fields import entries, summary
+from volery.model.rules import RULES
 from volery.model.system_loader import load
 from volery.report.graph_picture import graph_of_model, graph_svg
 from volery.requirements.observables import NOTED, OBSERVABLES
@@ -399,6 +400,21 @@ def delivery_model() -> dict[Path, str]:
     }
 
 
+def rules() -> str:
+    """The rules that a model is checked against."""
+    lines = [
+        "# Rules of models\n",
+        "`volery model check` names the rule of each finding. A model with an error does not run.",
+        "Warnings can be [suppressed](../models.md#checks) with a reason.\n",
+        "| code | name | level | what it finds | remedy |",
+        "|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {one.code} | `{one.name}` | {one.level} | {one.title} | {one.remedy} |" for one in RULES.values()
+    ]
+    return "\n".join(lines) + "\n"
+
+
 def pages() -> dict[Path, str]:
     """Return each generated file with its content."""
     reference = {
@@ -410,6 +426,7 @@ def pages() -> dict[Path, str]:
         "conformance.md": MADE + conformance(),
         "faults.md": MADE + faults(),
         "model.md": MADE + model(),
+        "rules.md": MADE + rules(),
         "model.schema.json": json.dumps(schema(), indent=2, ensure_ascii=False) + "\n",
     }
     return {

@@ -2,5 +2,5 @@
 
 A link moves frames, which are named messages with fields; a codec converts frames to bytes and back. This
 package knows the kernel (delivery, time-outs) and the wire formats. It does not know what a message means to
-a vehicle. It is the only package that imports pymavlink, pyserial and lxml.
+a vehicle. It is the only package that imports pymavlink and pyserial.
 """
