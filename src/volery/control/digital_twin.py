@@ -18,11 +18,12 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.control.actuation import Command, Measured
 from volery.control.laws import DEGREES, Law, PidGains, PidLaw, wrap
-from volery.control.manoeuvres import HEIGHT_GAINS, LoopSample, Manoeuvre
+from volery.control.manoeuvres import LoopSample, Manoeuvre
 from volery.control.step_response import Array, Signal
 from volery.vehicles import Drone
 
 FOLLOW_GAINS = PidGains(kp=0.9, low=-8.0, high=8.0)
+FOLLOW_HEIGHT_GAINS = PidGains(kp=0.9, low=-3.0, high=4.0)
 FOLLOW_YAW_GAINS = PidGains(kp=2.0, low=-200.0, high=200.0, period=DEGREES)
 AIRBORNE = 1.5
 """Height of the reference from which it counts as flying, m."""
@@ -169,7 +170,7 @@ class Twin(Manoeuvre):
         self._axes = {
             "north": PidLaw(FOLLOW_GAINS),
             "east": PidLaw(FOLLOW_GAINS),
-            "altitude": PidLaw(HEIGHT_GAINS),
+            "altitude": PidLaw(FOLLOW_HEIGHT_GAINS),
         }
         self._yaw = PidLaw(FOLLOW_YAW_GAINS)
         self.laws: dict[str, Law] = {**self._axes, "yaw": self._yaw}

@@ -1,8 +1,8 @@
 """Flight logs as tables of numbers: MAVLink telemetry logs, ArduPilot's DataFlash logs and PX4's ULog.
 
 A table holds the numeric fields of one type of message, each as an array, and ``time`` in seconds since the
-start of the log. Formats are recognised by their first bytes and not by their names. The libraries of the
-autopilots' projects decode DataFlash (pymavlink) and ULog (pyulog).
+start of the log (DataFlash: since the boot of the autopilot). Formats are recognised by their first bytes and
+not by their names. The libraries of the autopilots' projects decode DataFlash (pymavlink) and ULog (pyulog).
 """
 
 from __future__ import annotations
@@ -82,7 +82,8 @@ def read_flight_log(path: Path, wanted: Collection[str] = ()) -> Tables:
 class _Rows:
     """Rows of the numeric fields of messages, collected message by message."""
 
-    def __init__(self) -> None:
+    def __init__(self, start: float = 0.0) -> None:
+        self._start = start
         self._rows: dict[str, tuple[tuple[str, ...], list[tuple[float, ...]]]] = {}
 
     def add(self, name: str, time: float, fields: Mapping[str, Any]) -> None:
@@ -100,13 +101,11 @@ class _Rows:
             rows.append(tuple(numbers.values()))
 
     def tables(self) -> Tables:
-        """Return what was collected, with times since the first row of all."""
-        starts = [rows[0][0] for _, rows in self._rows.values() if rows]
-        start = min(starts, default=0.0)
+        """Return what was collected."""
         made: Tables = {}
         for name, (columns, rows) in self._rows.items():
             values = np.array(rows, dtype=float)
-            values[:, 0] -= start
+            values[:, 0] -= self._start
             made[name] = {column: values[:, index] for index, column in enumerate(columns)}
         return made
 
@@ -116,16 +115,17 @@ _LONGEST_ARRAY = 8
 
 def _tlog(path: Path, wanted: set[str]) -> Tables:
     """Read the messages of the first autopilot; those of other systems are the ground stations'."""
-    rows = _Rows()
     autopilot = 0
-    early = []
+    start = None
+    kept = []
     for at_us, frame in read_tlog(path):
+        start = at_us if start is None else start
         if not autopilot and frame.name == "HEARTBEAT" and frame.fields["autopilot"] != _NO_AUTOPILOT:
             autopilot = frame.system
-        if wanted and frame.name not in wanted and f"{STATION}{frame.name}" not in wanted:
-            continue
-        early.append((at_us, frame))
-    for at_us, frame in early:
+        if not wanted or frame.name in wanted or f"{STATION}{frame.name}" in wanted:
+            kept.append((at_us, frame))
+    rows = _Rows((start or 0) / 1e6)
+    for at_us, frame in kept:
         name = frame.name if frame.system == autopilot else f"{STATION}{frame.name}"
         if not wanted or name in wanted:
             rows.add(name, at_us / 1e6, frame.fields)
@@ -133,7 +133,7 @@ def _tlog(path: Path, wanted: set[str]) -> Tables:
 
 
 def _dataflash(path: Path, wanted: set[str]) -> Tables:
-    rows = _Rows()
+    rows = _Rows()  # times are those since boot
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # it prints what is damaged
         try:
             binary = path.open("rb").read(2) == _DATAFLASH_HEAD

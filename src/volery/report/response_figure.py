@@ -23,9 +23,10 @@ Judged = tuple[Signal, Sequence[StepResponse]]
 FORMATS = (".png", ".svg", ".pdf")
 GOAL, MEASURED, BAND = "#8a8f98", "#0b5fa5", "#f2c14e"
 COLOURS = ("#c43d3d", "#d98a1f", "#0b5fa5", "#2b8a5c", "#7a4fa3", "#5d6670")
-WIDTH, HEIGHT = 10.0, 3.4
+WIDTH, HEIGHT = 10.0, 2.7
 """Size of one plot in inches."""
-LEGEND = {"loc": "upper right", "fontsize": 8, "framealpha": 0.9}
+LEGEND: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "fontsize": 8, "frameon": False}
+"""The legend stands above its plot, where it hides nothing."""
 
 
 def check_format(path: Path) -> None:
@@ -122,4 +123,4 @@ def _label(axes: Any, unit: str, title: str) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     handles, _ = axes.get_legend_handles_labels()
     if handles:
-        axes.legend(**LEGEND)
+        axes.legend(**LEGEND, ncols=len(handles))
