@@ -32,6 +32,8 @@ Schema = dict[str, Any]
 SHORT = "x-short"
 """Marks, in the JSON Schema, a mapping that may be written as the value of this key alone."""
 
+_LONGEST_SHOWN = 200
+"""Characters of a value in a message."""
 _NAME = r"^[A-Za-z_][A-Za-z0-9_-]*$"
 _UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s|m|deg|coulomb|v|w|j|b)$")
 
@@ -55,7 +57,8 @@ def shown(node: Node) -> str:
         return "a mapping" if isinstance(node.value, dict) else "a list"
     if node.value is None:
         return "nothing"
-    return repr(node.value) if isinstance(node.value, str) else str(node.value)
+    text = repr(node.value) if isinstance(node.value, str) else str(node.value)
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}… ({len(text)} characters)"
 
 
 class Syntax(ABC):

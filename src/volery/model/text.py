@@ -120,6 +120,8 @@ def _order(error: ModelError) -> tuple[str, int]:
 _NO_MODEL = rules.NOT_A_MODEL.code
 
 MOST_NODES = 100_000
+_LONGEST_NUMBER = 100
+"""Characters; Python converts longer ones in quadratic time, or refuses."""
 """More than any model needs. Without a limit, a file of nested aliases would fill the memory."""
 
 Scalar = str | int | float | bool | None
@@ -301,6 +303,9 @@ class _Reading:
         kind = str(raw.tag or "").rpartition(":")[2]
         if kind not in ("int", "float", "bool", "null"):
             return str(raw.value)
+        if len(raw.value) > _LONGEST_NUMBER:
+            what = f"a number of {len(raw.value)} characters; at most {_LONGEST_NUMBER} are read"
+            raise ModelError(what, _dotted(path), where, _NO_MODEL)
         try:
             value: Scalar = getattr(self.yaml.constructor, f"construct_yaml_{kind}")(raw)
         except ValueError:

@@ -118,8 +118,8 @@ class ComponentLedger:
         owed = event.caller + event.background
         if event.kind.startswith(ROS_PREFIX):
             self.ros += owed
-            call = event.kind[len(ROS_PREFIX) :]
-            self.ros_calls[call] = self.ros_calls.get(call, 0) + 1
+            call, _, count = event.kind[len(ROS_PREFIX) :].partition("*")
+            self.ros_calls[call] = self.ros_calls.get(call, 0) + (int(count) if count else 1)
         else:
             self.charges += 1
         if event.energy:
@@ -154,7 +154,7 @@ class ComponentLedger:
             processor=self.processor,
             language=self.setup.language,
             cpu_s=to_seconds(self.executed),
-            ros_cpu_s=to_seconds(self.ros),
+            ros_cpu_s=to_seconds(min(self.ros, self.executed)),  # calls charged last may not have executed
             ros_calls=dict(sorted(self.ros_calls.items())),
             energy_j=None if by_law is None else self.stated_j + by_law,
             activations=self.activations.count,

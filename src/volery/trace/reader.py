@@ -123,10 +123,7 @@ class Reading:
                 self.complete = not record.missing
             record = self._next()
         if not (self.complete and self._ends_well()):
-            self._lose(
-                f"the writer never finished; everything up to {clock(self._last)} was kept, "
-                "at most the second after it is missing"
-            )
+            self._lose(f"the writer never finished; what follows {clock(self._last)} is missing")
         self.complete = not self.lost
 
     def _lose(self, what: str) -> None:

@@ -1,5 +1,7 @@
 """Whatever can be wrong with a model: the message names file, line, path, the fault and what would do."""
 
+import re
+
 import pytest
 
 from volery.base.errors import ModelError, UsageError
@@ -529,6 +531,8 @@ def test_two_carried_computers_need_an_allocation(workshop):
         ("a: *nobody\n", "found undefined alias 'nobody'"),
         ("[" * 5000, "nested too deeply"),
         ("a: !!int abc\n", "'abc' is no number"),
+        (f"volery: 0x{'f' * 10**6}\n", "a number of 1000002 characters"),
+        (f"volery: {'1' * 10**6}\n", "a number of 1000000 characters"),
     ],
 )
 def test_texts_that_are_no_models(workshop, text, complaint):
@@ -537,6 +541,24 @@ def test_texts_that_are_no_models(workshop, text, complaint):
         workshop.load()
     assert complaint in str(caught.value)
     assert str(caught.value).startswith(str(workshop.file))
+
+
+def test_a_value_of_a_megabyte_is_not_repeated_in_the_message(workshop):
+    workshop.file.write_text(f"volery: {'x' * 10**6}\n")
+    with pytest.raises(ModelError, match=r"x… \(1000002 characters\)") as caught:
+        workshop.load()
+    assert len(str(caught.value)) < 2000
+
+
+@pytest.mark.parametrize("path", ["/etc/passwd", "../../../../../../../../etc/passwd"])
+def test_a_file_outside_the_folder_of_the_model_is_not_used(workshop, path):
+    text = workshop.file.read_text()
+    workshop.file.write_text(re.sub(r"path: \S+\.py", f"path: {path}", text, count=1))
+    assert path in workshop.file.read_text()
+    with pytest.raises(
+        ModelError, match="is outside the folder of the model; list its folder under"
+    ):
+        workshop.load()
 
 
 def test_a_bomb_of_aliases_is_refused(workshop):

@@ -20,8 +20,11 @@ from volery.trace.events import (
     Charge,
     Event,
     Failure,
+    LinkState,
+    Message,
     Milestone,
     Operation,
+    Preemption,
     Slice,
     Text,
     VehicleState,
@@ -221,6 +224,62 @@ def test_verdicts_and_what_has_none() -> None:
     assert found.requirements["later"].met is None
     assert found.outcome.requirements_met is False
     assert books().outcome.requirements_met is None
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        Slice(1 * S, 9 * S, "onboard", 0, "control", "control"),
+        Preemption(9 * S, "onboard", 0, "control", "safety"),
+        Charge(9 * S, "control", "onboard", "code", 1, 0, 0.0),
+        Activation(1 * S, 9 * S, "control", NONE),
+        Call(1 * S, 9 * S, "a", "control", "ask", "ok"),
+        Message(1 * S, 9 * S, "/a", "/b", "/c", 1),
+        Message(9 * S, NONE, "/a", "/b", "/c", 1),
+        state(9 * S),
+        Operation(1 * S, 9 * S, "d", "land", "", "ok", "", 0.0, 0.0, 0.0, 0.0),
+        Milestone(9 * S, "c", "parcel", "p", "ordered", ""),
+        Failure(9 * S, "control", "no"),
+        Verdict(9 * S, "soon", "x.y", "max", 1.0, 0.5, True),
+        Text(9 * S, "x", 6, ""),
+        LinkState(9 * S, "udp", "up", ""),
+    ],
+)
+def test_a_run_lasts_until_its_last_event(event: Event) -> None:
+    assert books(Text(2 * S, "x", 6, ""), event, Text(3 * S, "x", 6, "")).sim_s == 9.0
+    assert books(event._replace(), Text(20 * S, "x", 6, "")).sim_s == 20.0
+
+
+def test_executed_time_is_from_start_to_end_and_of_its_processor() -> None:
+    found = books(
+        Slice(1 * S, 3 * S, "onboard", 0, "control", "control"),
+        Slice(3 * S, 4 * S, "second", 0, "other", "stranger"),
+        Text(10 * S, "x", 6, ""),
+    )
+    assert found.components["control"].cpu_s == 2.0
+    assert found.processors["onboard"].utilisation == 2.0 / 20.0
+    assert found.processors["second"].utilisation == 0.1
+    assert books().processors["onboard"].utilisation == 0.0
+
+
+def test_preemptions_are_counted_the_most_frequent_first() -> None:
+    rare = Preemption(0, "onboard", 0, "a", "b")
+    often = rare._replace(by="c")
+    found = books(rare, often, often).preemptions
+    assert [(one.preempted, one.by, one.count) for one in found] == [("a", "c", 2), ("a", "b", 1)]
+
+
+def test_a_response_bound_stands_beside_what_was_observed() -> None:
+    control = replace(SETUP.components[0], period=100 * MS, deadline=100 * MS, priority=5)
+    setup = replace(SETUP, components=(control,))
+    found = books(
+        Slice(0, 30 * MS, "onboard", 0, "control", "control"),
+        Activation(0, 30 * MS, "control", 100 * MS),
+        Slice(100 * MS, 120 * MS, "onboard", 0, "control", "control"),
+        Activation(100 * MS, 120 * MS, "control", 200 * MS),
+        setup=setup,
+    ).components["control"]
+    assert found.response_bound_s == pytest.approx(0.03)
 
 
 def test_failures_are_kept() -> None:

@@ -1,9 +1,23 @@
-"""Spread of durations: exact where promised, close where promised."""
+"""Spread of durations, exact or close as promised; what one component, vehicle or chain comes to."""
 
+from math import nan
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volery.requirements.ledgers import Distribution
+from volery.base.time import MS, S
+from volery.requirements.ledgers import (
+    ChainLedger,
+    ComponentLedger,
+    Distribution,
+    VehicleLedger,
+    known,
+    largest,
+    linear_energy,
+)
+from volery.trace.attachments import ChainSetup, ComponentSetup, ProcessorSetup, VehicleSetup
+from volery.trace.events import NONE, Activation, Call, Charge, Message, Operation, VehicleState
 
 
 def spread(durations: list[int]) -> Distribution:
@@ -39,3 +53,184 @@ def test_order_does_not_matter(values: list[int]) -> None:
 def test_memory_does_not_grow_with_observations() -> None:
     found = spread([(index * 2_654_435_761) % 10**9 for index in range(50_000)])
     assert len(found._buckets) < 12_000
+
+
+def test_a_negative_duration_is_none_at_all() -> None:
+    found = spread([-5, 10])
+    assert (found.count, found.total, found.largest) == (2, 10, 10)
+    assert found.quantile(0.5) == 0
+    assert found.quantile(1.5) == 10
+
+
+def component(*events: Charge | Activation | Call, executed: int = 0) -> ComponentLedger:
+    ledger = ComponentLedger(ComponentSetup("control", language="rospy"), "onboard", executed=executed)
+    for event in events:
+        if isinstance(event, Charge):
+            ledger.charge(event)
+        elif isinstance(event, Activation):
+            ledger.activation(event)
+        else:
+            ledger.call(event)
+    return ledger
+
+
+def test_charges_of_ros_calls_of_code_and_of_stated_energy() -> None:
+    ledger = component(
+        Charge(0, "control", "onboard", "code", 20 * MS, 0, 0.0),
+        Charge(0, "control", "onboard", "ros:publish", 6 * MS, 4 * MS, 0.0),
+        Charge(0, "control", "onboard", "ros:publish*3", 2 * MS, 0, 0.0),
+        Charge(0, "control", "onboard", "ros:param", 1 * MS, 0, 0.0),
+        Charge(0, "control", "onboard", "operation:look", 7 * MS, 3 * MS, 0.5),
+        executed=100 * MS,
+    )
+    assert ledger.charges == 2
+    assert ledger.unpriced_s() == 0.09
+    record = ledger.record(lambda busy_s: 2.0 * busy_s, 40 * MS)
+    assert record.cpu_s == 0.1
+    assert record.ros_cpu_s == 0.013
+    assert list(record.ros_calls.items()) == [("param", 1), ("publish", 4)]
+    assert record.energy_j == pytest.approx(0.5 + 2.0 * 0.09)
+    assert record.response_bound_s == 0.04
+    assert ledger.record(lambda busy_s: None).energy_j is None
+    assert ledger.record(lambda busy_s: None).response_bound_s is None
+
+
+def test_ros_calls_take_no_more_than_what_was_executed() -> None:
+    """Calls that were charged at the end of a run have not been executed."""
+    ledger = component(Charge(0, "control", "onboard", "ros:publish", 3 * MS, 0, 0.0), executed=2 * MS)
+    assert ledger.record(lambda busy_s: None).ros_cpu_s == 0.002
+
+
+def test_more_stated_than_executed_leaves_nothing_for_the_law() -> None:
+    ledger = component(Charge(0, "control", "onboard", "operation:x", 3 * MS, 0, 0.1), executed=2 * MS)
+    assert ledger.unpriced_s() == 0.0
+
+
+def test_a_component_without_code_of_its_own_is_uncounted() -> None:
+    charge = Charge(0, "control", "onboard", "ros:publish", 1, 0, 0.0)
+    assert not component(charge).uncounted()
+    assert component(charge, Activation(0, 1, "control", NONE)).uncounted()
+    assert component(charge, Call(0, 1, "a", "control", "ask", "ok")).uncounted()
+    code = charge._replace(kind="code")
+    assert not component(code, Activation(0, 1, "control", NONE)).uncounted()
+
+
+def test_a_deadline_is_missed_after_it_and_not_at_it() -> None:
+    ledger = component(
+        Activation(0, 10 * MS, "control", 10 * MS),
+        Activation(0, 10 * MS + 1, "control", 10 * MS),
+        Activation(0, 50 * MS, "control", NONE),
+    )
+    assert ledger.misses == 1
+
+
+def test_responses_are_of_activations_and_without_them_of_calls() -> None:
+    calls = [Call(S, S + n * MS, "a", "control", "ask", "ok") for n in range(1, 101)]
+    spread = component(*calls).record(lambda busy_s: None).response_s
+    assert (spread.of, spread.count, spread.max) == ("calls", 100, 0.1)
+    assert spread.mean == pytest.approx(0.0505)
+    assert spread.p95 == pytest.approx(0.095, rel=2e-3)
+    one = component(*calls, Activation(2 * S, 2 * S + 7 * MS, "control", NONE))
+    spread = one.record(lambda busy_s: None).response_s
+    assert (spread.of, spread.count, spread.mean) == ("activations", 1, 0.007)
+    assert component().record(lambda busy_s: None).response_s.count == 0
+
+
+def test_energy_of_a_processor() -> None:
+    onboard = ProcessorSetup("onboard", "rpi4", 1500.0, "fixed-priority", 4, 2.0, 6.0)
+    assert linear_energy(onboard, 2.0, 10.0) == 22.0
+    assert linear_energy(onboard, 2.0, 0.0) == 2.0
+    assert linear_energy(ProcessorSetup("z", busy_w=6.0), 1.0, 1.0) is None
+    assert linear_energy(ProcessorSetup("z", idle_w=6.0), 1.0, 1.0) is None
+
+
+def state(at: int, **changes: object) -> VehicleState:
+    still = VehicleState(
+        at, "d", *[0.0] * 3, 1.0, *[0.0] * 6, nan, nan, nan, 0.9, 12.0, 2.0, False, "STABILIZE"
+    )
+    return still._replace(**changes)
+
+
+def test_a_vehicle_between_two_states() -> None:
+    ledger = VehicleLedger(VehicleSetup("d", "px4", "multirotor"))
+    ledger.state(state(S, z=5.0))
+    ledger.state(state(3 * S, x=1.0, y=2.0, z=7.0, armed=True, volts=10.0, amperes=4.0))
+    assert (ledger.armed, ledger.airborne) == (0, 0)
+    assert ledger.joules == pytest.approx((24.0 + 40.0) / 2 * 2)
+    ledger.state(state(4 * S, x=1.0, y=2.0, z=5.3, armed=True))
+    assert (ledger.armed, ledger.airborne) == (S, S)
+    ledger.state(state(6 * S, x=1.0, y=2.0, z=5.0, volts=nan, battery=nan))
+    record = ledger.record()
+    assert (record.armed_s, record.airborne_s) == (3.0, 1.0)  # 30 cm above the ground is no flight
+    assert record.distance_m == pytest.approx(3.0 + 1.7 + 0.3)
+    assert record.battery is None
+    assert record.energy_j == pytest.approx(64.0 + (40.0 + 24.0) / 2)
+    assert record.landed
+
+
+@pytest.mark.parametrize(
+    ("speed", "armed", "landed"), [(0.29, False, True), (0.3, False, False), (0.0, True, False)]
+)
+def test_landed_is_disarmed_and_at_rest(speed: float, armed: bool, landed: bool) -> None:
+    ledger = VehicleLedger(VehicleSetup("d"))
+    ledger.state(state(0, vx=speed, armed=armed))
+    assert ledger.record().landed is landed
+
+
+def test_operations_of_a_vehicle() -> None:
+    done = Operation(S, 3 * S, "d", "goto", "there", "ok", "", 0.2, -0.4, nan, 0.1)
+    ledger = VehicleLedger(VehicleSetup("d"), operations=[done])
+    (record,) = ledger.record().operations
+    assert (record.start_s, record.end_s, record.outcome) == (1.0, 3.0, "ok")
+    assert (record.error_by_estimate_m.horizontal, record.error_by_estimate_m.vertical) == (0.2, -0.4)
+    assert (record.error_by_truth_m.horizontal, record.error_by_truth_m.vertical) == (None, 0.1)
+
+
+def test_what_is_known_and_the_largest_of_it() -> None:
+    assert (known(nan), known(0.0)) == (None, 0.0)
+    assert largest([1.0, -3.0, nan]) == 3.0
+    assert largest([nan]) is None
+
+
+def chain(*events: Message) -> ChainLedger:
+    ledger = ChainLedger(ChainSetup("eye-to-hand", ("/image", "/pose", "/command")))
+    for event in events:
+        ledger.message(event)
+    return ledger
+
+
+def test_a_chain_is_as_old_as_the_message_it_was_made_from() -> None:
+    found = chain(
+        Message(0, 5 * MS, "/image", "/camera", "/locate", 1),
+        Message(10 * MS, 12 * MS, "/image", "/camera", "/locate", 1),
+        Message(11 * MS, 15 * MS, "/pose", "/locate", "/steer", 1),  # of the first image
+        Message(16 * MS, 20 * MS, "/command", "/steer", "/motor", 1),
+        Message(20 * MS, 21 * MS, "/pose", "locate", "steer", 1),  # of the second
+        Message(21 * MS, 30 * MS, "/command", "steer", "motor", 1),
+    )
+    assert found.latencies.count == 2
+    record = found.record()
+    assert record.topics == ["/image", "/pose", "/command"]
+    assert record.latency_s.count == 2
+    assert record.latency_s.mean == pytest.approx(0.020)
+    assert record.latency_s.max == pytest.approx(0.020)
+    assert record.latency_s.p95 == pytest.approx(0.020)
+
+
+def test_what_was_lost_or_has_no_beginning_is_in_no_chain() -> None:
+    found = chain(
+        Message(0, NONE, "/image", "/camera", "/locate", 1),
+        Message(1 * MS, 2 * MS, "/pose", "/locate", "/steer", 1),
+        Message(3 * MS, 4 * MS, "/command", "/steer", "/motor", 1),
+        Message(5 * MS, 6 * MS, "/image", "/camera", "/other", 1),
+        Message(7 * MS, 8 * MS, "/pose", "/locate", "/steer", 1),
+        Message(9 * MS, 9 * MS, "/else", "/locate", "/steer", 1),
+    )
+    assert found.latencies.count == 0
+    assert found.record().latency_s.count == 0
+
+
+def test_a_chain_of_one_topic_is_the_latency_of_a_message() -> None:
+    ledger = ChainLedger(ChainSetup("eye", ("/image",)))
+    ledger.message(Message(S, S + 3 * MS, "/image", "/camera", "/locate", 1))
+    assert ledger.record().latency_s.max == pytest.approx(0.003)
