@@ -110,8 +110,14 @@ class OffboardStream:
             self._backend.send_setpoint(self._setpoint)
 
     def leave(self) -> None:
-        """Note that another mode is being commanded; the stream goes on until that mode is seen."""
+        """Note that another mode is being commanded; the stream goes on until that mode is seen.
+
+        The end of the stream, which enters AUTO.LOITER, waits for it: it would overrule a landing or a return
+        whose mode no heartbeat has shown yet.
+        """
         self._leaving = True
+        if self._until is not None:
+            self._until = max(self._until, self._kernel.now() + ENTERED_WITHIN)
 
     def _note_gap(self, now: Ns) -> None:
         """Doubt OFFBOARD after a gap in the stream: this program was frozen, or its computer.
