@@ -19,7 +19,9 @@ from pathlib import Path
 
 import atheris
 
-with atheris.instrument_imports(include=["volery", "mcap", "rosbags"]):
+INSTRUMENTED = ["volery.base", "volery.links", "volery.model", "volery.ros.messages", "volery.trace", "mcap"]
+
+with atheris.instrument_imports(include=INSTRUMENTED):
     from volery.base.errors import VoleryError
     from volery.base.units import QuantityError, parse
     from volery.cost.catalogue import read_catalogue
@@ -30,12 +32,12 @@ with atheris.instrument_imports(include=["volery", "mcap", "rosbags"]):
     from volery.links.pprzlink_messages import DATALINK, TELEMETRY
     from volery.links.pprzlink_messages import message_type_of as pprz_type_of
     from volery.links.tlog import read_tlog
+    from volery.model.reading import Vocabulary
     from volery.model.system_loader import load
     from volery.ros.messages import Message, new
     from volery.ros.messages.bags import create_bag, open_bag
     from volery.ros.messages.encodings import from_cdr, from_ros1, to_cdr, to_ros1
     from volery.ros.messages.store import idl_fields, interface_messages
-    from volery.run.assembly.model_checks import vocabulary
     from volery.testing.fuzzing import SEALS
     from volery.testing.sample_run import sample_events, sample_setup
     from volery.trace.mcap_writer import McapWriter
@@ -47,7 +49,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 from rigs.flight_log_files import dataflash, ulog  # noqa: E402
 
 FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-"))
-VOCABULARY = vocabulary()
+VOCABULARY = Vocabulary({}, frozenset({"python", "rospy"}), frozenset({"ardupilot", "px4"}))
 MESSAGES = 200
 """Messages read of one file: a longer one shows nothing new."""
 TYPES = (

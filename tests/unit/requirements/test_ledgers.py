@@ -119,9 +119,10 @@ def test_a_deadline_is_missed_after_it_and_not_at_it() -> None:
     ledger = component(
         Activation(0, 10 * MS, "control", 10 * MS),
         Activation(0, 10 * MS + 1, "control", 10 * MS),
+        Activation(0, 12 * MS, "control", 10 * MS),
         Activation(0, 50 * MS, "control", NONE),
     )
-    assert ledger.misses == 1
+    assert ledger.misses == 2
 
 
 def test_responses_are_of_activations_and_without_them_of_calls() -> None:
@@ -159,12 +160,14 @@ def test_a_vehicle_between_two_states() -> None:
     assert ledger.joules == pytest.approx((24.0 + 40.0) / 2 * 2)
     ledger.state(state(4 * S, x=1.0, y=2.0, z=5.3, armed=True))
     assert (ledger.armed, ledger.airborne) == (S, S)
-    ledger.state(state(6 * S, x=1.0, y=2.0, z=5.0, volts=nan, battery=nan))
+    ledger.state(state(6 * S, x=1.0, y=2.0, z=5.5, armed=True))
+    assert (ledger.armed, ledger.airborne) == (3 * S, S)  # 30 cm above the ground is no flight
+    ledger.state(state(7 * S, x=1.0, y=2.0, z=5.0, volts=nan, battery=nan))
     record = ledger.record()
-    assert (record.armed_s, record.airborne_s) == (3.0, 1.0)  # 30 cm above the ground is no flight
-    assert record.distance_m == pytest.approx(3.0 + 1.7 + 0.3)
+    assert (record.armed_s, record.airborne_s) == (4.0, 2.0)
+    assert record.distance_m == pytest.approx(3.0 + 1.7 + 0.2 + 0.5)
     assert record.battery is None
-    assert record.energy_j == pytest.approx(64.0 + (40.0 + 24.0) / 2)
+    assert record.energy_j == pytest.approx(64.0 + (40.0 + 24.0) / 2 + 24.0 * 2)
     assert record.landed
 
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from io import BytesIO
+from itertools import chain
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Literal, NamedTuple, Protocol, Self
@@ -51,6 +52,8 @@ _LARGEST = 1 << 30
 """Length, bytes, above which a record is taken as damaged."""
 MAX_CHUNK = 256 << 20
 """Decompressed size, bytes, above which a chunk is taken as damaged: 46 kB can hold 1.5 GB."""
+MAX_SALVAGED = 2 << 30
+"""Bytes of messages, decompressed, that are salvaged of a damaged recording: they are sorted in memory."""
 DAMAGE = (
     Reader1Error,
     Reader2Error,
@@ -123,7 +126,7 @@ def recover_rosbag1(path: Path) -> Iterator[RawMessage]:
     with path.open("rb") as file:
         file.readline()
         for header, data in _records(file):
-            kind = header.get("op", b"\0")[0]
+            kind = _kind(header)
             inner = _records(BytesIO(_unpacked(header, data))) if kind == _CHUNK else iter([(header, data)])
             for head, body in inner:
                 found = _rosbag1_message(head, body, connections)
@@ -131,16 +134,21 @@ def recover_rosbag1(path: Path) -> Iterator[RawMessage]:
                     yield found
 
 
+def _kind(header: dict[str, bytes]) -> int:
+    return (header.get("op") or b"\0")[0]
+
+
 def _rosbag1_message(
     header: dict[str, bytes], data: bytes, connections: dict[bytes, dict[str, bytes]]
 ) -> RawMessage | None:
-    kind = header.get("op", b"\0")[0]
-    if kind == _CONNECTION:
-        connections[header["conn"]] = {"topic": header["topic"], **_fields(data)}
-    connection = connections.get(header.get("conn", b""))
-    if kind != _MESSAGE or connection is None:
+    kind = _kind(header)
+    number, stamp = header.get("conn", b""), header.get("time", b"")
+    if kind == _CONNECTION and number:
+        connections[number] = {"topic": header.get("topic", b""), **_fields(data)}
+    connection = connections.get(number)
+    if kind != _MESSAGE or connection is None or len(stamp) != _STAMP.size:
         return None
-    seconds, rest = _STAMP.unpack(header["time"])
+    seconds, rest = _STAMP.unpack(stamp)
     topic, name, text = (
         connection.get(key, b"").decode(errors="replace") for key in ("topic", "type", "message_definition")
     )
@@ -321,7 +329,14 @@ class Bag:
         else:
             files = [self.path]
         recover = recover_rosbag1 if self.format == ROSBAG1 else recover_mcap
-        return sorted((raw for file in files for raw in recover(file)), key=lambda raw: raw.at)
+        found, size = [], 0
+        for raw in chain.from_iterable(recover(file) for file in files):
+            size += len(raw.data)
+            if size > MAX_SALVAGED:
+                self._note(f"{self.path} is damaged; only its first {MAX_SALVAGED >> 20} MB are salvaged")
+                break
+            found.append(raw)
+        return sorted(found, key=lambda raw: raw.at)
 
 
 def open_bag(path: Path) -> Bag:

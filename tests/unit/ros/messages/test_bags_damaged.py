@@ -14,7 +14,8 @@ from mcap.writer import CompressionType, Writer
 
 from volery.base.errors import UsageError
 from volery.ros.messages import bags
-from volery.ros.messages.bags import decompressed, open_bag
+from volery.ros.messages import new as message_of
+from volery.ros.messages.bags import create_bag, decompressed, open_bag
 
 CHUNK = 700
 MESSAGES = 60
@@ -111,6 +112,37 @@ def test_a_recording_whose_chunks_exceed_the_limit_is_not_read(
     bag = open_bag(file)
     assert list(bag.messages()) == []
     assert "bomb.mcap is damaged and left out" in bag.damage[0]
+
+
+def test_what_is_salvaged_is_limited_in_total(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "bomb.mcap"
+    whole = recorded(file, CompressionType.ZSTD)
+    file.write_bytes(whole[: len(whole) * 3 // 4])
+    salvaged = len(list(open_bag(file).messages()))
+    assert salvaged > 20
+    monkeypatch.setattr(bags, "MAX_SALVAGED", 200)
+    bag = open_bag(file)
+    assert 0 < len(list(bag.messages())) < salvaged
+    assert "bomb.mcap is damaged; only its first" in bag.damage[0]
+
+
+@pytest.mark.parametrize("field", [b"topic=", b"conn=", b"time=", b"op=", b"compression=", b"size="])
+@pytest.mark.parametrize("new", [b"?", b"="])
+def test_a_record_of_a_rosbag_without_a_field_is_left_out(tmp_path: Path, field: bytes, new: bytes) -> None:
+    file = tmp_path / "spoiled.bag"
+    with create_bag(file) as bag:
+        bag.write("/words", 1, message_of("std_msgs/String", data=WORD))
+        bag.write("/numbers", 2, message_of("std_msgs/Int32", data=5))
+    whole = file.read_bytes()
+    place, found = whole.find(field), 0
+    while place >= 0:
+        file.write_bytes(whole[:place] + new + whole[place + 1 :])
+        try:
+            found = max(found, len(list(open_bag(file).messages())))
+        except UsageError as error:
+            assert str(file) in str(error)  # noqa: PT017
+        place = whole.find(field, place + 1)
+    assert found <= 2
 
 
 def test_a_type_that_contains_itself_is_named(tmp_path: Path) -> None:
