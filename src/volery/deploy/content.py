@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from volery.base.errors import UsageError
 from volery.model.instances import Instance
 from volery.model.system import Processor, System
 from volery.run.assembly.vehicle_nodes import graph_access
+from volery.run.distributed.call_types import package_name
 from volery.run.distributed.plan import worker_instances
 
 VERIFICATION = "verification"
@@ -45,12 +45,6 @@ class Computer:
     package: str
     hosted: tuple[Hosted, ...]
     bridged: tuple[Bridged, ...]
-
-
-def package_name(*parts: str) -> str:
-    """Return a name that ROS 1 and ROS 2 allow: lower case letters, digits and single underscores."""
-    words = re.sub(r"[^a-z0-9]+", "_", "_".join(parts).lower()).strip("_")
-    return words if words[:1].isalpha() else f"pkg_{words}"
 
 
 def computers(system: System) -> tuple[Computer, ...]:

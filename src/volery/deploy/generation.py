@@ -9,9 +9,10 @@ from pathlib import Path
 
 from volery.base.errors import UsageError, choices
 from volery.deploy import ros1, ros2
-from volery.deploy.content import MODEL_FOLDER, VERIFICATION, Computer, computers, model_files, package_name
+from volery.deploy.content import MODEL_FOLDER, VERIFICATION, Computer, computers, model_files
 from volery.model.instances import Instance
 from volery.model.system import System
+from volery.run.distributed.call_types import INTERFACES, call_types, package_name
 
 GRAPHS = {1: ros1, 2: ros2}
 """Generators by the version of ROS."""
@@ -22,11 +23,12 @@ _EXECUTABLE = 0o755
 
 @dataclass(frozen=True)
 class Deployment:
-    """What was written: the folder, and the packages by computer."""
+    """What was written: the folder, the packages by computer, and those of simulation and of types."""
 
     folder: Path
     packages: dict[str, str]
     verification: str
+    interfaces: str
 
 
 def deploy(system: System, folder: Path, ros: int) -> Deployment:
@@ -46,7 +48,9 @@ def deploy(system: System, folder: Path, ros: int) -> Deployment:
     generator = GRAPHS[ros]
     found = computers(system)
     verification = package_name(system.name, VERIFICATION)
+    types = call_types(system)
     _prepare(folder)
+    _write(folder / types.package, generator.interface_files(types, system))
     for one in found:
         package = folder / one.package
         _write(package, generator.computer_files(one, system))
@@ -54,7 +58,8 @@ def deploy(system: System, folder: Path, ros: int) -> Deployment:
     _write(folder / verification, generator.verification_files(system, found))
     _copy_model(system, system.instances, folder / verification, verification, ros)
     (folder / "README.md").write_text(_readme(system, found, verification, ros), encoding="utf-8")
-    return Deployment(folder, {one.processor.name: one.package for one in found}, verification)
+    packages = {one.processor.name: one.package for one in found}
+    return Deployment(folder, packages, verification, types.package)
 
 
 def _prepare(folder: Path) -> None:
@@ -124,7 +129,8 @@ def _readme(system: System, found: tuple[Computer, ...], verification: str, ros:
             *rows,
             "",
             "Every package needs volery in the Python that executes it: `pip install 'volery[simulation]'`.",
-            "Calls between components are services `/<component>/<operation>`, topics are topics.",
+            f"Calls between components are services `/<component>/<operation>` of the types in `{package_name(system.name, INTERFACES)}`, "
+            "topics are topics. Components need no built package of types; other nodes that call them do.",
             "",
             steps.format(
                 first=found[0].package,

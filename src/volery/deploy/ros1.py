@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from volery.deploy.content import MODEL_FOLDER, VERIFICATION, Computer, package_name
+from volery.deploy.content import MODEL_FOLDER, VERIFICATION, Computer
 from volery.deploy.texts import (
     bridge_script,
     host_script,
@@ -19,6 +19,7 @@ from volery.deploy.texts import (
     verification_script,
 )
 from volery.model.system import System
+from volery.run.distributed.call_types import INTERFACES, CallTypes, package_name
 
 GRAPH = "ros1"
 _SHEBANG = "#!/usr/bin/env python3\n"
@@ -29,7 +30,8 @@ def computer_files(computer: Computer, system: System) -> Iterator[tuple[Path, s
     """Yield the files of a computer's package, without those of the model."""
     name, model = computer.package, model_expression(1)
     what = f"{system.name}: what {computer.processor.name} executes"
-    packages = dict.fromkeys(("rospy", "std_msgs", *message_packages(computer)))
+    interfaces = package_name(system.name, INTERFACES)
+    packages = dict.fromkeys(("rospy", "std_msgs", interfaces, *message_packages(computer)))
     depends = [f"<exec_depend>{one}</exec_depend>" for one in packages]
     yield Path("package.xml"), package_xml(name, system, what, _TOOLS, depends)
     scripts = {one.executable: host_script(one, system, GRAPH, model) for one in computer.hosted}
@@ -63,6 +65,40 @@ def verification_files(system: System, computers: Sequence[Computer]) -> Iterato
         for one in computers
     ]
     yield Path("launch") / f"{name}.launch", _document([*_world(name), *included])
+
+
+def interface_files(types: CallTypes, system: System) -> Iterator[tuple[Path, str]]:
+    """Yield the files of the package of messages and services."""
+    tools = (*_TOOLS, "<build_depend>message_generation</build_depend>")
+    depends = [
+        "<build_export_depend>message_runtime</build_export_depend>",
+        "<exec_depend>message_runtime</exec_depend>",
+    ]
+    what = f"{system.name}: services of the operations of its interfaces"
+    yield Path("package.xml"), package_xml(types.package, system, what, tools, depends)
+    files = definition_files(types)
+    yield from files.items()
+    listed = {kind: " ".join(one.name for one in files if one.parent.name == kind) for kind in ("msg", "srv")}
+    messages = f"add_message_files(FILES {listed['msg']})\n" if listed["msg"] else ""
+    yield (
+        Path("CMakeLists.txt"),
+        f"""cmake_minimum_required(VERSION 3.5)
+project({types.package})
+find_package(catkin REQUIRED COMPONENTS message_generation)
+{messages}add_service_files(FILES {listed["srv"]})
+generate_messages()
+catkin_package(CATKIN_DEPENDS message_runtime)
+""",
+    )
+
+
+def definition_files(types: CallTypes) -> dict[Path, str]:
+    """Return the files of messages and services below their package, which name each other without it."""
+    found = {}
+    for name, text in types.definitions.items():
+        package, kind, short = name.split("/")
+        found[Path(kind) / f"{short}.{kind}"] = text.replace(f"{package}/", "") if kind == "msg" else text
+    return found
 
 
 def _world(package: str) -> list[str]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from volery.deploy.content import MODEL_FOLDER, VERIFICATION, Computer, package_name
-from volery.deploy.ros1 import message_packages
+from volery.deploy.content import MODEL_FOLDER, VERIFICATION, Computer
+from volery.deploy.ros1 import definition_files, message_packages
 from volery.deploy.texts import (
     bridge_script,
     host_script,
@@ -19,6 +19,7 @@ from volery.deploy.texts import (
     verification_script,
 )
 from volery.model.system import System
+from volery.run.distributed.call_types import INTERFACES, CallTypes, package_name
 
 GRAPH = "ros2"
 _EXPORT = "<export><build_type>ament_python</build_type></export>"
@@ -30,7 +31,8 @@ def computer_files(computer: Computer, system: System) -> Iterator[tuple[Path, s
     """Yield the files of a computer's package, without those of the model."""
     name = computer.package
     what = f"{system.name}: what {computer.processor.name} executes"
-    packages = dict.fromkeys(("rclpy", "std_msgs", *message_packages(computer)))
+    interfaces = package_name(system.name, INTERFACES)
+    packages = dict.fromkeys(("rclpy", "std_msgs", interfaces, *message_packages(computer)))
     yield from _frame(name, system, what, packages, [
         *(one.executable for one in computer.hosted), *(one.executable for one in computer.bridged)
     ])  # fmt: skip
@@ -57,6 +59,35 @@ def verification_files(system: System, computers: Sequence[Computer]) -> Iterato
     yield from _frame(name, system, what, ("rclpy", "std_msgs", "rosgraph_msgs"), ["world"])
     yield Path(name) / "world.py", verification_script(system, GRAPH, _BELOW_CODE)
     yield Path("launch") / f"{name}.launch.py", _world_launch(name, computers)
+
+
+def interface_files(types: CallTypes, system: System) -> Iterator[tuple[Path, str]]:
+    """Yield the files of the package of messages and services."""
+    tools = ("<buildtool_depend>ament_cmake</buildtool_depend>",)
+    depends = [
+        "<build_depend>rosidl_default_generators</build_depend>",
+        "<exec_depend>rosidl_default_runtime</exec_depend>",
+        "<member_of_group>rosidl_interface_packages</member_of_group>",
+        "<export><build_type>ament_cmake</build_type></export>",
+    ]
+    what = f"{system.name}: services of the operations of its interfaces"
+    yield Path("package.xml"), package_xml(types.package, system, what, tools, depends)
+    files = definition_files(types)
+    yield from files.items()
+    listed = "\n".join(f'  "{one}"' for one in files)
+    yield (
+        Path("CMakeLists.txt"),
+        f"""cmake_minimum_required(VERSION 3.8)
+project({types.package})
+find_package(ament_cmake REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+rosidl_generate_interfaces(${{PROJECT_NAME}}
+{listed}
+)
+ament_export_dependencies(rosidl_default_runtime)
+ament_package()
+""",
+    )
 
 
 def _frame(

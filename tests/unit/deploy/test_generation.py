@@ -9,10 +9,10 @@ import pytest
 from lxml import etree
 
 from volery.base.errors import CapabilityError, UsageError
-from volery.deploy.content import package_name
 from volery.deploy.generation import MARK, deploy
 from volery.model.system_loader import load
 from volery.run.assembly.model_checks import vocabulary
+from volery.run.distributed.call_types import package_name
 
 DELIVERY = Path(__file__).parents[3] / "examples" / "delivery"
 

@@ -41,6 +41,7 @@ def deploy(
     for computer, package in made.packages.items():
         table.add_row(computer, package)
     table.add_row("simulated vehicles and environment", made.verification)
+    table.add_row("messages and services", made.interfaces)
     output.show(table)
     output.note(f"written: {made.folder}; how to build and start them: {made.folder / 'README.md'}")
     output.give({**asdict(made), "folder": str(made.folder)})

@@ -20,6 +20,7 @@ from volery.ros.messages.packages import define_imported, define_packages, modul
 from volery.ros.messages.store import (
     ServiceType,
     define,
+    define_all,
     definition,
     message_class,
     message_name,
@@ -39,6 +40,7 @@ __all__ = [
     "ServiceType",
     "cdr_size",
     "define",
+    "define_all",
     "define_imported",
     "define_packages",
     "definition",

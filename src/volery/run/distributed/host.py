@@ -28,6 +28,7 @@ from volery.model.text import parse
 from volery.run.assembly.component_builder import BuiltComponents
 from volery.run.assembly.model_checks import vocabulary
 from volery.run.distributed import pipe, plan
+from volery.run.distributed.call_types import CallTypes, call_types
 from volery.run.distributed.topic_messages import (
     MESSAGE_TYPE,
     QUEUE,
@@ -81,6 +82,9 @@ class Host(Worker):
 
     def _truth_source(self) -> Callable[[str], Callable[[], Position]] | None:
         return None  # only the run has it
+
+    def _call_types(self) -> CallTypes | None:
+        return call_types(self._system)
 
     def run(self) -> bool:
         """Join the graph, begin when the others are there and run to the end. Return whether it went well."""

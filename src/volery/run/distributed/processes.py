@@ -24,9 +24,10 @@ from volery.run.assembly.component_builder import Builder, BuiltComponents, Proc
 from volery.run.assembly.computers import Platform
 from volery.run.assembly.ros_graphs import open_graph
 from volery.run.distributed import pipe, plan
+from volery.run.distributed.call_types import call_types
 from volery.run.distributed.deployed import DeployedComponent, DeployedRun
 from volery.run.distributed.pipe import Pipe
-from volery.run.distributed.remote_ports import PortClients, PortServer, ValueCodec
+from volery.run.distributed.remote_ports import CallFormats, PortClients, PortServer, ValueCodec
 from volery.run.ending import Ending
 
 if TYPE_CHECKING:
@@ -184,7 +185,9 @@ class DistributedRun:
         self._truth = fleet.truth
         self._values = ValueCodec(self._beside)
         self._here = tuple(one for one in system.instances if one.is_environment)
-        part = ProcessPart(self.graph, self._here, PortClients(kernel, system, node, self._values))
+        types = call_types(system) if self._settings.deployed else None
+        self._formats = CallFormats(system, self._values, self._beside, types)
+        part = ProcessPart(self.graph, self._here, PortClients(kernel, system, node, self._formats))
         builder = Builder(system, kernel, platform, fleet, self._ending, part=part)
         self._built = builder.build("times", self._settings.seed)
         return self._built
@@ -202,7 +205,7 @@ class DistributedRun:
             ComponentError: A component cannot be loaded, or its process has ended.
             LinkSilent: Some components are not on the graph by the deadline.
         """
-        desk = PortServer(self._kernel, self._node, self._values, self._kernel.root)
+        desk = PortServer(self._kernel, self._node, self._formats, self._kernel.root)
         for model in self._here:
             desk.serve(model, self._built.instances[model.name])
         period = round(CLOCK_PERIOD * max(1.0, self._settings.pace))  # the same rate in wall time at any pace

@@ -12,8 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from functools import partial
-from types import ModuleType
-from typing import Any
+from typing import Any, Protocol
 
 from volery.base.errors import ComponentError, UsageError, VoleryError
 from volery.components.instance import Instance
@@ -26,15 +25,13 @@ from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
 from volery.ros.graph import Client, Node, ServiceError
 from volery.ros.graph.interface import Work
-from volery.ros.messages import Message, request, service
+from volery.ros.messages import Message, define_all, request, service
+from volery.run.distributed.call_types import CallTypes, Find, OperationType
 from volery.run.distributed.plan import NODE, operations, service_name
 
 _KIND = "!"
 _TUPLE, _MAPPING = "tuple", "mapping"
 _VOLERY = "volery."
-
-Find = Callable[[str], ModuleType | None]
-"""Returns the module of that name beside the components of this process, loaded if necessary."""
 
 
 class ValueCodec:
@@ -144,6 +141,118 @@ def _unfit(value: object, what: str) -> UsageError:
 CALL = "volery_msgs/srv/Call"
 
 
+class CallFormat(Protocol):
+    """How the calls of one operation are written into messages."""
+
+    type: str
+
+    def request(self, args: tuple[Any, ...], kwargs: dict[str, Any], what: str) -> Message:
+        """Return the request; raise ``UsageError`` that names *what* if a value cannot be sent."""
+
+    def arguments(self, asked: Any) -> tuple[tuple[Any, ...], dict[str, Any]]:
+        """Return the arguments of a request, by position and by name."""
+
+    def response(self, result: Any, what: str) -> Message:
+        """Return the response with a result; raise ``UsageError`` that names *what*."""
+
+    def failure(self, error: str) -> Message:
+        """Return the response of an operation that failed."""
+
+    def error(self, answer: Any) -> str:
+        """Return why the operation failed."""
+
+    def result(self, answer: Any) -> Any:
+        """Return the result of a response."""
+
+
+class JsonCalls:
+    """Calls of any operation as JSON in ``volery_msgs/srv/Call``."""
+
+    type = CALL
+
+    def __init__(self, values: ValueCodec) -> None:
+        self._values = values
+
+    def request(self, args: tuple[Any, ...], kwargs: dict[str, Any], what: str) -> Message:
+        """See ``CallFormat``."""
+        made: Message = request(CALL, arguments=self._values.to_text([list(args), kwargs], what))
+        return made
+
+    def arguments(self, asked: Any) -> tuple[tuple[Any, ...], dict[str, Any]]:
+        """See ``CallFormat``."""
+        args, kwargs = self._values.from_text(asked.arguments)
+        return tuple(args), kwargs
+
+    def response(self, result: Any, what: str) -> Message:
+        """See ``CallFormat``."""
+        made: Message = service(CALL).response(True, self._values.to_text(result, what))
+        return made
+
+    def failure(self, error: str) -> Message:
+        """See ``CallFormat``."""
+        made: Message = service(CALL).response(False, error)
+        return made
+
+    def error(self, answer: Any) -> str:
+        """See ``CallFormat``."""
+        return str(answer.result)
+
+    def result(self, answer: Any) -> Any:
+        """See ``CallFormat``."""
+        return self._values.from_text(answer.result)
+
+
+class TypedCalls:
+    """Calls of one operation as messages of its own service type."""
+
+    def __init__(self, types: CallTypes, kind: OperationType, find: Find) -> None:
+        self.type = kind.name
+        self._types, self._kind, self._find = types, kind, find
+
+    def request(self, args: tuple[Any, ...], kwargs: dict[str, Any], what: str) -> Message:
+        """See ``CallFormat``."""
+        return self._types.request(self._kind, args, kwargs, what)
+
+    def arguments(self, asked: Any) -> tuple[tuple[Any, ...], dict[str, Any]]:
+        """See ``CallFormat``."""
+        return (), self._types.arguments(self._kind, asked, self._find)
+
+    def response(self, result: Any, what: str) -> Message:
+        """See ``CallFormat``."""
+        return self._types.response(self._kind, result, what)
+
+    def failure(self, error: str) -> Message:
+        """See ``CallFormat``."""
+        return self._types.failure(self._kind, error)
+
+    def error(self, answer: Any) -> str:
+        """See ``CallFormat``."""
+        return str(answer.error)
+
+    def result(self, answer: Any) -> Any:
+        """See ``CallFormat``."""
+        return self._types.result(self._kind, answer, self._find)
+
+
+class CallFormats:
+    """The formats of a process: typed where *types* has the operation, else JSON."""
+
+    def __init__(
+        self, system: System, values: ValueCodec, find: Find, types: CallTypes | None = None
+    ) -> None:
+        self._system, self._json, self._find, self._types = system, JsonCalls(values), find, types
+        if types is not None:
+            define_all(types.definitions)
+
+    def of(self, callee: InstanceModel, operation: str) -> CallFormat:
+        """Return the format of an operation of *callee*."""
+        for interface in callee.component.provides.values():
+            kind = self._types.operations.get((interface, operation)) if self._types else None
+            if self._types is not None and kind is not None:
+                return TypedCalls(self._types, kind, self._find)
+        return self._json
+
+
 class RemotePort(Port):
     """Port to a component of another process.
 
@@ -151,22 +260,27 @@ class RemotePort(Port):
     """
 
     def __init__(
-        self, kernel: Kernel, caller: str, callee: Instance, clients: Mapping[str, Client], values: ValueCodec
+        self,
+        kernel: Kernel,
+        caller: str,
+        callee: Instance,
+        clients: Mapping[str, Client],
+        formats: Mapping[str, CallFormat],
     ) -> None:
         super().__init__(kernel, caller, callee, None, None)
         self._clients = clients
-        self._values = values
+        self._formats = formats
 
     def _execute(self, task: Task, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
-        what = f"the arguments of {self.component}.{operation}"
-        asked = request(CALL, arguments=self._values.to_text([list(args), kwargs], what))
+        written = self._formats[operation]
+        asked = written.request(args, kwargs, f"the arguments of {self.component}.{operation}")
         try:
             answer = self._clients[operation].call(asked)
         except ServiceError as error:
             raise ComponentError(self.component, f"{operation} failed: {error.what}") from error
         if not answer.done:
-            raise ComponentError(self.component, answer.result.removeprefix(f"{self.component}: "))
-        return self._values.from_text(answer.result)
+            raise ComponentError(self.component, written.error(answer).removeprefix(f"{self.component}: "))
+        return written.result(answer)
 
 
 class PortClients:
@@ -176,46 +290,47 @@ class PortClients:
     has not discovered its client yet.
     """
 
-    def __init__(self, kernel: Kernel, system: System, node: Node, values: ValueCodec) -> None:
-        self._kernel, self._system, self._node, self._values = kernel, system, node, values
+    def __init__(self, kernel: Kernel, system: System, node: Node, formats: CallFormats) -> None:
+        self._kernel, self._system, self._node, self._formats = kernel, system, node, formats
         self._clients: dict[str, Client] = {}
 
     def __call__(self, caller: InstanceModel, callee: InstanceModel) -> RemotePort:
         """Return the port of *caller* in this process to *callee* in another."""
         provided = operations(self._system, callee)
         far = Instance(self._kernel, callee.name, operations=provided)
-        clients = {name: self._client(service_name(callee, name)) for name in provided}
-        return RemotePort(self._kernel, caller.name, far, clients, self._values)
+        formats = {name: self._formats.of(callee, name) for name in provided}
+        clients = {name: self._client(service_name(callee, name), formats[name].type) for name in provided}
+        return RemotePort(self._kernel, caller.name, far, clients, formats)
 
-    def _client(self, name: str) -> Client:
+    def _client(self, name: str, service_type: str) -> Client:
         known = self._clients.get(name)
         if known is None:
-            known = self._clients[name] = self._node.client(name, CALL)
+            known = self._clients[name] = self._node.client(name, service_type)
         return known
 
 
 class PortServer:
     """Serves the operations of the components of one process to others, with one task for each call."""
 
-    def __init__(self, kernel: Kernel, node: Node, values: ValueCodec, scope: Scope) -> None:
-        self._kernel, self._node, self._values, self._scope = kernel, node, values, scope
+    def __init__(self, kernel: Kernel, node: Node, formats: CallFormats, scope: Scope) -> None:
+        self._kernel, self._node, self._formats, self._scope = kernel, node, formats, scope
         self._group = node.group(self._start)
 
     def serve(self, model: InstanceModel, instance: Instance) -> None:
         """Advertise the operations of *instance*."""
         for operation in instance.operations:
-            handler = partial(self._answer, instance, operation)
-            self._node.serve(service_name(model, operation), CALL, handler, self._group)
+            written = self._formats.of(model, operation)
+            handler = partial(self._answer, instance, operation, written)
+            self._node.serve(service_name(model, operation), written.type, handler, self._group)
 
     def _start(self, work: Work) -> None:
         self._kernel.spawn(work.run, f"{NODE} (call)", ExecutionContext(NODE), self._scope)
 
-    def _answer(self, instance: Instance, operation: str, asked: Any) -> Message:
-        respond = service(CALL).response
+    def _answer(self, instance: Instance, operation: str, written: CallFormat, asked: Any) -> Message:
         try:
-            args, kwargs = self._values.from_text(asked.arguments)
+            args, kwargs = written.arguments(asked)
             with instance.serving(current_task(self._kernel), operation) as thing:
-                result = invoke(instance, thing, operation, tuple(args), kwargs)
-            return respond(True, self._values.to_text(result, f"the result of {instance.name}.{operation}"))
+                result = invoke(instance, thing, operation, args, kwargs)
+            return written.response(result, f"the result of {instance.name}.{operation}")
         except VoleryError as error:
-            return respond(False, str(error))
+            return written.failure(str(error))

@@ -23,8 +23,9 @@ from volery.requirements.record import Status
 from volery.run.assembly.component_builder import Builder, BuiltComponents, ProcessPart
 from volery.run.assembly.ros_graphs import open_graph
 from volery.run.distributed import pipe, plan
+from volery.run.distributed.call_types import CallTypes
 from volery.run.distributed.pipe import Pipe, RunSide
-from volery.run.distributed.remote_ports import PortClients, PortServer, ValueCodec
+from volery.run.distributed.remote_ports import CallFormats, PortClients, PortServer, ValueCodec
 from volery.run.ending import FOREVER, Ending
 from volery.trace.events import Activation, Charge, Event
 
@@ -74,14 +75,18 @@ class Worker:
         if isinstance(kernel, FollowingKernel):
             self.graph.follow_clock(node)
         values = ValueCodec(self._beside)
-        reach = PortClients(kernel, self._system, node, values)
+        formats = CallFormats(self._system, values, self._beside, self._call_types())
+        reach = PortClients(kernel, self._system, node, formats)
         part = ProcessPart(self.graph, (model,), reach, {model.name: node}, self._truth_source())
         platform = plan.HostPlatform(self._system, kernel, self._order.seed, "times")
         builder = Builder(self._system, kernel, platform, None, self._ending, part=part)
         built = builder.build("times", self._order.seed)
         self._loader = built.loader
-        PortServer(kernel, node, values, kernel.root).serve(model, built.instances[model.name])
+        PortServer(kernel, node, formats, kernel.root).serve(model, built.instances[model.name])
         return built
+
+    def _call_types(self) -> CallTypes | None:
+        return None  # processes of one run send JSON
 
     def _beside(self, module: str) -> ModuleType | None:
         assert self._loader is not None, "values are received after the component is loaded"
