@@ -20,6 +20,7 @@ from volery.base.position import Position
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.api import Action, Handle, Kernel
 from volery.kernel.waiting import sleep
+from volery.trace.events import Text
 from volery.vehicles.driver import Driver, Step
 from volery.vehicles.limits import FLOOR
 from volery.vehicles.telemetry import REFRESHED_AFTER, STALE_AFTER, Telemetry, describe_state, failsafe_cause
@@ -30,6 +31,9 @@ REASON_WAIT: Ns = 500 * MS
 """Time to wait for the text with the reason, which often follows a refusal."""
 RECENT_TEXT_S = 3.0
 """Texts older than this are quoted with their age."""
+CLOCKS_COMPARED_AFTER: Ns = 5 * S
+CLOCK_TOLERANCE = 0.25
+"""Share by which the clocks of vehicle and program may differ before that of the vehicle counts."""
 LINK_TIMEOUT: Ns = 5 * S
 """Time without a message after which the link counts as lost: five missed heartbeats."""
 
@@ -117,6 +121,7 @@ class StepExecutor:
         self._silent_after = min(link_timeout, STALE_AFTER)
         self.commanded = ""  # mode that this program commanded last; empty while another has control
         self._previous = ""  # mode commanded before, until the one commanded last is seen
+        self._clock_reported = False
         self._claim = 0  # counts aborts; steps begun under an earlier claim end
         self._successor = ""  # what aborted the steps in progress
         self._taking_back = False  # from a failsafe that a stream of this program has caused
@@ -279,6 +284,17 @@ class StepExecutor:
             cycle()
         return True
 
+    def report_clock(self, rate: float) -> None:
+        """Record once that the vehicle's clock runs *rate* times as fast, and whose seconds count where."""
+        if self._clock_reported:
+            return
+        self._clock_reported = True
+        said = (
+            f"its clock runs {rate:.1f} times as fast as this computer's: time-outs are in its seconds; "
+            "durations of the report, of velocities and of lost links are in this computer's"
+        )
+        self._kernel.record(Text(self._kernel.now(), self._driver.name, 5, said))
+
     def link_lost(self) -> bool:
         """Return whether the last message is older than the link time-out."""
         return self._kernel.now() - self._driver.telemetry.last_message_ns >= self._link_timeout
@@ -307,6 +323,7 @@ class _StepRun:
         self._check = check
         self._telemetry: Telemetry = driver.telemetry
         self._began: Ns = self._kernel.now()
+        self._boot_began: Ns = self._telemetry.boot_time(self._began)
         self._mode_before = self._telemetry.mode
         self._was_armed = self._telemetry.armed
         self._taken = ""  # how another station, a pilot or a failsafe has changed it
@@ -349,7 +366,7 @@ class _StepRun:
                 handles.append(_repeat(kernel, step.keep.period, step.keep.action))
             try:
                 while not self._over():
-                    changed.wait_for(self._over, self._time_left(), ends_activation=True)
+                    changed.wait_for(self._over_or_late, self._time_left(), ends_activation=True)
             finally:
                 for handle in handles:
                     handle.cancel()
@@ -387,6 +404,25 @@ class _StepRun:
             self._stopped = self._stopped or self._check(self._asked, self._kernel.now()) or self._failed()
         return bool(self._taken) or self._stopped is not None
 
+    def _over_or_late(self) -> bool:
+        return self._over() or self._elapsed() >= self._step.within
+
+    def _elapsed(self) -> Ns:
+        """Return the time since the step began, ns, on the vehicle's clock if that runs faster or slower.
+
+        A simulated firmware may run at several times real time, or slowly on a busy computer. Where both
+        clocks agree within a quarter, that of the program counts.
+        """
+        now = self._kernel.now()
+        elapsed = now - self._began
+        if self._boot_began < 0 or elapsed < CLOCKS_COMPARED_AFTER or self._telemetry.stale:
+            return elapsed
+        theirs = self._telemetry.boot_time(now) - self._boot_began
+        if theirs < 0 or abs(theirs - elapsed) <= CLOCK_TOLERANCE * elapsed:
+            return elapsed
+        self._executor.report_clock(theirs / elapsed)
+        return theirs
+
     def _failed(self) -> VehicleError | None:
         """Return the error of a step that can no longer be done."""
         why = self._step.fails()
@@ -417,7 +453,7 @@ class _StepRun:
         patience = self._telemetry.last_message_ns + self._executor._link_timeout - now
         if patience <= 0:
             raise self._executor.link_lost_error(self._asked)
-        left = self._began + self._step.within - now
+        left = self._step.within - self._elapsed()
         if left <= 0:
             raise self._refused() if self._is_refused() else self._not_arrived()
         return min(left, patience)

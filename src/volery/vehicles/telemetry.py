@@ -63,6 +63,8 @@ POSITION_STALE_AFTER: Ns = 3 * S
 PERIODS_MISSED = 3
 """A position that is reported rarely counts as old after this many of its periods."""
 LONGEST_POSITION_AGE: Ns = 30 * S
+REBOOTED_BEFORE: Ns = 10 * S
+"""A time since boot that is this much less than the last one is that of another boot."""
 FIXED = frozenset(
     {"3d_fix", "dgps", "rtk_float", "rtk_fixed", "static", "ppp", "3d", "rtk", "gps health 4", "gps health 5"}
 )
@@ -111,6 +113,7 @@ class Telemetry:
         answers: last acknowledgement by key.
         rc: pulse widths of the RC channels as the autopilot reads them, µs; 0 or 65535 where there is none.
         rc_ns: time of their last report; -1 before the first.
+        boot_ns: last reported time of the autopilot since its boot; -1 where it sends none.
         home_ns: time since which the present home position is reported; -1 without one.
         detects_silence: whether a silence is one of the link, not of a node that does not run its loop.
         stream_lost: how a stream of this program was interrupted, so that a failsafe of the autopilot acts.
@@ -144,6 +147,8 @@ class Telemetry:
         self.above_home = nan
         self.amsl_known = True
         self.amsl_remedy = ""
+        self.boot_ns: Ns = -1
+        self._boot_at: Ns = -1
         self._home: Position | None = None
         self.home_ns: Ns = -1
         self.velocity = Velocity(nan, nan, nan)
@@ -226,6 +231,15 @@ class Telemetry:
             self._had_fix, self._fix_lost_ns = True, None
         elif fix in UNFIXED and self._had_fix and self._fix_lost_ns is None:
             self._fix_lost_ns = self._kernel.now()
+
+    def update_clock(self, boot_ns: Ns) -> None:
+        """Store the autopilot's time since boot, unless the message was overtaken on the way."""
+        if boot_ns > self.boot_ns or boot_ns < self.boot_ns - REBOOTED_BEFORE:
+            self.boot_ns, self._boot_at = boot_ns, self._kernel.now()
+
+    def boot_time(self, now: Ns) -> Ns:
+        """Return the autopilot's time since boot, ns, extrapolated from its last report; -1 without one."""
+        return -1 if self.boot_ns < 0 else self.boot_ns + now - self._boot_at
 
     def texts_since(self, when: Ns, severity: int = 6) -> list[str]:
         """Return texts received at or after *when*, at least as severe as *severity*, oldest first."""

@@ -29,6 +29,21 @@ def test_a_critical_battery_holds_and_then_acts(action: int, mode: str, bench: A
     assert rig.latest["HEARTBEAT"]["system_status"] == 5
 
 
+def test_a_battery_that_falls_further_does_not_hold_a_second_time(bench: Any) -> None:
+    """The delay of COM_FAIL_ACT_T is used up once: from critical to emergency the landing goes on."""
+    rig = bench(parameters={"COM_LOW_BAT_ACT": 2})
+    since = hovering(rig)
+    rig.flight.drain_battery(0.06)
+    rig.run_until(lambda: rig.vehicle.mode.name == LAND, within=10.0)
+    rig.flight.drain_battery(0.03)
+    seen = set()
+    for _ in range(30):
+        rig.run(0.1)
+        seen.add(rig.vehicle.mode.name)
+    assert "Emergency battery level\t" in rig.texts(since)
+    assert seen == {LAND}
+
+
 def test_a_battery_that_only_warns(bench: Any) -> None:
     rig = bench(parameters={"COM_LOW_BAT_ACT": 0})
     since = hovering(rig)

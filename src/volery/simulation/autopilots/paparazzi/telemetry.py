@@ -10,7 +10,7 @@ from collections.abc import Callable
 from math import cos, radians, sin
 from typing import Any, NamedTuple
 
-from volery.base.frames import Vector, enu_to_ned, geodetic_to_ecef, ned_to_enu
+from volery.base.frames import Vector, enu_to_ned, euler_to_quaternion, geodetic_to_ecef, ned_to_enu
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.simulation.autopilots.paparazzi import modes, rotorcraft_state
@@ -25,6 +25,10 @@ Fields = dict[str, Any]
 
 POSITION, SPEED, ANGLE = 1 << 8, 1 << 19, 1 << 12
 """Counts in a metre, in a metre per second, in a radian."""
+ACCELERATION, QUATERNION = 1 << 10, 1 << 15
+"""Counts in a metre per second squared, in a quaternion's one."""
+AIR_DEG_C, STANDARD_QNH = 14.0, 1013.25
+"""Air temperature, as recorded [deg C]; pressure at sea level [hPa]."""
 ABOVE_ELLIPSOID_M = 49.85
 """Height of mean sea level above the ellipsoid, as recorded; the simulated world has no geoid model."""
 GUIDANCE = {
@@ -224,6 +228,52 @@ def next_waypoint(vehicle: Vehicle) -> Fields:
     return waypoint(vehicle, state.last_sent_waypoint)
 
 
+def ins(vehicle: Vehicle) -> Fields:
+    """Return INS: estimated position, velocity and acceleration, north, east, down."""
+    estimate = vehicle.estimate
+    fields: Fields = {}
+    for suffix, vector, scale in (
+        ("", estimate.position, POSITION),
+        ("d", estimate.velocity, SPEED),
+        ("dd", estimate.acceleration, ACCELERATION),
+    ):
+        for axis, value in zip("xyz", vector, strict=True):
+            fields[f"ins_{axis}{suffix}"] = to_counts(value, scale)
+    return fields
+
+
+def ahrs_ref_quat(vehicle: Vehicle) -> Fields:
+    """Return AHRS_REF_QUAT: commanded and estimated attitude."""
+    estimate = vehicle.estimate
+    wanted = euler_to_quaternion(*estimate.target_attitude) if vehicle.armed else (1.0, 0.0, 0.0, 0.0)
+    fields: Fields = {}
+    for name, quaternion in (("ref", wanted), ("body", estimate.quaternion)):
+        for part, value in zip("ixyz", quaternion, strict=True):
+            fields[f"{name}_q{part}"] = to_counts(value, QUATERNION)
+    return fields
+
+
+def air_data(vehicle: Vehicle) -> Fields:
+    """Return AIR_DATA: pressure and the rest without a sensor, as recorded."""
+    return {
+        "pressure": vehicle.estimate.pressure * 100.0,
+        "temp": AIR_DEG_C,
+        "qnh": STANDARD_QNH,
+        "airspeed": -1.0,
+        "tas": -1.0,
+    }
+
+
+def state_filter_status(_vehicle: Vehicle) -> Fields:
+    """Return STATE_FILTER_STATUS as recorded: the attitude filter works."""
+    return {"id": 3, "state_filter_mode": 3}
+
+
+def autopilot_version(_vehicle: Vehicle) -> Fields:
+    """Return AUTOPILOT_VERSION: the version that is simulated."""
+    return {"version": 60_200, "desc": "v6.2 simulated by volery"}
+
+
 def next_setting(vehicle: Vehicle) -> Fields:
     """Return DL_VALUE of the settings in turn."""
     state = state_of(vehicle)
@@ -248,21 +298,22 @@ def _period(seconds: float) -> Ns:
 
 PERIODIC_MESSAGES = (
     PeriodicMessage("ROTORCRAFT_FP", _period(0.25), rotorcraft_fp),
+    PeriodicMessage("INS", _period(0.25), ins),
     PeriodicMessage("GPS_INT", _period(0.25), gps_int),
+    PeriodicMessage("AHRS_REF_QUAT", _period(0.5), ahrs_ref_quat),
     PeriodicMessage("DL_VALUE", _period(1.1), next_setting),
     PeriodicMessage("ROTORCRAFT_STATUS", _period(1.2), rotorcraft_status),
     PeriodicMessage("WP_MOVED_ENU", _period(1.3), next_waypoint),
+    PeriodicMessage("AIR_DATA", _period(1.3), air_data),
     PeriodicMessage("ROTORCRAFT_NAV_STATUS", _period(1.6), nav_status),
     PeriodicMessage("ALIVE", _period(2.1), alive),
     PeriodicMessage("ENERGY", _period(2.5), energy),
+    PeriodicMessage("STATE_FILTER_STATUS", _period(3.2), state_filter_status),
     PeriodicMessage("INS_REF", _period(5.1), ins_ref),
     PeriodicMessage("DATALINK_REPORT", _period(5.1), datalink_report),
+    PeriodicMessage("AUTOPILOT_VERSION", _period(11.1), autopilot_version),
 )
-"""Sorted by period, which is the order of messages that are due together.
-
-The observed aircraft also sends INS (4 Hz), AHRS_REF_QUAT (2 Hz), AIR_DATA, STATE_FILTER_STATUS and
-AUTOPILOT_VERSION, of which nothing here makes use.
-"""
+"""Sorted by period, which is the order of messages that are due together."""
 
 OTHER_MODES = range(1, 10)
 """Values of ``telemetry_mode_Main`` that are other lists. Beyond them no periodic message is sent."""

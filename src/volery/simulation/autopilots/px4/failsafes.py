@@ -291,7 +291,7 @@ def _end_hold(commander: Commander) -> None:
     """Execute the action of a failsafe after its hold."""
     if commander.hold_until == NEVER or commander.vehicle.kernel.now() < commander.hold_until:
         return
-    commander.hold_until = NEVER
+    commander.hold_until, commander.hold_delay_left = NEVER, 0.0
     commander.vehicle.send_text(CRITICAL, "Failsafe activated\t")
     commander.log.send(event_interface.FAILSAFE_AFTER_HOLD, struct.pack("<HHBB", 0, 3, 6, 1))
     commander.begin_failsafe(commander.failsafe, commander.after_hold)

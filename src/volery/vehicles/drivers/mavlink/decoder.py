@@ -9,7 +9,7 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.position import AMSL, Position
-from volery.base.time import Ns
+from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import StatusTextAssembler, constant, entry_name
 from volery.trace.events import Text
@@ -87,6 +87,8 @@ class TelemetryDecoder(ABC):
     def handle_message(self, name: str, fields: Fields) -> bool:
         """Decode a message; return whether it was used. Positions off the globe are discarded."""
         self._telemetry.note_message(self._kernel.now())
+        if "time_boot_ms" in fields:
+            self._telemetry.update_clock(fields["time_boot_ms"] * MS)
         handler = self._handlers.get(name)
         if handler is None:
             return False

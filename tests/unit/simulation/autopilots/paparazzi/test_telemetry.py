@@ -17,13 +17,18 @@ Make = Callable[..., Any]
 
 PERIODS = {
     "ROTORCRAFT_FP": 0.25,
+    "INS": 0.25,
     "GPS_INT": 0.25,
+    "AHRS_REF_QUAT": 0.5,
+    "AIR_DATA": 1.3,
     "ROTORCRAFT_STATUS": 1.2,
     "ROTORCRAFT_NAV_STATUS": 1.6,
     "ALIVE": 2.1,
     "ENERGY": 2.5,
+    "STATE_FILTER_STATUS": 3.2,
     "INS_REF": 5.1,
     "DATALINK_REPORT": 5.1,
+    "AUTOPILOT_VERSION": 11.1,
 }
 
 
@@ -49,6 +54,18 @@ def test_position_velocity_and_attitude_have_their_scales(craft: Any) -> None:
     assert fp["psi"] / 4096 == pytest.approx(0.75, abs=0.03)
     assert fp["flight_time"] > 5
     assert 2000 < fp["thrust"] < 7000
+
+
+def test_the_estimate_is_also_sent_as_ins_and_quaternion(craft: Any) -> None:
+    craft.guided()
+    craft.guide(0x00, 10.0, 5.0, -12.0, 0.3)
+    craft.run(20.0)
+    seen, attitude, air = (craft.last(name) for name in ("INS", "AHRS_REF_QUAT", "AIR_DATA"))
+    assert seen["ins_x"] / 256 == pytest.approx(10.0, abs=0.5)
+    assert seen["ins_z"] / 256 == pytest.approx(-12.0, abs=0.5)
+    size = sum((attitude[f"body_q{part}"] / 32768) ** 2 for part in "ixyz")
+    assert size == pytest.approx(1.0, abs=1e-3)
+    assert 80_000.0 < air["pressure"] < 102_000.0
 
 
 def test_local_frame_and_satellites_name_the_same_place(craft: Any) -> None:
@@ -124,7 +141,7 @@ def test_another_telemetry_mode_is_another_list(craft: Any, mode: int, silent: s
     """Recorded of scaled_sensors (3); observed of a number that is no mode: all periodic telemetry stops."""
     craft.set("telemetry_mode_Main", mode)
     craft.received.clear()
-    craft.run(6.0)
+    craft.run(12.0)
     assert {name for name in PERIODS if not craft.count(name)} == silent
     craft.send("PING")
     craft.run(0.05)
@@ -159,7 +176,7 @@ def test_every_message_fits_its_definition_and_carries_its_number(make: Make) ->
     craft.guided()
     craft.run(10.0)
     assert {frame.system for frame in craft.received} == {7}
-    assert set(PERIODS) <= {frame.name for frame in craft.received}
+    assert set(PERIODS) <= {frame.name for frame in craft.received} | {"AUTOPILOT_VERSION"}
     assert (
         craft.link.statistics.corrupt == craft.link.statistics.unknown == craft.link.statistics.garbage == 0
     )

@@ -1,0 +1,212 @@
+"""The five-line mission phase by phase: simulated against flown by the real firmware in its own simulator.
+
+The reference is what was recorded of ArduCopter 4.5.6 (SITL), PX4 1.14.0 (SIH, mean of three flights) and
+Paparazzi v6.2 (NPS, `ardrone2`, mean of two), with the same mission file and without wind. The ratio is
+simulated over recorded. A figure marked with * is more than 5 per cent (times) or 10 per cent (others) off.
+PX4's three flights differ by 6 per cent to goal 1 and by 20 per cent on leg 3.
+
+    python bench/phases.py [ardupilot|px4|paparazzi ...]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from math import dist, hypot, nan
+from pathlib import Path
+from typing import NamedTuple
+
+import volery
+from volery.base.frames import LocalFrame
+from volery.trace.events import Operation, VehicleState
+from volery.trace.reader import Reading
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
+from mission import HOME, mission
+
+STOPPED_LATE, HOVERED = 11.7, 13.0
+"""Seconds for which the driver of the recorded Paparazzi waited: on the ground with motors on, and for the
+last 0.3 m of the take-off. The present driver does not.
+"""
+
+NEAR_M = 1.0
+LIFTED_M, NEARLY_UP_M = 0.3, 9.5
+TIME_TOLERANCE, TOLERANCE = 0.05, 0.10
+
+
+class Figure(NamedTuple):
+    """One recorded figure and how it is computed from a simulated flight."""
+
+    name: str
+    unit: str
+    recorded: float
+    of: Callable[[Flight], float]
+
+
+class Flight:
+    """A simulated flight of the mission: operations, and states at 10 Hz in metres about home."""
+
+    def __init__(self, autopilot: str) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            run = volery.fly(mission, f"sim:{autopilot}?start=warm", volery.Options(seed=1, out=Path(folder)))
+            assert run.completed, run.record.outcome.reason
+            with Reading(Path(folder) / "trace.mcap") as reading:
+                events = list(reading.events())
+        (self.record,) = run.record.vehicles.values()
+        self.operations = [one for one in events if isinstance(one, Operation)]
+        states = [one for one in events if isinstance(one, VehicleState)]
+        first = next(number for number, one in enumerate(states) if one.armed)
+        last = max(number for number, one in enumerate(states) if one.armed)
+        self.states = states[first : last + 2]
+        frame = LocalFrame(HOME.latitude, HOME.longitude, HOME.altitude.metres)
+        self.goals = [
+            frame.to_enu(latitude, longitude, amsl)
+            for latitude, longitude, amsl in (
+                (46.0828, -103.8990, 940.0),
+                (46.0828, -103.8962, 940.0),
+                (46.0820, -103.8964, 920.0),
+            )
+        ]
+
+    def operation(self, name: str, number: int = 0) -> Operation:
+        """Return the operation of that name and number, from 0."""
+        return [one for one in self.operations if one.operation == name][number]
+
+    def duration(self, name: str, number: int = 0) -> float:
+        """Return the duration of an operation, s."""
+        one = self.operation(name, number)
+        return (one.end - one.start) / 1e9
+
+    def armed(self) -> float:
+        """Return the time from arming to disarming, s."""
+        return (self.states[-1].at - self.states[0].at) / 1e9
+
+    def when(self, holds: Callable[[VehicleState], bool]) -> float:
+        """Return the time after arming at which a state first holds, s."""
+        return next(((one.at - self.states[0].at) / 1e9 for one in self.states if holds(one)), nan)
+
+    def rises_to(self, height: float) -> float:
+        """Return the time after arming at which a height is reached, s."""
+        ground = self.states[0].z
+        return self.when(lambda one: one.z - ground >= height)
+
+    def near(self, number: int) -> float:
+        """Return the time after arming at which a goal is first within a metre, s."""
+        started = self.operation("goto", number).start
+        return self.when(lambda one: one.at >= started and dist(one[2:5], self.goals[number]) < NEAR_M)
+
+    def overshoot(self) -> float:
+        """Return the mean distance flown past the goals along the legs, m."""
+        start, past = (0.0, 0.0, 0.0), []
+        for number, goal in enumerate(self.goals):
+            operation = self.operation("goto", number)
+            leg = goal[0] - start[0], goal[1] - start[1]
+            length = hypot(*leg)
+            flown = (one for one in self.states if operation.start <= one.at <= operation.end)
+            past.append(
+                max(((one.x - goal[0]) * leg[0] + (one.y - goal[1]) * leg[1]) / length for one in flown)
+            )
+            start = goal
+        return sum(past) / len(past)
+
+    def greatest(self, value: Callable[[VehicleState], float]) -> float:
+        """Return the greatest value of a state."""
+        return max(value(one) for one in self.states)
+
+    def distance(self) -> float:
+        """Return the distance flown, m."""
+        return sum(dist(a[2:5], b[2:5]) for a, b in zip(self.states, self.states[1:], strict=False))
+
+    def energy(self) -> float:
+        """Return the energy drawn from the battery, kJ."""
+        pairs = zip(self.states, self.states[1:], strict=False)
+        return sum(a.volts * a.amperes * (b.at - a.at) for a, b in pairs) / 1e12
+
+
+def speed(one: VehicleState) -> float:
+    """Return the speed over ground, m/s."""
+    return hypot(one.vx, one.vy)
+
+
+def legs(*recorded: float) -> Sequence[Figure]:
+    """Return the figures of three legs, each the duration of its goto()."""
+    return [
+        Figure(
+            f"leg {number + 1}", "s", seconds, lambda flight, number=number: flight.duration("goto", number)
+        )
+        for number, seconds in enumerate(recorded)
+    ]
+
+
+RECORDED: Mapping[str, Sequence[Figure]] = {
+    "ardupilot": (
+        Figure("arming to 0.3 m up", "s", 4.1, lambda flight: flight.rises_to(LIFTED_M)),
+        Figure(
+            "0.3 m to 9.5 m",
+            "s",
+            5.4,
+            lambda flight: flight.rises_to(NEARLY_UP_M) - flight.rises_to(LIFTED_M),
+        ),
+        *legs(14.51, 28.62, 17.79),
+        Figure("land from 20 m", "s", 31.19, lambda flight: flight.duration("land")),
+        Figure("armed in all", "s", 101.1, Flight.armed),
+        Figure("distance", "m", 401.0, Flight.distance),
+        Figure("greatest speed", "m/s", 10.24, lambda flight: flight.greatest(speed)),
+        Figure("overshoot", "m", 0.8, Flight.overshoot),
+        Figure("energy", "kJ", 35.0, Flight.energy),
+    ),
+    "px4": (
+        Figure("9.5 m up", "s", 11.7, lambda flight: flight.rises_to(NEARLY_UP_M)),
+        Figure("goal 1 within 1 m", "s", 28.0, lambda flight: flight.near(0)),
+        Figure("leg 2, from 1 m to 1 m", "s", 53.5, lambda flight: flight.near(1) - flight.near(0)),
+        Figure("leg 3, from 1 m to 1 m", "s", 32.7, lambda flight: flight.near(2) - flight.near(1)),
+        Figure(
+            "goal 3 within 1 m to LAND",
+            "s",
+            8.1,
+            lambda flight: (flight.operation("land").start - flight.states[0].at) / 1e9 - flight.near(2),
+        ),
+        Figure("LAND to disarmed", "s", 27.0, lambda flight: flight.duration("land")),
+        Figure("armed in all", "s", 149.3, Flight.armed),
+        Figure("distance", "m", 408.2, Flight.distance),
+        Figure("greatest speed", "m/s", 5.08, lambda flight: flight.greatest(speed)),
+        Figure("greatest climb", "m/s", 2.78, lambda flight: flight.greatest(lambda one: one.vz)),
+        Figure("greatest sink", "m/s", 1.62, lambda flight: flight.greatest(lambda one: -one.vz)),
+        Figure("overshoot", "m", 1.5, Flight.overshoot),
+    ),
+    "paparazzi": (
+        *legs(20.0, 50.75, 25.65),
+        Figure("land from 20 m", "s", 38.7 - STOPPED_LATE, lambda flight: flight.duration("land")),
+        Figure("armed in all", "s", 154.0 - STOPPED_LATE - HOVERED, Flight.armed),
+        Figure("distance", "m", 431.0, Flight.distance),
+        Figure("greatest speed", "m/s", 7.7, lambda flight: flight.greatest(speed)),
+        Figure("greatest climb", "m/s", 3.5, lambda flight: flight.greatest(lambda one: one.vz)),
+        Figure("greatest sink", "m/s", 3.1, lambda flight: flight.greatest(lambda one: -one.vz)),
+        Figure("overshoot", "m", 2.4, Flight.overshoot),
+    ),
+}
+"""PX4's simulator measures no current; Paparazzi's reports a current that its model does not depend on."""
+
+
+def main() -> None:
+    """Print one table for each autopilot."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("autopilots", nargs="*", default=list(RECORDED))
+    for autopilot in options.parse_args().autopilots:
+        flight = Flight(autopilot)
+        print(f"| {autopilot} | recorded | simulated | ratio |\n|---|---|---|---|")
+        for figure in RECORDED[autopilot]:
+            value = figure.of(flight)
+            ratio = value / figure.recorded
+            off = abs(ratio - 1.0) > (TIME_TOLERANCE if figure.unit == "s" else TOLERANCE)
+            print(
+                f"| {figure.name} | {figure.recorded:g} {figure.unit} | {value:.2f} {figure.unit} | "
+                f"{ratio:.2f}{' *' if off else ''} |"
+            )
+        print()
+
+
+if __name__ == "__main__":
+    main()
