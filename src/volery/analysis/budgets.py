@@ -15,6 +15,7 @@ from volery.base.errors import EstimateError
 from volery.base.time import to_seconds
 from volery.cost import ProcessorPrices, load_catalogue
 from volery.model.environment import Vehicle
+from volery.model.instances import Instance
 from volery.model.system import System
 from volery.run.assembly.simulated_fleet import body_of
 from volery.simulation.world.body_specs import Multirotor
@@ -90,12 +91,39 @@ def budgets(system: System, utilisations: Sequence[Utilisation]) -> Budgets:
 
 
 def _memory(system: System) -> Iterator[Memory]:
-    """Yield the memory of each process: a component instance is deployed as one."""
+    """Yield the memory of each process, and of each computer whose memory is stated.
+
+    The instances of a memory space share its process; every other instance is deployed as one.
+    """
+    limits = {one.name: one.memory_b for one in system.memory_spaces}
+    used: dict[str, list[Memory]] = {}
+    for process, instances in _processes(system).items():
+        missing = [one.component.name for one in instances if one.component.memory_b is None]
+        stated, limit = sum(one.component.memory_b or 0.0 for one in instances), limits.get(process)
+        why = f"state `memory` of {', '.join(dict.fromkeys(missing))}" if missing else ""
+        if limit is not None and stated > limit:
+            why = f"more than the {limit:g} B of its memory space"
+        made = Memory(process, instances[0].processor or "", None if missing else stated, why)
+        used.setdefault(made.processor, []).append(made)
+        yield made
+    for processor in system.processors:
+        mine = used.get(processor.name, [])
+        if processor.memory_b is None or not mine:
+            continue
+        known = sum(one.bytes or 0.0 for one in mine)
+        unknown = ", ".join(one.process for one in mine if one.bytes is None)
+        why = f"without {unknown}" if unknown else ""
+        if known > processor.memory_b:
+            why = f"more than its {processor.memory_b:g} B"
+        yield Memory(f"all of {processor.name}", processor.name, None if unknown else known, why)
+
+
+def _processes(system: System) -> dict[str, list[Instance]]:
+    found: dict[str, list[Instance]] = {}
     for one in system.instances:
         if one.processor is not None:
-            stated = one.component.memory_b
-            why = "" if stated is not None else f"state `memory` of {one.component.name}"
-            yield Memory(one.name, one.processor, stated, why)
+            found.setdefault(one.memory_space or one.name, []).append(one)
+    return found
 
 
 def _energy(system: System, prices: ProcessorPrices, used: Utilisation, cores: int) -> Energy:

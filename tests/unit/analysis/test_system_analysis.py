@@ -265,3 +265,24 @@ def test_budgets(system_of):
     assert energy.watts == pytest.approx(2.5, abs=2.0)
     assert energy.joules == pytest.approx(energy.watts * 900)
     assert not energy.at_least
+
+
+def test_the_worst_time_counts(system_of):
+    text = PERIODIC.replace("activation: {time: 3 ms}", "activation: {time: 1 ms, worst: 3 ms}")
+    assert milliseconds(system_of(text)) == {"a": 3, "b": 6, "c": 12}
+
+
+def test_instances_of_a_memory_space_share_its_process(system_of):
+    text = PERIODIC.replace("platform:", "memory_spaces: {loops: {memory: 20 MB}}\nplatform:", 1)
+    text = text.replace("cores: 1}", "cores: 1, memory: 30 MB}").replace(
+        "{a: pc, b: pc, c: pc}", "{a: loops, b: loops, c: pc, loops: pc}"
+    )
+    system = system_of(text)
+    loops, alone, everything = budgets(system, analyse(system).processors).memory
+    assert (loops.process, loops.bytes, loops.why) == (
+        "loops",
+        24e6,
+        "more than the 2e+07 B of its memory space",
+    )
+    assert (alone.process, alone.bytes, alone.why) == ("c", 12e6, "")
+    assert (everything.bytes, everything.why) == (36e6, "more than its 3e+07 B")
