@@ -8,13 +8,13 @@ from typing import Any
 
 from volery.base.errors import VoleryError
 from volery.base.time import MS, S, from_seconds
-from volery.control.actuation import RcOverride, VelocitySetpoints
 from volery.control.flight import ControlledFlight
 from volery.control.manoeuvres import Manoeuvre
 from volery.control.safety_switch import SwitchSettings
 from volery.kernel.waiting import sleep
 from volery.run.assembly.vehicles import VehicleSettings, open_vehicles
 from volery.run.connect import SCRIPT
+from volery.run.go import ACTUATIONS
 from volery.trace.events import ControlSample, Text
 from volery.vehicles import Drone
 
@@ -120,7 +120,7 @@ def fly_watched(
     flight = ControlledFlight(
         drone,
         make(),
-        RcOverride(drone) if by == "rc" else VelocitySetpoints(drone),
+        ACTUATIONS[by](drone),
         switch=switch,
         height=height,
     )

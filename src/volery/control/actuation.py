@@ -1,9 +1,9 @@
-"""How a command of a control law reaches an autopilot: by velocity set-points or by overridden RC channels.
+"""How a command of a control law reaches an autopilot: by set-points or by overridden RC channels.
 
 A law commands a velocity over ground and a turn rate. ``VelocitySetpoints`` passes both on where the
-autopilot follows a computer. ``RcOverride`` flies as the thesis did, by the sticks: it computes tilt angles
-from velocities, and pulse widths from tilt, climb rate and turn rate. ``RcAxis`` holds trim, dead band and
-scale of one channel; a law that is to overcome the dead band of the autopilot needs its true width.
+autopilot follows a computer, ``AttitudeSetpoints`` as tilt angles, thrust and turn rate. ``RcOverride`` flies
+as the thesis did, by the sticks: pulse widths from tilt, climb rate and turn rate. ``RcAxis`` holds trim,
+dead band and scale of one channel; a law that is to overcome the dead band needs its true width.
 """
 
 from __future__ import annotations
@@ -140,8 +140,37 @@ RC_SCALES: Mapping[str, RcScale] = {
 }
 """Scales by autopilot, from the defaults of its parameters."""
 
-VELOCITY_GAINS = PidGains(kp=1.2, ki=0.4, low=-3.0, high=3.0)
+VELOCITY_GAINS = PidGains(kp=2.0, ki=0.4, low=-3.0, high=3.0)
 """From an error of velocity in m/s to an acceleration in m/s^2."""
+
+
+class _TiltLoop:
+    """The loop from velocities to tilt angles; without gains the drone stays level."""
+
+    def __init__(self, gains: PidGains | None) -> None:
+        self._gains = gains
+        self._laws: tuple[PidLaw, PidLaw] | None = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew after a takeover."""
+        self._laws = (PidLaw(self._gains), PidLaw(self._gains)) if self._gains is not None else None
+
+    def tilt(self, command: Command, measured: Measured, sample_s: float, most: float) -> tuple[float, float]:
+        """Return tilt forward and to the right in degrees, each at most *most*."""
+        if self._laws is None or isnan(measured.velocity_north) or isnan(measured.heading):
+            return 0.0, 0.0
+        wanted = (command.north, command.east)
+        have = (measured.velocity_north, measured.velocity_east)
+        north, east = (
+            float(law(aim, seen, sample_s).output)
+            for law, aim, seen in zip(self._laws, wanted, have, strict=True)
+        )
+        c, s = cos(radians(measured.heading)), sin(radians(measured.heading))
+        ahead, right = north * c + east * s, east * c - north * s
+        angles = (degrees(atan(acceleration / GRAVITY)) for acceleration in (ahead, right))
+        forward, sideways = (min(most, max(-most, angle)) for angle in angles)
+        return forward, sideways
 
 
 class RcOverride:
@@ -161,11 +190,7 @@ class RcOverride:
     ) -> None:
         self._drone = drone
         self._scale = scale
-        self._gains = gains
-        self._laws = self._new_laws()
-
-    def _new_laws(self) -> tuple[PidLaw, PidLaw] | None:
-        return (PidLaw(self._gains), PidLaw(self._gains)) if self._gains is not None else None
+        self._loop = _TiltLoop(gains)
 
     @property
     def scale(self) -> RcScale:
@@ -186,34 +211,64 @@ class RcOverride:
 
     def engage(self) -> None:
         """Enter altitude hold with centred sticks."""
-        self._laws = self._new_laws()
+        self._loop.reset()
         self._drone.manual_control(0.0, 0.0, 0.5, 0.0)
         self._drone.altitude_hold()
 
     def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
         """Send the stick positions of a command."""
-        forward, right = self._tilt(command, measured, sample_s)
         scale = self.scale
+        forward, right = self._loop.tilt(command, measured, sample_s, scale.most_tilt)
         throttle = (scale.climb.position(command.up) + 1.0) / 2.0
         pitch, roll = scale.tilt.position(forward), scale.tilt.position(right)
         self._drone.manual_control(pitch, roll, throttle, scale.turn.position(command.yaw_rate))
 
-    def _tilt(self, command: Command, measured: Measured, sample_s: float) -> tuple[float, float]:
-        """Return tilt forward and to the right in degrees."""
-        if self._laws is None or isnan(measured.velocity_north) or isnan(measured.heading):
-            return 0.0, 0.0
-        wanted = (command.north, command.east)
-        have = (measured.velocity_north, measured.velocity_east)
-        north, east = (
-            float(law(aim, seen, sample_s).output)
-            for law, aim, seen in zip(self._laws, wanted, have, strict=True)
+
+CLIMB_RATES: Mapping[str, tuple[float, float]] = {"ArduPilot": (2.5, 1.5)}
+"""Climb and descent in m/s at a thrust of 1 and of 0, where an autopilot takes thrust as a climb rate
+(WPNAV_SPEED_UP, WPNAV_SPEED_DN); the others take it as collective thrust.
+"""
+THRUST_GAINS = PidGains(kp=0.12, ki=0.08, low=-0.3, high=0.3)
+"""From an error of climb rate in m/s to a share of thrust about hover."""
+MOST_TILT = 20.0
+
+
+class AttitudeSetpoints:
+    """Attitude set-points: tilt angles of the velocity loop, thrust and turn rate.
+
+    Args:
+        drone: the drone.
+        lasting: time after which the drone stops if no command follows, s.
+        gains: gains of the velocity loop.
+    """
+
+    def __init__(self, drone: Drone, lasting: float = 1.0, gains: PidGains = VELOCITY_GAINS) -> None:
+        self._drone, self._lasting = drone, lasting
+        self._loop = _TiltLoop(gains)
+        self._thrust = PidLaw(THRUST_GAINS)
+
+    def take_off(self, height: float) -> None:
+        """Take off by the autopilot's own take-off."""
+        self._drone.takeoff(height)
+
+    def engage(self) -> None:
+        """Stop where it is."""
+        self._loop.reset()
+        self._thrust.reset()
+        self._drone.hold()
+
+    def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
+        """Send an attitude, a thrust and a turn rate."""
+        forward, right = self._loop.tilt(command, measured, sample_s, MOST_TILT)
+        rates = CLIMB_RATES.get(self._drone.telemetry.autopilot)
+        if rates is not None:
+            share = command.up / rates[0 if command.up > 0.0 else 1]
+            thrust = 0.5 + 0.5 * min(1.0, max(-1.0, share))
+        else:
+            thrust = 0.5 + float(self._thrust(command.up, measured.velocity_up, sample_s).output)
+        self._drone.set_attitude(
+            right, -forward, thrust=thrust, yaw_rate=command.yaw_rate, lasting=self._lasting
         )
-        c, s = cos(radians(measured.heading)), sin(radians(measured.heading))
-        most = self.scale.most_tilt
-        ahead, right = north * c + east * s, east * c - north * s
-        angles = (degrees(atan(acceleration / GRAVITY)) for acceleration in (ahead, right))
-        forward, sideways = (min(most, max(-most, angle)) for angle in angles)
-        return forward, sideways
 
 
 def thesis_scale(trim: float = 1480.0) -> RcScale:

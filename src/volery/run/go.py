@@ -14,7 +14,7 @@ from typing import Any
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns, from_seconds
-from volery.control.actuation import Actuation, RcOverride, VelocitySetpoints
+from volery.control.actuation import Actuation, AttitudeSetpoints, RcOverride, VelocitySetpoints
 from volery.control.flight import PERIOD, ControlledFlight
 from volery.control.laws import PidGains, PidLaw
 from volery.control.manoeuvres import Manoeuvre, set_gains
@@ -26,8 +26,12 @@ from volery.vehicles import Drone
 from volery.vehicles.address import MAVLINK_OPTIONS, parse
 from volery.vehicles.driver import drivers
 
-SETPOINTS, RC = "setpoints", "rc"
-WAYS = (SETPOINTS, RC)
+ACTUATIONS: Mapping[str, Callable[[Drone], Actuation]] = {
+    "setpoints": VelocitySetpoints,
+    "attitude": AttitudeSetpoints,
+    "rc": RcOverride,
+}
+WAYS = tuple(ACTUATIONS)
 RATES = {"rate": "20", "attitude": "50", "rc": "20"}
 """Telemetry that a control loop needs, Hz, unless the address states other rates."""
 READ_AGAIN_S = 1.0
@@ -46,7 +50,7 @@ class GoSettings:
         period: sample time, ns.
     """
 
-    by: str = SETPOINTS
+    by: str = "setpoints"
     switch: SwitchSettings | None = None
     height: float = 5.0
     gains: Path | None = None
@@ -105,7 +109,7 @@ def go(
     gains = _GainsFile(settings.gains, manoeuvre) if settings.gains is not None else None
 
     def mission(drone: Drone) -> None:
-        actuation: Actuation = RcOverride(drone) if settings.by == RC else VelocitySetpoints(drone)
+        actuation = ACTUATIONS[settings.by](drone)
         flight = ControlledFlight(
             drone,
             manoeuvre,

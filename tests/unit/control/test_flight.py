@@ -15,6 +15,7 @@ from volery.control.safety_switch import Reaction, SwitchSettings
 
 SWITCH = SwitchSettings()
 BOTH = pytest.mark.parametrize("by", ["setpoints", "rc"])
+ALL = pytest.mark.parametrize("by", ["setpoints", "attitude", "rc"])
 REPORT_S, SAMPLE_S, DELAY_S = 0.05, 0.05, 0.01
 SETTLED_S = REPORT_S + SAMPLE_S + DELAY_S
 """Time after which a moved switch has its effect: one report of RC channels, one sample of the loop."""
@@ -28,7 +29,7 @@ def landed_gently(flown: Watched) -> bool:
     return not flown.end.armed and flown.end.height < 0.3 and flown.touch_down < 1.0
 
 
-@BOTH
+@ALL
 def test_a_turn_is_flown_and_the_drone_lands(by: str) -> None:
     flown = fly_watched(rotation, [(0.0, 1500)], by=by, switch=SWITCH)
     assert flown.error is None
@@ -87,7 +88,7 @@ def test_never_two_masters_over_random_switch_sequences(by: str, seed: int) -> N
         assert not (manual_for > SETTLED_S + 0.1 and now.armed and now.mode == "GUIDED"), now
 
 
-@BOTH
+@ALL
 def test_control_that_was_given_back_continues_the_flight(by: str) -> None:
     moves = [(0.0, 1500), (13.0, 1000), (14.0, 1500)]
     flown = fly_watched(lambda: Rotation([0.0, 90.0], 8.0), moves, by=by, switch=SWITCH)
@@ -127,7 +128,7 @@ def test_lost_telemetry_that_returns_ends_in_a_landing() -> None:
     assert landed_gently(flown)
 
 
-@BOTH
+@ALL
 def test_the_corners_of_a_cube(by: str) -> None:
     points = cube(3.0, 4.0)
     made: list[Waypoints] = []

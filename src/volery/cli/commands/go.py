@@ -23,7 +23,10 @@ commands = Commands("Fly", group="go", summary="Fly under a control law on this 
 On = Annotated[str, typer.Option(metavar="URL", help="Address of the vehicle, such as sim:ardupilot.")]
 By = Annotated[
     str,
-    typer.Option(metavar="setpoints|rc", help="Apply commands as velocity set-points or by RC override."),
+    typer.Option(
+        metavar="setpoints|attitude|rc",
+        help="Apply commands as velocity or attitude set-points, or by RC override.",
+    ),
 ]
 Switch = Annotated[
     str,

@@ -38,9 +38,8 @@ def teleop(
     """Fly by keyboard or joystick: take off, hold a key or the dead-man button, let go to hover."""
     from volery.cli.run_display import run_folder, show_outcome
     from volery.control import teleoperation
-    from volery.control.actuation import RcOverride, VelocitySetpoints
     from volery.run.fly import fly
-    from volery.run.go import GoSettings, with_rates
+    from volery.run.go import ACTUATIONS, GoSettings, with_rates
     from volery.run.result import Options
     from volery.vehicles.address import parse
 
@@ -62,7 +61,7 @@ def teleop(
 
         def mission(drone: Drone) -> None:
             nonlocal ended
-            actuation = RcOverride(drone) if settings.by == "rc" else VelocitySetpoints(drone)
+            actuation = ACTUATIONS[settings.by](drone)
             ended = teleoperation.teleoperate(drone, source, actuation, limits, settings.height)
 
         options = Options(fidelity="hardware", pace=pace, out=folder, tell=output.note)
