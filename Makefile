@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 ROS2 := $(VENV)/ros2-jazzy.stamp $(VENV)/ros2-kilted.stamp
 PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 
-.PHONY: demo test check bench docs clean
+.PHONY: demo test check bench docs wheel clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/volery.stamp ## parcels across a city, two allocations side by side, a report
@@ -34,6 +34,9 @@ docs: $(VENV)/docs.stamp ## regenerate the generated pages, build the site into 
 	$(BIN)/python scripts/generate_docs.py
 	$(BIN)/mkdocs build --strict --quiet
 	@echo "docs: site/index.html"
+
+wheel: $(VENV)/volery.stamp ## a wheel with the machine code of this architecture, in dist/
+	VOLERY_COMPILE=1 $(PIP) wheel --no-deps -w dist .
 
 clean: ## remove what was built, not what was recorded
 	rm -rf $(VENV) build dist site .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

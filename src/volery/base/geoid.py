@@ -14,7 +14,7 @@ from __future__ import annotations
 import lzma
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from math import floor, isfinite
 
@@ -44,11 +44,15 @@ def unpack(data: bytes) -> npt.NDArray[np.int16]:
     return np.cumsum(np.cumsum(steps, axis=0, dtype=np.int16), axis=1, dtype=np.int16)
 
 
+_Posts = tuple[tuple[int, ...], ...]
+
+
 class Egm96Grid:
     """Heights of the geoid, interpolated between the points of the grid."""
 
     def __init__(self, decimetres: npt.NDArray[np.int16]) -> None:
         self._decimetres = decimetres
+        self._cells: dict[tuple[int, int], _Posts] = {}
 
     def height(self, latitude: float, longitude: float) -> float:
         """Return metres above the ellipsoid by Catmull-Rom cubics; 0 for coordinates off the globe."""
@@ -56,13 +60,21 @@ class Egm96Grid:
             return 0.0
         up, along = (latitude + 90.0) * PER_DEGREE, (longitude + 180.0) * PER_DEGREE
         row, column = min(floor(up), ROWS - 2), floor(along)
-        across = _weights(along - column)
-        columns = [(column + step) % COLUMNS for step in (-1, 0, 1, 2)]
+        posts = self._cells.get((row, column)) or self._cell(row, column)
+        a, b, c, d = _weights(along - column)
         height = 0.0
-        for step, weight in zip((-1, 0, 1, 2), _weights(up - row), strict=True):
-            line = self._decimetres[min(max(row + step, 0), ROWS - 1)]
-            height += weight * sum(w * int(line[at]) for w, at in zip(across, columns, strict=True))
+        for weight, (p, q, r, s) in zip(_weights(up - row), posts, strict=True):
+            height += weight * (a * p + b * q + c * r + d * s)
         return height * DECIMETRE
+
+    def _cell(self, row: int, column: int) -> _Posts:
+        """Return the four by four points around a cell of the grid."""
+        rows = [min(max(row + step, 0), ROWS - 1) for step in (-1, 0, 1, 2)]
+        columns = [(column + step) % COLUMNS for step in (-1, 0, 1, 2)]
+        found = self._cells[row, column] = tuple(
+            tuple(int(self._decimetres[one, other]) for other in columns) for one in rows
+        )
+        return found
 
 
 def _weights(f: float) -> tuple[float, float, float, float]:
@@ -79,6 +91,11 @@ def _weights(f: float) -> tuple[float, float, float, float]:
 def read_grid() -> Egm96Grid:
     """Return the grid of the package; it is read once a process."""
     return Egm96Grid(unpack(files("volery.base").joinpath(GRID_FILE).read_bytes()))
+
+
+@lru_cache(maxsize=64)
+def _height(latitude: float, longitude: float) -> float:
+    return read_grid().height(latitude, longitude)
 
 
 LOWEST_SEPARATION, HIGHEST_SEPARATION = -107.0, 86.0
@@ -134,7 +151,7 @@ class Egm96(Geoid):
 
     def separation(self, latitude: float, longitude: float) -> float:
         """See ``Geoid``."""
-        return read_grid().height(latitude, longitude)
+        return _height(latitude, longitude)
 
     def __repr__(self) -> str:
         return "Egm96()"

@@ -10,6 +10,7 @@ of their own package; a test or a script calls ``add``.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from typing import Generic, TypeVar
@@ -30,8 +31,9 @@ class Registry(Generic[T]):
         """Register *thing* for this process."""
         self._added[name] = thing
 
+    @cached_property
     def _installed(self) -> dict[str, dict[str, EntryPoint]]:
-        """Return {name: {value: entry point}}, with several values if packages disagree."""
+        """{name: {value: entry point}}, with several values if packages disagree; read once a process."""
         found: dict[str, dict[str, EntryPoint]] = {}
         for point in entry_points(group=self.group):
             found.setdefault(point.name, {})[point.value] = point
@@ -39,7 +41,7 @@ class Registry(Generic[T]):
 
     def names(self) -> list[str]:
         """Return all names, sorted, without importing anything."""
-        return sorted(self._added.keys() | self._installed().keys())
+        return sorted(self._added.keys() | self._installed.keys())
 
     def load(self, name: str) -> T:
         """Import and return the plug-in *name*.
@@ -50,7 +52,7 @@ class Registry(Generic[T]):
         """
         if name in self._added:
             return self._added[name]
-        installed = self._installed()
+        installed = self._installed
         if name not in installed:
             hint = did_you_mean(name, self.names())
             raise UsageError(f"no {self.noun} named {name!r}{hint}; there is {choices(self.names())}")

@@ -17,10 +17,13 @@ the training of a real one by other code is not modelled.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from volery.base.numeric_code import NumericCode, numeric
 
 BITS = 12
 TABLE_SIZE = 1 << BITS
@@ -38,7 +41,6 @@ def history_lengths(tables: int, longest: int) -> Array:
     return np.round(FIRST_HISTORY * (2 * longest / FIRST_HISTORY) ** steps).astype(np.int64)
 
 
-@njit(cache=True)
 def new_predictor(tables: int) -> tuple[Array, Array, Array, Array, Array]:
     """Return an empty predictor: base counters, tagged entries, history, folded histories, position."""
     base = np.zeros(TABLE_SIZE, dtype=np.int64)
@@ -53,7 +55,7 @@ def new_predictor(tables: int) -> tuple[Array, Array, Array, Array, Array]:
     )
 
 
-@njit(cache=True)
+@numeric
 def _fold(folded: int, new: int, old: int, length: int, bits: int) -> int:
     folded = (folded << 1) | new
     folded ^= old << (length % bits)
@@ -61,7 +63,7 @@ def _fold(folded: int, new: int, old: int, length: int, bits: int) -> int:
     return folded & ((1 << bits) - 1)
 
 
-@njit(cache=True)
+@numeric
 def record_taken(
     state: tuple[Array, Array, Array, Array, Array], lengths: Array, place: int, target: int
 ) -> None:
@@ -78,7 +80,7 @@ def record_taken(
         position[0] = at + 1
 
 
-@njit(cache=True)
+@numeric
 def predict_branch(
     state: tuple[Array, Array, Array, Array, Array], lengths: Array, place: int, taken: bool
 ) -> bool:
@@ -162,7 +164,7 @@ LINES_AHEAD = 4.0
 """Distance of the prefetcher, lines."""
 
 
-@njit(cache=True)
+@numeric
 def _issue(used: Array, capacity: Array, operation: Array, ready: float, times: float) -> float:
     """Return the cycle in which an operation starts: its class and its group of pipes have capacity then."""
     own = _first_free(used, capacity, int(operation[KIND_OF]), ready, times)
@@ -171,7 +173,7 @@ def _issue(used: Array, capacity: Array, operation: Array, ready: float, times: 
     return _first_free(used, capacity, int(operation[GROUP]), own, times)
 
 
-@njit(cache=True)
+@numeric
 def _first_free(used: Array, capacity: Array, pipes: int, ready: float, need: float) -> float:
     """Reserve ``need`` of the pipes' capacity from ``ready`` on; return the first cycle with some."""
     cycle = int(np.ceil(ready))
@@ -193,7 +195,7 @@ def _first_free(used: Array, capacity: Array, pipes: int, ready: float, need: fl
     return float(max(started, int(np.ceil(ready))))
 
 
-@njit(cache=True)
+@numeric
 def _record_store(
     keys: Array, times: Array, key: np.int64, one: Array, number: int, done: float, leaves: float
 ) -> None:
@@ -207,7 +209,7 @@ def _record_store(
         times[at, 1] = leaves
 
 
-@njit(cache=True)
+@numeric
 def _forward(keys: Array, times: Array, key: np.int64, one: Array, start: float, forward: float) -> float:
     """Return when a load has the data of pending stores; parts of several stores must retire first."""
     ready, source, whole = 0.0, -1, True
@@ -227,7 +229,7 @@ def _forward(keys: Array, times: Array, key: np.int64, one: Array, start: float,
     return ready
 
 
-@njit(cache=True)
+@numeric
 def _load(used: Array, capacity: Array, operation: Array, at: float, times: int) -> float:
     """Return when the last of ``times`` loads has its value from the first cache."""
     started = at
@@ -236,7 +238,7 @@ def _load(used: Array, capacity: Array, operation: Array, at: float, times: int)
     return float(started + operation[LATENCY])
 
 
-@njit(cache=True)
+@numeric
 def _available(registers: Array, ready: Array, start: float) -> float:
     """Return when the last of these registers has its value."""
     at = start
@@ -246,7 +248,7 @@ def _available(registers: Array, ready: Array, start: float) -> float:
     return at
 
 
-@njit(cache=True)
+@numeric
 def _address(one: Array, version: Array) -> np.int64:
     """Return the identity of an address: its text and the versions of the registers in it."""
     key = np.int64(one[PLACE]) * 1000003
@@ -256,7 +258,7 @@ def _address(one: Array, version: Array) -> np.int64:
     return key
 
 
-@njit(cache=True)
+@numeric
 def _write_registers(registers: Array, ready: Array, version: Array, done: float, changes: int) -> int:
     """Give registers a new value at ``done``; return the number of changes so far."""
     for register in registers:
@@ -267,7 +269,7 @@ def _write_registers(registers: Array, ready: Array, version: Array, done: float
     return changes
 
 
-@njit(cache=True)
+@numeric
 def _fetch_lines(
     misses: Array, first: int, last: int, levels: Array, line: float, at: float, free: float
 ) -> tuple[float, float]:
@@ -284,7 +286,7 @@ def _fetch_lines(
     return arrives, free
 
 
-@njit(cache=True)
+@numeric
 def _send_lines(
     misses: Array, first: int, last: int, levels: Array, line: float, at: float, free: float
 ) -> float:
@@ -295,7 +297,7 @@ def _send_lines(
     return free
 
 
-@njit(cache=True)
+@numeric
 def _end_of_misses(misses: Array, first: int, step: int, row: int) -> int:
     """Return the end of the misses that belong to an instruction."""
     last = first
@@ -304,7 +306,7 @@ def _end_of_misses(misses: Array, first: int, step: int, row: int) -> int:
     return last
 
 
-@njit(cache=True)
+@numeric
 def _predict(
     predictor: Any, histories: Array, targets: Array, kind: int, row: int, taken: bool, target: int
 ) -> bool:
@@ -321,7 +323,82 @@ def _predict(
     return right
 
 
-@njit(cache=True)
+_ARGUMENTS = (
+    "int64[::1]", "int8[::1]", "int64[::1]", "int64[:,::1]", "float64[:,::1]", "float64[::1]", "float64[::1]",
+    "float64[::1]", "float64[::1]", "int64[::1]", "int64[:,::1]", "float64[::1]", "float64",
+    "float64[::1]", "float64[::1]",
+    "float64[::1]", "int64[::1]", "float64[:,:,::1]", "float64[::1]", "int64[:,::1]", "float64[:,::1]",
+    "int64[::1]", "int64[::1]", "int64[:,:,::1]", "int64[::1]", "int64[:,::1]", "int64[::1]",
+)  # fmt: skip
+"""Types of the arguments of ``execute_blocks``: those of ``run``, its results, and its working memory."""
+
+
+def _compose(digest: str) -> Callable[..., int]:
+    def execute_blocks(
+        blocks: Array, taken: Array, first: Array, table: Array, operations: Array, capacity: Array,
+        core: Array, slots: Array, library: Array, histories: Array, misses: Array, levels: Array,
+        line: float, cost: Array, stalled: Array,
+        ready: Array, version: Array, used: Array, leaves: Array, stored_key: Array, stored: Array,
+        targets: Array, base: Array, tagged: Array, record: Array, folds: Array, position: Array,
+    ) -> int:  # fmt: skip
+        predictor = (base, tagged, record, folds, position)
+        count = len(blocks)
+        window = len(leaves)
+        enters, resumes, retired, clock, number, changes = 0.0, 0.0, 0.0, 0.0, 0, 0
+        next_miss, free = 0, 0.0
+        for step in range(count):
+            block = blocks[step]
+            stalled[step] = max(0.0, resumes - clock)
+            enters = max(enters, resumes)
+            for row in range(first[block], first[block + 1]):
+                one = table[row]
+                enters = max(enters + slots[row] / core[WIDTH], leaves[number % window])
+                if one[KIND] == LIBRARY:
+                    done = max(enters, ready[0], ready[1]) + 2.0 * library[row]
+                    enters += library[row]
+                    ready[0] = ready[1] = done
+                else:
+                    at = _available(one[FIRST_ADDRESS:FIRST_WRITE], ready, enters)
+                    done = _available(one[FIRST_READ:FIRST_ADDRESS], ready, enters)
+                    place = _address(one, version) if one[PLACE] != 0 else np.int64(0)
+                    last_miss = _end_of_misses(misses, next_miss, step, row)
+                    if one[LOAD] >= 0:
+                        loaded = _load(used, capacity, operations[one[LOAD]], at, one[LOADS])
+                        arrives, free = _fetch_lines(misses, next_miss, last_miss, levels, line, at, free)
+                        done = max(done, loaded, arrives)
+                        if one[PLACE] != 0:
+                            done = max(done, _forward(stored_key, stored, place, one, at, core[FORWARD]))
+                    else:
+                        free = _send_lines(misses, next_miss, last_miss, levels, line, at, free)
+                    next_miss = last_miss
+                    if one[OPERATION] >= 0:
+                        operation = operations[one[OPERATION]]
+                        done = _issue(used, capacity, operation, done, float(one[TIMES])) + operation[LATENCY]
+                    if one[STORE] >= 0:
+                        done = max(done, _issue(used, capacity, operations[one[STORE]], at, 1.0))
+                        if one[PLACE] != 0:
+                            _record_store(stored_key, stored, place, one, number, done, max(done, retired))
+                    changes = _write_registers(one[FIRST_WRITE:FIRST_BUMP], ready, version, done, changes)
+                    changes = _write_registers(one[FIRST_BUMP:COLUMNS], ready, version, at + 1.0, changes)
+                retired = max(retired, done)
+                leaves[number % window] = retired
+                number += 1
+                if one[KIND] == PLAIN or one[KIND] == LIBRARY or step + 1 == count:
+                    continue
+                target = blocks[step + 1]
+                if not _predict(predictor, histories, targets, one[KIND], row, taken[step] == 1, target):
+                    resumes = done + core[REFILL]
+            finished = max(retired, enters)
+            cost[step] = finished - clock
+            clock = finished
+        return 1 if digest else 0
+
+    return execute_blocks
+
+
+execute_blocks = NumericCode("execute_blocks", _compose, (Path(__file__),), _ARGUMENTS)
+
+
 def run(
     blocks: Array, taken: Array, first: Array, table: Array, operations: Array, capacity: Array, core: Array,
     slots: Array, library: Array, histories: Array, misses: Array, levels: Array, line: float,
@@ -347,63 +424,31 @@ def run(
         Cycles from the end of the block before to the end of each block, and how many of them nothing entered
         because the branch before was mispredicted.
     """
-    count = len(blocks)
-    cost = np.zeros(count)
-    stalled = np.zeros(count)
-    ready = np.zeros(REGISTERS)
-    version = np.zeros(REGISTERS, dtype=np.int64)
-    used = np.full((len(capacity), SLOT_CYCLES, 2), -1.0)
-    window = int(core[WINDOW])
-    leaves = np.zeros(window)
-    stored_key = np.zeros((PLACES, 2), dtype=np.int64)
-    stored = np.zeros((PLACES, 2))
-    predictor = new_predictor(len(histories))
-    targets = np.full(PLACES, -1, dtype=np.int64)
-    enters, resumes, retired, clock, number, changes = 0.0, 0.0, 0.0, 0.0, 0, 0
-    next_miss, free = 0, 0.0
-    for step in range(count):
-        block = blocks[step]
-        stalled[step] = max(0.0, resumes - clock)
-        enters = max(enters, resumes)
-        for row in range(first[block], first[block + 1]):
-            one = table[row]
-            enters = max(enters + slots[row] / core[WIDTH], leaves[number % window])
-            if one[KIND] == LIBRARY:
-                done = max(enters, ready[0], ready[1]) + 2.0 * library[row]
-                enters += library[row]
-                ready[0] = ready[1] = done
-            else:
-                at = _available(one[FIRST_ADDRESS:FIRST_WRITE], ready, enters)
-                done = _available(one[FIRST_READ:FIRST_ADDRESS], ready, enters)
-                place = _address(one, version) if one[PLACE] != 0 else np.int64(0)
-                last_miss = _end_of_misses(misses, next_miss, step, row)
-                if one[LOAD] >= 0:
-                    loaded = _load(used, capacity, operations[one[LOAD]], at, one[LOADS])
-                    arrives, free = _fetch_lines(misses, next_miss, last_miss, levels, line, at, free)
-                    done = max(done, loaded, arrives)
-                    if one[PLACE] != 0:
-                        done = max(done, _forward(stored_key, stored, place, one, at, core[FORWARD]))
-                else:
-                    free = _send_lines(misses, next_miss, last_miss, levels, line, at, free)
-                next_miss = last_miss
-                if one[OPERATION] >= 0:
-                    operation = operations[one[OPERATION]]
-                    done = _issue(used, capacity, operation, done, float(one[TIMES])) + operation[LATENCY]
-                if one[STORE] >= 0:
-                    done = max(done, _issue(used, capacity, operations[one[STORE]], at, 1.0))
-                    if one[PLACE] != 0:
-                        _record_store(stored_key, stored, place, one, number, done, max(done, retired))
-                changes = _write_registers(one[FIRST_WRITE:FIRST_BUMP], ready, version, done, changes)
-                changes = _write_registers(one[FIRST_BUMP:COLUMNS], ready, version, at + 1.0, changes)
-            retired = max(retired, done)
-            leaves[number % window] = retired
-            number += 1
-            if one[KIND] == PLAIN or one[KIND] == LIBRARY or step + 1 == count:
-                continue
-            target = blocks[step + 1]
-            if not _predict(predictor, histories, targets, one[KIND], row, taken[step] == 1, target):
-                resumes = done + core[REFILL]
-        finished = max(retired, enters)
-        cost[step] = finished - clock
-        clock = finished
+    cost, stalled = np.zeros(len(blocks)), np.zeros(len(blocks))
+    stated = (
+        blocks,
+        taken,
+        first,
+        table,
+        operations,
+        capacity,
+        core,
+        slots,
+        library,
+        histories,
+        misses,
+        levels,
+    )
+    arrays = [
+        np.ascontiguousarray(value, dtype=declared.partition("[")[0])
+        for declared, value in zip(_ARGUMENTS, stated, strict=False)
+    ]
+    execute_blocks.bind(
+        *arrays, line, cost, stalled,
+        np.zeros(REGISTERS), np.zeros(REGISTERS, dtype=np.int64),
+        np.full((len(capacity), SLOT_CYCLES, 2), -1.0),
+        np.zeros(int(core[WINDOW])),
+        np.zeros((PLACES, 2), dtype=np.int64), np.zeros((PLACES, 2)), np.full(PLACES, -1, dtype=np.int64),
+        *new_predictor(len(histories)),
+    )()  # fmt: skip
     return cost, stalled

@@ -1,6 +1,6 @@
 """The simulated vehicles of a run: their bodies in one world, and a simulated autopilot for each.
 
-This module imports the simulation, and with it numba. Code that also runs on board of a real vehicle imports
+This module imports the simulation. Code that also runs on board of a real vehicle imports
 it inside functions, or for type checking only.
 """
 
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from itertools import cycle
 from math import cos, pi, radians, sin
 
 from volery.base.errors import UsageError
@@ -179,11 +180,15 @@ class SimulatedFleet:
 
 
 def _ids(names: Sequence[str], stated: Mapping[str, int]) -> dict[str, int]:
-    """Return distinct system ids. Raises ``UsageError`` if two stated ids are equal."""
+    """Return system ids, distinct as far as the 255 go; each vehicle has a link of its own.
+
+    Raises:
+        UsageError: Two stated ids are equal.
+    """
     taken = list(stated.values())
     if len(set(taken)) < len(taken):
         raise UsageError(f"system ids {sorted(taken)}: each vehicle needs its own")
-    free = (number for number in range(1, 256) if number not in taken)
+    free = cycle([number for number in range(1, 256) if number not in taken] or range(1, 256))
     return {name: stated[name] if name in stated else next(free) for name in names}
 
 

@@ -14,7 +14,8 @@ from __future__ import annotations
 from math import frexp, ldexp, sqrt
 
 import numpy as np
-from numba import njit
+
+from volery.base.numeric_code import numeric
 
 PI = 3.141592653589793
 HALF_PI = 1.5707963267948966
@@ -24,7 +25,7 @@ _LN2_HIGH = 0.6931471803691238
 _LN2_LOW = 1.9082149292705877e-10
 
 
-@njit(cache=True)
+@numeric
 def _sine_near_zero(x: float) -> float:
     """Evaluate Taylor's series to x**17 on [-pi/4, pi/4]; the remainder is below 2e-19."""
     s = x * x
@@ -38,7 +39,7 @@ def _sine_near_zero(x: float) -> float:
     return x + x * s * p
 
 
-@njit(cache=True)
+@numeric
 def _cosine_near_zero(x: float) -> float:
     """Evaluate Taylor's series to x**16 on [-pi/4, pi/4]; the remainder is below 3e-18."""
     s = x * x
@@ -51,7 +52,7 @@ def _cosine_near_zero(x: float) -> float:
     return 1.0 - 0.5 * s + s * s * p
 
 
-@njit(cache=True)
+@numeric
 def sine_cosine(x: float) -> tuple[float, float]:
     """Return (sin x, cos x) for |x| below a million radians."""
     turns = x * (1.0 / HALF_PI)
@@ -69,7 +70,7 @@ def sine_cosine(x: float) -> tuple[float, float]:
     return -c, s
 
 
-@njit(cache=True)
+@numeric
 def _arc_tangent(x: float) -> float:
     """Return the arc tangent for 0 <= x <= 1.
 
@@ -85,7 +86,7 @@ def _arc_tangent(x: float) -> float:
     return 4.0 * (t - t * s * (1.0 / 3.0 - s * p))
 
 
-@njit(cache=True)
+@numeric
 def arc_tangent2(y: float, x: float) -> float:
     """Return the angle of the point (x, y) in (-pi, pi] [rad]; zero at the origin."""
     across = abs(x)
@@ -98,7 +99,7 @@ def arc_tangent2(y: float, x: float) -> float:
     return -angle if y < 0.0 else angle
 
 
-@njit(cache=True)
+@numeric
 def exponential(x: float) -> float:
     """Return e**x for |x| < 700, by reduction to |r| <= ln2/2 and Taylor's series to r**13."""
     scaled = x * 1.4426950408889634
@@ -110,7 +111,7 @@ def exponential(x: float) -> float:
     return ldexp(p, k)
 
 
-@njit(cache=True)
+@numeric
 def logarithm(x: float) -> float:
     """Return the natural logarithm of x > 0.
 
@@ -128,7 +129,7 @@ def logarithm(x: float) -> float:
     return 2.0 * z * p + k * _LN2_LOW + k * _LN2_HIGH
 
 
-@njit(cache=True)
+@numeric
 def wrap_angle(angle: float) -> float:
     """Return the same angle in [-pi, pi), for angles within a few thousand turns [rad]."""
     turns = angle * (0.5 / PI)
@@ -136,7 +137,7 @@ def wrap_angle(angle: float) -> float:
     return angle - whole * (2.0 * PI)
 
 
-@njit(cache=True)
+@numeric
 def clip(value: float, low: float, high: float) -> float:
     """Return *value* limited to [low, high]."""
     return min(max(value, low), high)
@@ -155,20 +156,20 @@ _MEAN = 8 * 65535 / 2
 _DEVIATION = 53510.91981653096  # sqrt(8 (65536**2 - 1) / 12)
 
 
-@njit(cache=True)
+@numeric
 def _mix(word: np.uint64) -> np.uint64:
     word = (word ^ (word >> _S30)) * _MIX_1
     word = (word ^ (word >> _S27)) * _MIX_2
     return word ^ (word >> _S31)
 
 
-@njit(cache=True)
+@numeric
 def random_word(key: np.uint64, stream: int, k: int) -> np.uint64:
     """Return 64 uniform bits for uint64 *key*, integer *stream* and integer counter *k*."""
     return _mix(_mix(key + np.uint64(stream) * _STREAM) + np.uint64(k) * _STEP)
 
 
-@njit(cache=True)
+@numeric
 def gaussian(key: np.uint64, stream: int, k: int) -> float:
     """Return draw *k* of a stream, of zero mean and unit variance: the sum of eight 16-bit uniforms.
 

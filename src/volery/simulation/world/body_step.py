@@ -1,22 +1,15 @@
-"""One grid step of one body, and the compiled step of a world without autopilots.
-
-How compiled code is cached: numba stamps a cached function with its own source file only, so a function that
-calls one of another file would be kept although the other changed. Therefore functions that call across files
-are not cached, except the entry points that compile everything below them at once; those hold a digest of all
-sources as a constant, which numba makes part of the cache's key.
-"""
+"""One grid step of one body, and the compiled step of a world without autopilots."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterable
+from collections.abc import Callable
 from math import sqrt
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from volery.base.numeric_code import NumericCode, numeric
 from volery.simulation.world.dynamics import (
     S_SPEED,
     drive_power,
@@ -31,6 +24,7 @@ from volery.simulation.world.dynamics import (
 from volery.simulation.world.environment_models import GUST_EVERY, advance_gust, ground_height
 from volery.simulation.world.sensors import sample_sensors
 from volery.simulation.world.state_layout import (
+    ADVANCE_ARGUMENTS,
     INTEGRATED,
     MULTIROTOR,
     P_FEET,
@@ -66,18 +60,9 @@ from volery.simulation.world.state_layout import (
     W_SLOPE_SUM,
     W_STATE,
     W_THROTTLE,
-    Advance,
     Array,
     Bodies,
 )
-
-
-def digest_of(files: Iterable[Path]) -> str:
-    """Return a digest of the files' contents, independent of their order."""
-    digest = hashlib.sha256()
-    for file in sorted(files):
-        digest.update(file.read_bytes())
-    return digest.hexdigest()
 
 
 def world_sources() -> list[Path]:
@@ -90,7 +75,7 @@ _STILL_RATE = 0.05  # [rad/s]
 _LIGHT = 0.7  # fraction of the weight: with less thrust a landed body stays where it is
 
 
-@njit(cache=False)
+@numeric
 def _slope(row: Array, flying: bool, resting: bool) -> None:
     if flying:
         multirotor_slope(row, resting)
@@ -98,7 +83,7 @@ def _slope(row: Array, flying: bool, resting: bool) -> None:
         rover_slope(row, resting)
 
 
-@njit(cache=False)
+@numeric
 def _integrate(row: Array, flying: bool) -> None:
     """Advance the integrated columns by the classical fourth-order Runge-Kutta step (Kutta 1901)."""
     resting = row[S_RESTING] > 0.5
@@ -121,7 +106,7 @@ def _integrate(row: Array, flying: bool) -> None:
         row[i] += STEP_S / 6.0 * (row[W_SLOPE_SUM + i] + row[W_SLOPE + i])
 
 
-@njit(cache=False)
+@numeric
 def _normalise(row: Array) -> None:
     square = 0.0
     for i in range(4):
@@ -131,7 +116,7 @@ def _normalise(row: Array) -> None:
         row[S_ATTITUDE + i] /= norm
 
 
-@njit(cache=False)
+@numeric
 def _touches(row: Array) -> bool:
     lowest = (
         row[P_FEET] * abs(row[W_ROTATION + 6])
@@ -142,7 +127,7 @@ def _touches(row: Array) -> bool:
     return touching
 
 
-@njit(cache=False)
+@numeric
 def _settle_multirotor(row: Array) -> None:
     """Update contact and rest at the end of a multirotor's step."""
     touching = _touches(row)
@@ -165,7 +150,7 @@ def _settle_multirotor(row: Array) -> None:
             row[S_RATES + axis] = 0.0
 
 
-@njit(cache=False)
+@numeric
 def _settle_rover(row: Array, height_before: float) -> None:
     """Update height, velocity and rest at the end of a rover's step."""
     climb = (row[S_GROUND] - height_before) / STEP_S
@@ -178,7 +163,7 @@ def _settle_rover(row: Array, height_before: float) -> None:
     follow_ground(row, row[S_GROUND], climb)
 
 
-@njit(cache=False)
+@numeric
 def _measure_motion(row: Array) -> None:
     """Compute the step's mean specific force in body axes, and add to the distance travelled."""
     ae = (row[S_VELOCITY] - row[W_LAST_VELOCITY]) / STEP_S
@@ -194,7 +179,7 @@ def _measure_motion(row: Array) -> None:
     row[S_DISTANCE] += sqrt(square) * STEP_S
 
 
-@njit(cache=False)
+@numeric
 def _power(row: Array, flying: bool) -> None:
     power = electrical_power(row, 0) if flying else _rover_power(row)
     volts, amps = volts_amps(row, 0, power)
@@ -203,7 +188,7 @@ def _power(row: Array, flying: bool) -> None:
     row[S_PAYLOAD_ENERGY] += row[U_PAYLOAD] * STEP_S
 
 
-@njit(cache=False)
+@numeric
 def _rover_power(row: Array) -> float:
     """Return the power [W] that a rover draws from its battery."""
     drive = drive_power(row, row[S_SPEED], row[W_SLOPE + S_SPEED])
@@ -211,7 +196,7 @@ def _rover_power(row: Array) -> float:
     return power
 
 
-@njit(cache=False)
+@numeric
 def step_body(bodies: Bodies, body: int, row: Array) -> None:
     """Advance one body to its next grid step under the commands in ``W_THROTTLE``, and take its samples.
 
@@ -246,7 +231,7 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
     sample_sensors(row, key, k)
 
 
-@njit(cache=False)
+@numeric
 def start_body(bodies: Bodies, body: int, row: Array) -> None:
     """Take the samples of the first grid step, before any motion."""
     rotation_matrix(row, S_ATTITUDE, W_ROTATION)
@@ -257,11 +242,12 @@ def start_body(bodies: Bodies, body: int, row: Array) -> None:
     row[S_STARTED] = 1.0
 
 
-def _compose(sources: str) -> Advance:
-    @njit(cache=True)
-    def advance_bodies(bodies: Bodies, goals: NDArray[np.int64]) -> None:
-        if not sources:  # never true: naming the digest makes it part of the cache's key
-            return
+def _compose(digest: str) -> Callable[..., int]:
+    def advance_bodies(
+        rows: Array, keys: NDArray[np.uint64], reached: NDArray[np.int64], heights: Array, grid: Array,
+        goals: NDArray[np.int64],
+    ) -> int:  # fmt: skip
+        bodies = Bodies(rows, keys, reached, heights, grid)
         for body in range(goals.shape[0]):
             row = bodies.rows[body]
             if row[S_STARTED] == 0.0:
@@ -270,10 +256,10 @@ def _compose(sources: str) -> Advance:
                 for i in range(4):
                     row[W_THROTTLE + i] = row[U_THROTTLE + i]
                 step_body(bodies, body, row)
+        return 1 if digest else 0
 
-    compiled: Advance = advance_bodies
-    return compiled
+    return advance_bodies
 
 
-advance_bodies = _compose(digest_of(world_sources()))
+advance_bodies = NumericCode("advance_bodies", _compose, world_sources(), ADVANCE_ARGUMENTS)
 """Advance each body to its goal step with the motor commands in its inputs, without an autopilot."""

@@ -35,8 +35,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from numba import njit
-
+from volery.base.numeric_code import numeric
 from volery.simulation.world.arithmetic import sine_cosine
 from volery.simulation.world.state_layout import (
     INTEGRATED,
@@ -98,7 +97,7 @@ from volery.simulation.world.state_layout import (
 CELL_FULL_VOLTS = 4.2
 
 
-@njit(cache=False)
+@numeric
 def cell_voltage(left: float) -> float:
     """Return the open-circuit voltage of one cell [V] with the fraction *left* of its charge.
 
@@ -117,7 +116,7 @@ def cell_voltage(left: float) -> float:
     return max(0.0, 3.0 + left * 60.0)
 
 
-@njit(cache=False)
+@numeric
 def battery_current(open_volts: float, resistance: float, power: float) -> float:
     """Return the current [A] at which the terminals give a power.
 
@@ -137,7 +136,7 @@ def battery_current(open_volts: float, resistance: float, power: float) -> float
 _SLIP = 0.05  # [m/s] below which friction grows linearly with speed
 
 
-@njit(cache=False)
+@numeric
 def electrical_power(row: Array, at: int) -> float:
     """Return the power [W] that rotors, autopilot and payload draw, in the state from column *at*."""
     cubes = 0.0
@@ -149,7 +148,7 @@ def electrical_power(row: Array, at: int) -> float:
     return power
 
 
-@njit(cache=False)
+@numeric
 def volts_amps(row: Array, at: int, power: float) -> tuple[float, float]:
     """Return voltage [V] and current [A] at the terminals at a power [W], in the state from column *at*."""
     left = 1.0 - row[at + S_CHARGE] / row[P_CAPACITY]
@@ -158,7 +157,7 @@ def volts_amps(row: Array, at: int, power: float) -> tuple[float, float]:
     return open_volts - row[P_RESISTANCE] * amps, amps
 
 
-@njit(cache=False)
+@numeric
 def rotation_matrix(row: Array, at: int, to: int) -> None:
     """Write the matrix of the quaternion in column *at* to column *to*: body axes to world axes."""
     w, x, y, z = row[at], row[at + 1], row[at + 2], row[at + 3]
@@ -173,7 +172,7 @@ def rotation_matrix(row: Array, at: int, to: int) -> None:
     row[to + 8] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@njit(cache=False)
+@numeric
 def write_quaternion(row: Array, to: int, roll: float, pitch: float, yaw: float) -> None:
     """Write the quaternion of roll, pitch and yaw [rad] to column *to*."""
     sr, cr = sine_cosine(0.5 * roll)
@@ -185,7 +184,7 @@ def write_quaternion(row: Array, to: int, roll: float, pitch: float, yaw: float)
     row[to + 3] = cr * cp * sy - sr * sp * cy
 
 
-@njit(cache=False)
+@numeric
 def _to_world(row: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Rotate a vector from body axes to east, north, up."""
     return (
@@ -195,7 +194,7 @@ def _to_world(row: Array, x: float, y: float, z: float) -> tuple[float, float, f
     )
 
 
-@njit(cache=False)
+@numeric
 def _to_body(row: Array, east: float, north: float, up: float) -> tuple[float, float, float]:
     """Rotate a vector from east, north, up to body axes."""
     return (
@@ -205,7 +204,7 @@ def _to_body(row: Array, east: float, north: float, up: float) -> tuple[float, f
     )
 
 
-@njit(cache=False)
+@numeric
 def _add_foot_contact(row: Array, x: float, y: float, z: float) -> None:
     """Add the force and torque of the ground on a foot at x, y, z in body axes [m]."""
     _, _, height = _to_world(row, x, y, z)
@@ -228,7 +227,7 @@ def _add_foot_contact(row: Array, x: float, y: float, z: float) -> None:
     row[W_TORQUE + 2] += x * fy - y * fx
 
 
-@njit(cache=False)
+@numeric
 def _add_ground_contact(row: Array) -> None:
     """Add the force and torque of the ground on the four feet, or on four points above if upside down."""
     depth = -row[P_FEET + 2] if row[W_ROTATION + 8] >= 0.0 else row[P_FEET + 2]
@@ -238,7 +237,7 @@ def _add_ground_contact(row: Array) -> None:
         _add_foot_contact(row, x, y, depth)
 
 
-@njit(cache=False)
+@numeric
 def _rotor_and_battery_slope(row: Array) -> None:
     """Compute the slopes of rotor speeds, charge and energy: these change also at rest."""
     power = electrical_power(row, W_STATE)
@@ -252,7 +251,7 @@ def _rotor_and_battery_slope(row: Array) -> None:
     row[W_SLOPE + S_ENERGY] = volts * amps
 
 
-@njit(cache=False)
+@numeric
 def _add_rotor_and_air_loads(row: Array) -> None:
     """Compute force (east, north, up, without gravity) and torque (forward, left, up) of rotors and air."""
     lift = 0.0
@@ -276,7 +275,7 @@ def _add_rotor_and_air_loads(row: Array) -> None:
         row[W_TORQUE + axis] -= row[P_SPIN_DAMPING] * row[W_STATE + S_RATES + axis]
 
 
-@njit(cache=False)
+@numeric
 def _attitude_slope(row: Array) -> None:
     """Compute the slopes of attitude quaternion and body rates, by Euler's equations."""
     p, q, r = row[W_STATE + S_RATES], row[W_STATE + S_RATES + 1], row[W_STATE + S_RATES + 2]
@@ -292,7 +291,7 @@ def _attitude_slope(row: Array) -> None:
     row[W_SLOPE + S_RATES + 2] = (row[W_TORQUE + 2] + (ix - iy) * p * q) / iz
 
 
-@njit(cache=False)
+@numeric
 def multirotor_slope(row: Array, resting: bool) -> None:
     """Compute the slope of a multirotor's state.
 
@@ -317,7 +316,7 @@ def multirotor_slope(row: Array, resting: bool) -> None:
     _attitude_slope(row)
 
 
-@njit(cache=False)
+@numeric
 def total_thrust(row: Array) -> float:
     """Return the thrust of all rotors [N]."""
     squares = 0.0
@@ -336,7 +335,7 @@ S_SPEED = S_ROTORS + 1
 _STANDING = 0.001  # [m/s] below which rolling resistance has no sign
 
 
-@njit(cache=False)
+@numeric
 def drive_power(row: Array, speed: float, acceleration: float) -> float:
     """Return the power [W] that the wheels draw from the battery.
 
@@ -356,7 +355,7 @@ def drive_power(row: Array, speed: float, acceleration: float) -> float:
     return power
 
 
-@njit(cache=False)
+@numeric
 def turn_rate(row: Array, speed: float, steer: float) -> float:
     """Return the rate of change of the heading [rad/s, anticlockwise].
 
@@ -375,7 +374,7 @@ def turn_rate(row: Array, speed: float, steer: float) -> float:
     return held
 
 
-@njit(cache=False)
+@numeric
 def rover_slope(row: Array, resting: bool) -> None:
     """Compute the slope of a rover's state; the commands are steering (left positive) and throttle."""
     for i in range(INTEGRATED):
@@ -401,7 +400,7 @@ def rover_slope(row: Array, resting: bool) -> None:
     row[W_SLOPE + S_ENERGY] = volts * amps
 
 
-@njit(cache=False)
+@numeric
 def follow_ground(row: Array, ground: float, climb: float) -> None:
     """Write height, velocity and turn rate of a rover after a step: its wheels follow the ground."""
     speed = row[S_SPEED]

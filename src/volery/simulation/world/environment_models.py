@@ -21,10 +21,10 @@ from dataclasses import dataclass
 from math import radians, sqrt
 
 import numpy as np
-from numba import njit
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
+from volery.base.numeric_code import numeric
 from volery.simulation.world.arithmetic import exponential, gaussian, logarithm, sine_cosine
 from volery.simulation.world.state_layout import P_GUST_DECAY, P_GUST_GAIN, S_GUST, U_GUST, Array
 
@@ -36,14 +36,14 @@ _LAPSE = 0.0065  # [K/m]
 _EXPONENT = 5.255877  # g M / (R L)
 
 
-@njit(cache=True)
+@numeric
 def pressure_at(amsl: float) -> float:
     """Return the pressure [Pa] at a height above mean sea level [m]: p0 (1 - L h / T0)^(g M / R L)."""
     warmth = 1.0 - _LAPSE * amsl / _SEA_LEVEL_K
     return _SEA_LEVEL_PA * exponential(_EXPONENT * logarithm(warmth))
 
 
-@njit(cache=True)
+@numeric
 def altitude_at(pressure: float) -> float:
     """Return the height above mean sea level [m] at a pressure [Pa]: the inverse of ``pressure_at``."""
     return _SEA_LEVEL_K / _LAPSE * (1.0 - exponential(logarithm(pressure / _SEA_LEVEL_PA) / _EXPONENT))
@@ -163,7 +163,7 @@ class Terrain:
         )
 
 
-@njit(cache=True)
+@numeric
 def _relief(heights: Array, grid: Array, east: float, north: float) -> float:
     """Interpolate bilinearly between the four posts around a point."""
     rows, columns = heights.shape
@@ -181,7 +181,7 @@ def _relief(heights: Array, grid: Array, east: float, north: float) -> float:
     return height
 
 
-@njit(cache=True)
+@numeric
 def ground_height(heights: Array, grid: Array, east: float, north: float) -> float:
     """Return the height of the ground over the plane that touches the globe at the world's origin [m]."""
     drop = (east * east + north * north) * _HALF_CURVATURE
@@ -224,7 +224,7 @@ class Wind:
         return self.gust_length / max(speed, 2.0)
 
 
-@njit(cache=False)
+@numeric
 def advance_gust(row: Array, key: np.uint64, k: int) -> None:
     """Advance one body's gust by one gust period; to be called when k is a multiple of GUST_EVERY."""
     deviation = row[U_GUST]

@@ -19,11 +19,11 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.frames import Quaternion, Vector
 from volery.base.installed import Registry
+from volery.base.numeric_code import numeric
 from volery.base.seeds import key
 from volery.base.time import Ns
 from volery.simulation.world.arithmetic import exponential, gaussian
@@ -340,12 +340,12 @@ class MountedSensor:
         ideal = self._sensor.ideal(state)
         gain = error.bias_sigma * (sqrt(1.0 - self._decay * self._decay) if self._bias else 1.0)
         before = self._bias or [0.0] * len(ideal)
-        self._bias = [
-            self._decay * bias + gain * gaussian(self._key, 2 * axis, k) for axis, bias in enumerate(before)
-        ]
+        with np.errstate(over="ignore"):  # hashes wrap around
+            draws = [float(gaussian(self._key, stream, k)) for stream in range(2 * len(ideal))]
+        self._bias = [self._decay * bias + gain * draw for bias, draw in zip(before, draws[::2], strict=True)]
         noisy = tuple(
-            value + bias + error.white_sigma * gaussian(self._key, 2 * axis + 1, k)
-            for axis, (value, bias) in enumerate(zip(ideal, self._bias, strict=True))
+            value + bias + error.white_sigma * draw
+            for value, bias, draw in zip(ideal, self._bias, draws[1::2], strict=True)
         )
         self.last = Measurement(state.time, self._sensor.output(noisy))
         self.next_step = k + self._every
@@ -414,7 +414,7 @@ def fill_sensor_parameters(row: Array, suite: SensorSuite) -> None:
     row[P_PERFECT] = float(suite.perfect)
 
 
-@njit(cache=False)
+@numeric
 def _advance_biases(row: Array, key: np.uint64, k: int) -> None:
     """Advance every bias by one period."""
     stream = _BIAS_STREAM
@@ -433,7 +433,7 @@ def _advance_biases(row: Array, key: np.uint64, k: int) -> None:
             stream += 1
 
 
-@njit(cache=False)
+@numeric
 def _sample_inertial(row: Array, key: np.uint64, k: int) -> None:
     gyro = row[P_GYRO_ERROR + WHITE_SIGMA]
     accel = row[P_ACCEL_ERROR + WHITE_SIGMA]
@@ -446,7 +446,7 @@ def _sample_inertial(row: Array, key: np.uint64, k: int) -> None:
             row[M_ACCEL + axis] += accel * gaussian(key, _ACCEL_STREAM + axis, k)
 
 
-@njit(cache=False)
+@numeric
 def _sample_barometer(row: Array, key: np.uint64, k: int) -> None:
     if row[U_BARO_BLOCKED] != 0.0:
         return
@@ -455,7 +455,7 @@ def _sample_barometer(row: Array, key: np.uint64, k: int) -> None:
     row[M_BARO_COUNT] += 1.0
 
 
-@njit(cache=False)
+@numeric
 def _sample_magnetometer(row: Array, key: np.uint64, k: int) -> None:
     if row[U_MAG_BLOCKED] != 0.0:
         return
@@ -473,7 +473,7 @@ def _sample_magnetometer(row: Array, key: np.uint64, k: int) -> None:
     row[M_MAG_COUNT] += 1.0
 
 
-@njit(cache=False)
+@numeric
 def _sample_range_finder(row: Array, key: np.uint64, k: int) -> None:
     slant = (row[S_POSITION + 2] - row[S_GROUND]) / max(row[W_ROTATION + 8], 0.1)
     slant += row[P_RANGE_ERROR + WHITE_SIGMA] * gaussian(key, _RANGE_STREAM, k)
@@ -481,7 +481,7 @@ def _sample_range_finder(row: Array, key: np.uint64, k: int) -> None:
     row[M_RANGE] = max(slant, 0.0) if in_range else -1.0
 
 
-@njit(cache=False)
+@numeric
 def _sample_gps(row: Array, key: np.uint64, k: int) -> None:
     if row[U_GPS_BLOCKED] != 0.0:
         row[M_GPS_FIX] = 0.0
@@ -506,7 +506,7 @@ def _sample_gps(row: Array, key: np.uint64, k: int) -> None:
     row[M_GPS_COUNT] += 1.0
 
 
-@njit(cache=False)
+@numeric
 def sample_sensors(row: Array, key: np.uint64, k: int) -> None:
     """Take the samples that are due at step *k*; ``W_ROTATION`` holds the attitude of that step."""
     if k % BIAS_EVERY == 0:

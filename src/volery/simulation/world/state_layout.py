@@ -11,7 +11,6 @@ stack continues the layout with ``Layout(after=WORLD_LAYOUT)``. SI units.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -232,5 +231,7 @@ class Bodies(NamedTuple):
     grid: Array
 
 
-Advance = Callable[[Bodies, NDArray[np.int64]], None]
-"""The compiled step: advances every body to its goal step. Composed by import, not by passing functions."""
+ADVANCE_ARGUMENTS = (
+    "float64[:,::1]", "uint64[::1]", "int64[::1]", "float64[:,::1]", "float64[::1]", "int64[::1]",
+)  # fmt: skip
+"""Types of the arguments of a compiled step: the arrays of ``Bodies``, then the goal step of each body."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from volery.base.errors import UsageError, choices
 from volery.base.frames import LocalFrame, Quaternion, Vector
+from volery.base.numeric_code import NumericCode
 from volery.base.seeds import key
 from volery.base.time import MS, Ns
 from volery.simulation.world.body_specs import BodySpec, fill_parameters, fill_state
@@ -46,7 +47,6 @@ from volery.simulation.world.state_layout import (
     U_PAYLOAD,
     U_WIND,
     WORLD,
-    Advance,
     Array,
     Bodies,
 )
@@ -150,7 +150,7 @@ class World:
         now: Callable[[], Ns],
         bodies: Sequence[BodySpec],
         *,
-        advance: Advance = advance_bodies,
+        advance: NumericCode = advance_bodies,
         seed: int = 0,
         frame: LocalFrame,
         wind: Wind | None = None,
@@ -158,7 +158,6 @@ class World:
         columns: int = 0,
     ) -> None:
         self._now = now
-        self._advance = advance
         self.frame = frame
         self.specs = tuple(bodies)
         count = len(self.specs)
@@ -168,12 +167,13 @@ class World:
         self._pending: list[deque[_PendingInput]] = [deque() for _ in self.specs]
         self._last_read = [-_ACTIVE_STEPS] * count
         self._goals = np.zeros(count, dtype=np.int64)
+        self._advance = advance.bind(*self.arrays, self._goals)
         self._mounted = {
             body: {name: MountedSensor(added_sensor(name), seed, body) for name in spec.added_sensors}
             for body, spec in enumerate(self.specs)
             if spec.added_sensors
         }
-        self._advance(self.arrays, self._goals)
+        self._advance()
         self._sample_mounted()
         self.advances = 0
         """Number of calls of the compiled step."""
@@ -263,7 +263,7 @@ class World:
                     if sample < goal:
                         goal, stopped = sample, True
                 self._goals[body] = goal
-            self._advance(self.arrays, self._goals)
+            self._advance()
             self.advances += 1
             self._sample_mounted()
             if not stopped:

@@ -9,7 +9,6 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS
 from volery.simulation.world.body_specs import Multirotor, Rover
-from volery.simulation.world.body_step import digest_of
 from volery.simulation.world.environment_models import Terrain, Wind, magnetic_field
 from volery.simulation.world.sensors import declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
@@ -221,13 +220,3 @@ def test_payload_power_acts_from_the_next_grid_step_on(clock, frame):
     clock.wait(10)
     truth = world.truth(0)
     assert truth.payload_j == pytest.approx(12.0 * (10.0 - STEP / 1e9), rel=1e-9)
-
-
-def test_the_digest_of_sources_changes_with_any_source(tmp_path):
-    one, two = tmp_path / "a.py", tmp_path / "b.py"
-    one.write_text("x = 1")
-    two.write_text("y = 1")
-    before = digest_of([one, two])
-    assert digest_of([two, one]) == before
-    two.write_text("y = 2")
-    assert digest_of([one, two]) != before

@@ -14,8 +14,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from numba import njit
-
+from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_ACCEL,
     C_CONTROL,
@@ -90,7 +89,7 @@ _SPOOL_TIME = 0.5  # [s]
 _YAW_ROOM = 0.2  # of full thrust that yaw may always have
 
 
-@njit(cache=False)
+@numeric
 def detect_landing(row: Array, control: int) -> None:
     """Update the landed detector: one guidance period."""
     motion = 0.0
@@ -115,7 +114,7 @@ def detect_landing(row: Array, control: int) -> None:
         row[K_LANDED_TIME] = 0.0
 
 
-@njit(cache=False)
+@numeric
 def _rate_targets(row: Array) -> tuple[float, float, float]:
     """Return the rates that turn the attitude into the target, forward, right, down [rad/s]."""
     w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
@@ -137,7 +136,7 @@ def _rate_targets(row: Array) -> tuple[float, float, float]:
     )
 
 
-@njit(cache=False)
+@numeric
 def _torque(row: Array, axis: int, target: float) -> float:
     """Return the output of one rate's PID as a share of full thrust by which motors differ."""
     rate = row[K_RATES + axis]
@@ -154,7 +153,7 @@ def _torque(row: Array, axis: int, target: float) -> float:
     return torque
 
 
-@njit(cache=False)
+@numeric
 def motor_output(thrust: float) -> float:
     """Return the motor command 0..1 for a share of full thrust."""
     linear = 1.0 - _EXPO
@@ -162,7 +161,7 @@ def motor_output(thrust: float) -> float:
     return _SPIN_MIN + (_SPIN_MAX - _SPIN_MIN) * curve
 
 
-@njit(cache=False)
+@numeric
 def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
     """Write motor commands from three torques and the collective."""
     reach = 1e-9
@@ -185,7 +184,7 @@ def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
         row[K_MOTORS + i] = motor_output(thrust)
 
 
-@njit(cache=False)
+@numeric
 def run_attitude_loops(row: Array, control: int) -> None:
     """Run one grid step of the inner loops, from target attitude and collective to four motor commands."""
     if control in (OFF, IDLE):
@@ -216,7 +215,7 @@ _BRAKE_SHARE = 0.6  # of the acceleration limit: how a point is approached
 _CLOSE = 0.3  # [m] to a point, within which the rover stops
 
 
-@njit(cache=False)
+@numeric
 def _forward_speed(row: Array) -> float:
     """Return the estimated speed along the heading [m/s]."""
     s, c = sine_cosine(row[K_EULER + 2])
@@ -224,7 +223,7 @@ def _forward_speed(row: Array) -> float:
     return speed
 
 
-@njit(cache=False)
+@numeric
 def _steer_for(row: Array, rate: float, speed: float) -> float:
     """Return the steering -1..1, right positive, that turns at a rate.
 
@@ -240,7 +239,7 @@ def _steer_for(row: Array, rate: float, speed: float) -> float:
     return clip(angle / row[P_MAX_STEERING], -1.0, 1.0)
 
 
-@njit(cache=False)
+@numeric
 def _throttle_for(row: Array, target: float) -> float:
     """Return the throttle -1..1 for a speed [m/s]: feed-forward and PI."""
     miss = target - _forward_speed(row)
@@ -252,7 +251,7 @@ def _throttle_for(row: Array, target: float) -> float:
     return clip(target / row[P_MAX_SPEED] + _SPEED_GAIN * miss + row[K_SPEED_INTEGRAL], -1.0, 1.0)
 
 
-@njit(cache=False)
+@numeric
 def _to_point(row: Array) -> tuple[float, float]:
     """Return speed [m/s] and turn rate [rad/s] on the way to the commanded point."""
     north = row[C_POSITION] + row[K_ORIGIN] - row[K_POSITION]
@@ -268,7 +267,7 @@ def _to_point(row: Array) -> tuple[float, float]:
     return speed * clip(ahead, 0.2, 1.0), clip(_TURN_GAIN * error, -1.5, 1.5)
 
 
-@njit(cache=False)
+@numeric
 def _along(row: Array) -> tuple[float, float]:
     """Return the commanded speed [m/s] and turn rate [rad/s]."""
     kind = int(row[C_YAW_MODE])
@@ -280,7 +279,7 @@ def _along(row: Array) -> tuple[float, float]:
     return clip(row[C_VELOCITY], -row[C_SPEED], row[C_SPEED]), rate
 
 
-@njit(cache=False)
+@numeric
 def guide_rover(row: Array) -> None:
     """Run one guidance period."""
     control = int(row[C_CONTROL])

@@ -11,8 +11,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from numba import njit
-
+from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_AIDED,
     K_ACCEL,
@@ -83,7 +82,7 @@ _GRAVITY_GAIN = 0.3  # [1/s] while nothing better is known
 _STALE = 1.0  # [s] after which a fix no longer holds the tilt
 
 
-@njit(cache=False)
+@numeric
 def _euler(row: Array) -> None:
     """Compute roll, pitch and yaw of the estimated quaternion."""
     w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
@@ -93,7 +92,7 @@ def _euler(row: Array) -> None:
     row[K_EULER + 2] = arc_tangent2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
-@njit(cache=False)
+@numeric
 def _rotate_attitude(row: Array, x: float, y: float, z: float) -> None:
     """Rotate the attitude by a small angle about body axes [rad]."""
     w0, x0, y0, z0 = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
@@ -109,7 +108,7 @@ def _rotate_attitude(row: Array, x: float, y: float, z: float) -> None:
     row[K_ATTITUDE + 3] = z1 * scale
 
 
-@njit(cache=False)
+@numeric
 def _horizontal(row: Array, x: float, y: float, z: float) -> tuple[float, float]:
     """Return the north and east components of a vector in body axes."""
     return (
@@ -118,7 +117,7 @@ def _horizontal(row: Array, x: float, y: float, z: float) -> tuple[float, float]
     )
 
 
-@njit(cache=False)
+@numeric
 def _correct_attitude(row: Array, north: float, east: float, down: float, share: float) -> None:
     """Rotate the attitude by a small rotation, and move the gyro bias by -*share* of it.
 
@@ -138,7 +137,7 @@ def _correct_attitude(row: Array, north: float, east: float, down: float, share:
     _rotate_attitude(row, x, y, z)
 
 
-@njit(cache=False)
+@numeric
 def _predict(row: Array) -> None:
     """Advance the estimate by one grid step of dead reckoning."""
     for axis in range(3):
@@ -158,7 +157,7 @@ def _predict(row: Array) -> None:
             row[K_VELOCITY + axis] += accel * STEP_S
 
 
-@njit(cache=False)
+@numeric
 def _propagate_covariance(row: Array, axis: int) -> None:
     """Propagate one axis' covariance (pp pv pb vv vb bb) over a fusion period."""
     at = K_COVARIANCE + 6 * axis
@@ -173,7 +172,7 @@ def _propagate_covariance(row: Array, axis: int) -> None:
     row[at + 5] = bb + _BIAS_DENSITY * t
 
 
-@njit(cache=False)
+@numeric
 def _fuse_position(row: Array, axis: int, innovation: float, variance: float) -> float:
     """Update one axis by a position measurement and return the innovation in its standard deviations.
 
@@ -199,7 +198,7 @@ def _fuse_position(row: Array, axis: int, innovation: float, variance: float) ->
     return abs(innovation) / sqrt(total)
 
 
-@njit(cache=False)
+@numeric
 def _fuse_velocity(row: Array, axis: int, innovation: float, variance: float) -> None:
     """Update one axis by a velocity measurement [m/s] with its variance."""
     at = K_COVARIANCE + 6 * axis
@@ -217,7 +216,7 @@ def _fuse_velocity(row: Array, axis: int, innovation: float, variance: float) ->
     row[at + 4] = (1.0 - gain_v) * vb
 
 
-@njit(cache=False)
+@numeric
 def _variance(row: Array, error: int) -> float:
     """Return the declared variance of the sensor whose error parameters are in column *error*."""
     white = row[error + WHITE_SIGMA]
@@ -226,7 +225,7 @@ def _variance(row: Array, error: int) -> float:
     return declared
 
 
-@njit(cache=False)
+@numeric
 def _reset_covariance(row: Array, axis: int, position: float, velocity: float) -> None:
     """Reset one axis' covariance to a variance of position and of velocity."""
     at = K_COVARIANCE + 6 * axis
@@ -237,7 +236,7 @@ def _reset_covariance(row: Array, axis: int, position: float, velocity: float) -
     row[at + 5] = 0.04
 
 
-@njit(cache=False)
+@numeric
 def _switch_aiding(row: Array) -> None:
     """Begin or end the use of satellites as commanded by C_AIDED."""
     commanded = row[C_AIDED] > 0.5
@@ -261,7 +260,7 @@ def _switch_aiding(row: Array) -> None:
             row[K_ACCEL_BIAS + axis] = 0.0
 
 
-@njit(cache=False)
+@numeric
 def _fuse_gps(row: Array) -> None:
     """Fuse a new fix, and correct the tilt by part of the estimated acceleration bias."""
     level, speed = _variance(row, P_GPS_HORIZONTAL_ERROR), _variance(row, P_GPS_VELOCITY_ERROR)
@@ -283,7 +282,7 @@ def _fuse_gps(row: Array) -> None:
     row[K_GPS_AGE] = 0.0
 
 
-@njit(cache=False)
+@numeric
 def _fuse_gravity(row: Array, gravity: float) -> None:
     """Correct the tilt by the accelerometer: without satellites its mean direction is up."""
     fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
@@ -292,7 +291,7 @@ def _fuse_gravity(row: Array, gravity: float) -> None:
     _correct_attitude(row, -east * share, north * share, 0.0, 0.02)
 
 
-@njit(cache=False)
+@numeric
 def _fuse_heading(row: Array) -> None:
     """Correct the heading by the difference of the measured field's direction and the declination."""
     mx, my, mz = row[M_MAG], row[M_MAG + 1], row[M_MAG + 2]
@@ -303,7 +302,7 @@ def _fuse_heading(row: Array) -> None:
     _correct_attitude(row, 0.0, 0.0, -_HEADING_GAIN * _FUSE_S * error, _HEADING_INTEGRAL / _HEADING_GAIN)
 
 
-@njit(cache=False)
+@numeric
 def _fuse(row: Array) -> None:
     """Fuse the measurements that are new: 20 times a second."""
     _switch_aiding(row)
@@ -330,7 +329,7 @@ def _fuse(row: Array) -> None:
         row[K_SIGMA + 2 + index] = sqrt(max(row[at + 3], 0.0))
 
 
-@njit(cache=False)
+@numeric
 def _align(row: Array) -> None:
     """Initialise the attitude: tilt from the accelerometer, heading from the magnetometer."""
     fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
@@ -345,7 +344,7 @@ def _align(row: Array) -> None:
     row[K_ALIGNED] = 1.0
 
 
-@njit(cache=False)
+@numeric
 def _copy_truth(row: Array) -> None:
     """Set the estimate of a vehicle with perfect sensors: the true state in the autopilot's axes."""
     for axis in range(3):
@@ -372,7 +371,7 @@ def _copy_truth(row: Array) -> None:
     row[K_AIDED] = row[C_AIDED]
 
 
-@njit(cache=False)
+@numeric
 def initialise_estimate(row: Array) -> None:
     """Initialise the estimate from the first samples."""
     if row[P_PERFECT] > 0.5:
@@ -384,7 +383,7 @@ def initialise_estimate(row: Array) -> None:
     _euler(row)
 
 
-@njit(cache=False)
+@numeric
 def update_estimate(row: Array, k: int) -> None:
     """Compute the estimate of grid step *k*, just reached."""
     if row[P_PERFECT] > 0.5:

@@ -15,11 +15,11 @@ from math import isfinite
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
+from volery.base.numeric_code import NumericCode, numeric
 from volery.base.time import Ns
 from volery.simulation.autopilots.flight_stack.control_loops import (
     detect_landing,
@@ -46,10 +46,11 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
 )
 from volery.simulation.autopilots.flight_stack.guidance import GUIDE_EVERY, guide_multirotor
 from volery.simulation.world.body_specs import BodySpec, Multirotor
-from volery.simulation.world.body_step import digest_of, start_body, step_body, world_sources
+from volery.simulation.world.body_step import start_body, step_body, world_sources
 from volery.simulation.world.environment_models import Terrain, Wind
 from volery.simulation.world.sensors import Measurement, Sigma, declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
+    ADVANCE_ARGUMENTS,
     M_GYRO,
     MULTIROTOR,
     P_CELLS,
@@ -64,7 +65,6 @@ from volery.simulation.world.state_layout import (
     U_MAG_BLOCKED,
     U_MOTOR_HEALTH,
     W_THROTTLE,
-    Advance,
     Array,
     Bodies,
 )
@@ -76,7 +76,7 @@ _FAR = 1e6  # [m] beyond which a point is placed on an unrolled map
 _FIRST_HOVER = 0.35  # MOT_THST_HOVER's default
 
 
-@njit(cache=False)
+@numeric
 def _boot(row: Array) -> None:
     """Initialise the flight stack of one vehicle before its first step."""
     row[K_HOVER_THROTTLE] = _FIRST_HOVER
@@ -84,7 +84,7 @@ def _boot(row: Array) -> None:
     initialise_estimate(row)
 
 
-@njit(cache=False)
+@numeric
 def _control(row: Array, k: int) -> None:
     """Compute the motor commands of step *k* from the estimate at that step."""
     due = k % GUIDE_EVERY == 0
@@ -103,11 +103,12 @@ def _control(row: Array, k: int) -> None:
         row[W_THROTTLE + i] = row[K_MOTORS + i]
 
 
-def _compose(sources: str) -> Advance:
-    @njit(cache=True)
-    def advance_flights(bodies: Bodies, goals: NDArray[np.int64]) -> None:
-        if not sources:  # never true: naming the digest makes it part of the cache's key
-            return
+def _compose(digest: str) -> Callable[..., int]:
+    def advance_flights(
+        rows: Array, keys: NDArray[np.uint64], reached: NDArray[np.int64], heights: Array, grid: Array,
+        goals: NDArray[np.int64],
+    ) -> int:  # fmt: skip
+        bodies = Bodies(rows, keys, reached, heights, grid)
         for body in range(goals.shape[0]):
             row = bodies.rows[body]
             if row[S_STARTED] == 0.0:
@@ -117,12 +118,13 @@ def _compose(sources: str) -> Advance:
                 _control(row, bodies.reached[body])
                 step_body(bodies, body, row)
                 update_estimate(row, bodies.reached[body])
+        return 1 if digest else 0
 
-    compiled: Advance = advance_flights
-    return compiled
+    return advance_flights
 
 
-advance_flights = _compose(digest_of([*world_sources(), *Path(__file__).parent.glob("*.py")]))
+_SOURCES = (*world_sources(), *Path(__file__).parent.glob("*.py"))
+advance_flights = NumericCode("advance_flights", _compose, _SOURCES, ADVANCE_ARGUMENTS)
 """Advance each body to its goal step under the set-points in its row."""
 
 

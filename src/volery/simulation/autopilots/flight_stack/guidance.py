@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from numba import njit
-
+from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
     ATTITUDE,
     C_ACCEL,
@@ -84,7 +83,7 @@ _OVERSPEED_GAIN = 2.0  # POSCONTROL_OVERSPEED_GAIN_Z
 _MAX_LIFT = 2.2  # in multiples of gravity
 
 
-@njit(cache=False)
+@numeric
 def approach(error: float, gain: float, brake: float) -> float:
     """Return the rate at which to close *error* so that a deceleration of *brake* suffices to stop at zero.
 
@@ -106,13 +105,13 @@ def approach(error: float, gain: float, brake: float) -> float:
     return error * gain
 
 
-@njit(cache=False)
+@numeric
 def ramp(value: float, goal: float, most: float) -> float:
     """Return *value* moved towards *goal* by at most *most*."""
     return value + clip(goal - value, -most, most)
 
 
-@njit(cache=False)
+@numeric
 def shorten(x: float, y: float, most: float) -> tuple[float, float]:
     """Return the vector (x, y), scaled to the length *most* where it is longer."""
     length = sqrt(x * x + y * y)
@@ -122,20 +121,20 @@ def shorten(x: float, y: float, most: float) -> tuple[float, float]:
     return x * scale, y * scale
 
 
-@njit(cache=False)
+@numeric
 def controls_horizontal(control: int) -> bool:
     """Return whether a control determines horizontal motion."""
     return control in (VELOCITY, POSITION, POSITION_CLIMB, VELOCITY_HEIGHT)
 
 
-@njit(cache=False)
+@numeric
 def _cos_tilt(row: Array) -> float:
     """Return the cosine of the tilt, at least one half."""
     x, y = row[K_ATTITUDE + 1], row[K_ATTITUDE + 2]
     return clip(1.0 - 2.0 * (x * x + y * y), 0.5, 1.0)
 
 
-@njit(cache=False)
+@numeric
 def _disturbance(row: Array, axis: int) -> float:
     """Return the acceleration that the present thrust balances besides inertia [m/s^2].
 
@@ -152,7 +151,7 @@ def _disturbance(row: Array, axis: int) -> float:
     return clip(thrust - row[K_ACCEL + axis], -4.0, 4.0)
 
 
-@njit(cache=False)
+@numeric
 def _enter_control(row: Array, control: int, before: int) -> None:
     """Initialise a new control at the present position and velocity.
 
@@ -173,7 +172,7 @@ def _enter_control(row: Array, control: int, before: int) -> None:
         row[K_TARGET_EULER + 1] = 0.0
 
 
-@njit(cache=False)
+@numeric
 def _reset_target(row: Array) -> None:
     """Put the target where the vehicle stands and reset the integrators, on the ground."""
     for axis in range(3):
@@ -183,7 +182,7 @@ def _reset_target(row: Array) -> None:
         row[K_VELOCITY_INTEGRAL + axis] = 0.0
 
 
-@njit(cache=False)
+@numeric
 def _move_target(row: Array, axis: int, accel: float, jerk: float) -> None:
     """Integrate one axis of the target; *accel* is the acceleration that the limits allow."""
     target_accel = ramp(row[K_TARGET_ACCEL + axis], accel, jerk * GUIDE_S)
@@ -193,7 +192,7 @@ def _move_target(row: Array, axis: int, accel: float, jerk: float) -> None:
     row[K_TARGET + axis] += (before + 0.5 * target_accel * GUIDE_S) * GUIDE_S
 
 
-@njit(cache=False)
+@numeric
 def _speed_along(row: Array) -> tuple[float, float]:
     """Return the limits of horizontal and vertical speed towards the commanded point [m/s].
 
@@ -215,7 +214,7 @@ def _speed_along(row: Array) -> tuple[float, float]:
     return speed, speed * abs(down) / level
 
 
-@njit(cache=False)
+@numeric
 def _shape_horizontal(row: Array, control: int) -> None:
     """Move the horizontal target by one guidance period."""
     limit = row[C_ACCEL]
@@ -243,7 +242,7 @@ def _shape_horizontal(row: Array, control: int) -> None:
     row[K_TARGET + 1] = row[K_POSITION + 1] + ahead_e
 
 
-@njit(cache=False)
+@numeric
 def _overspeed(row: Array) -> float:
     """Return the factor on vertical acceleration and jerk of a target that is beyond its speed limits.
 
@@ -257,7 +256,7 @@ def _overspeed(row: Array) -> float:
     return factor
 
 
-@njit(cache=False)
+@numeric
 def _shape_vertical(row: Array, control: int) -> None:
     """Move the vertical target by one guidance period."""
     harder = _overspeed(row)
@@ -277,7 +276,7 @@ def _shape_vertical(row: Array, control: int) -> None:
     row[K_TARGET + 2] = row[K_POSITION + 2] + ahead
 
 
-@njit(cache=False)
+@numeric
 def _target_accel(row: Array, axis: int, gain: float, integral: float, hold: bool) -> float:
     """Return the acceleration [m/s^2] that position and velocity loop of one axis request."""
     error = row[K_TARGET + axis] - row[K_POSITION + axis]
@@ -290,7 +289,7 @@ def _target_accel(row: Array, axis: int, gain: float, integral: float, hold: boo
     return accel
 
 
-@njit(cache=False)
+@numeric
 def _shape_yaw(row: Array) -> None:
     """Move the yaw target with limited rate and acceleration."""
     kind = int(row[C_YAW_MODE])
@@ -308,7 +307,7 @@ def _shape_yaw(row: Array) -> None:
     row[K_YAW_TARGET] = wrap_angle(row[K_YAW_TARGET] + row[K_YAW_SPEED] * GUIDE_S)
 
 
-@njit(cache=False)
+@numeric
 def _set_target_angles(row: Array, roll: float, pitch: float) -> None:
     """Set the target attitude from roll, pitch and the yaw target."""
     yaw = row[K_YAW_TARGET]
@@ -318,7 +317,7 @@ def _set_target_angles(row: Array, roll: float, pitch: float) -> None:
     write_quaternion(row, K_TARGET_QUATERNION, roll, pitch, yaw)
 
 
-@njit(cache=False)
+@numeric
 def _tilt_thrust(row: Array, north: float, east: float, lift: float) -> None:
     """Set the target attitude whose thrust gives a horizontal acceleration.
 
@@ -340,7 +339,7 @@ def _tilt_thrust(row: Array, north: float, east: float, lift: float) -> None:
     _set_target_angles(row, clip(roll, -most, most), clip(pitch, -most, most))
 
 
-@njit(cache=False)
+@numeric
 def _learn_hover_throttle(row: Array) -> None:
     """Adapt the hover throttle while the vehicle hardly accelerates."""
     steady = row[K_LANDED] < 0.5 and row[K_SPOOL] >= 1.0 and abs(row[K_VELOCITY + 2]) < 0.6
@@ -352,7 +351,7 @@ def _learn_hover_throttle(row: Array) -> None:
         row[K_HOVER_THROTTLE] = learnt
 
 
-@njit(cache=False)
+@numeric
 def _hold_nothing(row: Array) -> None:
     """Reset target and attitude: the vehicle stands, or falls."""
     _reset_target(row)
@@ -361,7 +360,7 @@ def _hold_nothing(row: Array) -> None:
     _set_target_angles(row, 0.0, 0.0)
 
 
-@njit(cache=False)
+@numeric
 def _follow_angles(row: Array) -> None:
     """Low-pass the commanded roll and pitch into the target attitude."""
     share = GUIDE_S / _TC
@@ -370,7 +369,7 @@ def _follow_angles(row: Array) -> None:
     _set_target_angles(row, roll, pitch)
 
 
-@njit(cache=False)
+@numeric
 def _follow_horizontal(row: Array, control: int) -> None:
     """Tilt so that the vehicle follows the horizontal target."""
     _shape_horizontal(row, control)
@@ -380,7 +379,7 @@ def _follow_horizontal(row: Array, control: int) -> None:
     _tilt_thrust(row, north, east, _GRAVITY)
 
 
-@njit(cache=False)
+@numeric
 def _follow_vertical(row: Array, control: int) -> None:
     """Set the collective so that the vehicle follows the vertical target."""
     _shape_vertical(row, control)
@@ -391,7 +390,7 @@ def _follow_vertical(row: Array, control: int) -> None:
     _learn_hover_throttle(row)
 
 
-@njit(cache=False)
+@numeric
 def guide_multirotor(row: Array) -> None:
     """Run one guidance period: update the targets, the target attitude and the collective."""
     control = int(row[C_CONTROL])

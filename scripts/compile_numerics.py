@@ -1,0 +1,99 @@
+"""Compile the entry points of machine code into src/volery/base/object_code, for the architecture at hand.
+
+A wheel that is built afterwards carries the object code; ``VOLERY_COMPILE=1 pip wheel .`` runs this as well.
+The code is for the oldest processor of the architecture and gives the bits that numba's gives. Needs numba,
+and a C compiler as linker.
+
+    python scripts/compile_numerics.py
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+os.environ["NUMBA_CPU_NAME"] = "generic"
+os.environ["NUMBA_CPU_FEATURES"] = ""
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "src"))
+import llvmlite.binding as llvm
+from numba import carray, cfunc, types
+
+from volery.base.numeric_code import NumericCode, parsed
+from volery.cost.native.core_model import execute_blocks
+from volery.simulation.autopilots.flight_stack.flight import advance_flights
+from volery.simulation.world.body_step import advance_bodies
+
+ENTRY_POINTS = (advance_flights, advance_bodies, execute_blocks)
+
+ERROR_PATHS = """
+/* What numba's code calls where it raises an error. The entry point then returns 0, and Python raises. */
+#define NOTHING(name) __attribute__((visibility("hidden"))) void *name(void) { return 0; }
+#define NO_ERROR(name) __attribute__((visibility("hidden"))) void *name;
+NOTHING(NRT_Free) NOTHING(NRT_MemInfo_call_dtor) NOTHING(PyBytes_FromStringAndSize) NOTHING(PyErr_Clear)
+NOTHING(PyErr_SetNone) NOTHING(PyErr_SetString) NOTHING(PyErr_WriteUnraisable) NOTHING(PyUnicode_FromString)
+NOTHING(Py_DecRef) NOTHING(numba_do_raise) NOTHING(numba_gil_ensure) NOTHING(numba_gil_release)
+NOTHING(numba_runtime_build_excinfo_struct) NOTHING(numba_unpickle)
+NO_ERROR(PyExc_RuntimeError) NO_ERROR(PyExc_StopIteration) NO_ERROR(PyExc_SystemError)
+"""
+
+
+def compiled(entry: NumericCode) -> bytes:
+    """Return an entry point as a relocatable object. Arrays become a pointer and their sizes."""
+    parameters, values = [], []
+    kinds: list[Any] = []
+    for index, argument in enumerate(entry.arguments):
+        kind, dimensions = parsed(argument)
+        sizes = [f"n{index}_{axis}" for axis in range(dimensions)]
+        parameters += [f"a{index}", *sizes]
+        values.append(f"carray(a{index}, ({', '.join(sizes)},))" if sizes else f"a{index}")
+        number = getattr(types, kind)
+        kinds += [types.CPointer(number) if dimensions else number, *[types.int64] * dimensions]
+    scope: dict[str, Any] = {"carray": carray, "entry": entry.by_numba(cache=False)}
+    exec(f"def call({', '.join(parameters)}):\n    return entry({', '.join(values)})\n", scope)
+    made = cfunc(types.int64(*kinds))(scope["call"])
+    text = str(made._library._final_module).replace(made._wrapper_name, entry.name)
+    target = llvm.Target.from_default_triple().create_target_machine(
+        "generic", "", opt=3, reloc="pic", codemodel="small"
+    )
+    code: bytes = target.emit_object(llvm.parse_assembly(text))
+    return code
+
+
+def build(entry: NumericCode, linker: str) -> None:
+    """Compile one entry point, unless its object code is up to date, and remove its older object code."""
+    folder = entry.library.parent
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob(f"{entry.name}-*.so"):
+        if old != entry.library:
+            old.unlink()
+    if entry.shipped:
+        return
+    with tempfile.TemporaryDirectory() as place:
+        file = Path(place) / "code.o"
+        file.write_bytes(compiled(entry))
+        errors = Path(place) / "errors.c"
+        errors.write_text(ERROR_PATHS)
+        made = Path(place) / "code.so"
+        options = ["-shared", "-fPIC", "-s", "-Wl,--no-undefined", "-fno-builtin", "-o", str(made)]
+        subprocess.run([linker, *options, str(file), str(errors), "-lm"], check=True)
+        shutil.move(made, entry.library)
+    print(f"{entry.library.name}: {entry.library.stat().st_size} bytes")
+
+
+def main() -> None:
+    """Compile all entry points."""
+    linker = shutil.which("cc")
+    if linker is None:
+        sys.exit("compile_numerics: there is no C compiler (cc) to link with; install gcc or clang")
+    for entry in ENTRY_POINTS:
+        build(entry, linker)
+
+
+if __name__ == "__main__":
+    main()

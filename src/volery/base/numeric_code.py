@@ -1,0 +1,169 @@
+"""Functions of numbers and arrays that execute as machine code, not as Python.
+
+A function marked ``numeric`` is plain Python for its callers in Python. A ``NumericCode`` is an entry point:
+a function that calls such functions and is compiled with all of them. It executes from the object code that a
+wheel carries (``scripts/compile_numerics.py``), so that neither numba nor a compiler is needed at run time.
+Where that is missing or was made from other sources, numba compiles it at the first use and keeps it in its
+cache. Both are compiled without fused or reordered operations and give the same bits on every processor.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import platform
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
+from pathlib import Path
+from types import FunctionType
+from typing import Any, TypeVar, cast
+
+import numpy as np
+
+from volery.base.errors import UsageError
+
+OBJECT_CODE = Path(__file__).parent / "object_code"
+"""Folder of the object code of a wheel. In a checkout it is empty until the script has been run."""
+
+F = TypeVar("F", bound=Callable[..., Any])
+_numeric: set[Callable[..., Any]] = set()
+
+
+def numeric(function: F) -> F:
+    """Mark a function that machine code may call. It may use numbers, arrays and numeric functions only."""
+    _numeric.add(function)
+    return function
+
+
+def digest_of(files: Iterable[Path]) -> str:
+    """Return a digest of the files' contents, independent of their order."""
+    digest = hashlib.sha256()
+    for file in sorted(files):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+class NumericCode:
+    """An entry point, compiled.
+
+    Args:
+        name: Name of the entry point, unique in volery.
+        compose: Returns the Python function, given the digest of its sources. The function must use the
+            digest as a free variable, because numba's cache sees only the source file of the function itself;
+            it returns 1, so that 0 reports an error of the object code.
+        sources: Source files of everything that is compiled, constants included.
+        arguments: Types of the arguments, in numba's notation, such as ``float64[:,::1]`` and ``int64``.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        compose: Callable[[str], Callable[..., int]],
+        sources: Iterable[Path],
+        arguments: Sequence[str],
+    ) -> None:
+        self.name = name
+        self.arguments = tuple(arguments)
+        self._digest = digest_of([Path(__file__), *sources])
+        self._function = compose(self._digest)
+
+    @property
+    def library(self) -> Path:
+        """File of the object code for this machine and these sources."""
+        return OBJECT_CODE / f"{self.name}-{platform.machine()}-{self._digest[:16]}.so"
+
+    @property
+    def shipped(self) -> bool:
+        """Whether there is object code for this machine and these sources."""
+        return self.library.exists()
+
+    def bind(self, *arguments: Any) -> Callable[[], None]:
+        """Return a function that executes on these arguments.
+
+        Arrays must be contiguous and stay where they are; their contents may change between two calls.
+
+        Raises:
+            UsageError: An array has another type or another layout than declared.
+        """
+        for declared, value in zip(self.arguments, arguments, strict=True):
+            _check(self.name, declared, value)
+        return self._bound_to_object_code(arguments) if self.shipped else self._bound_to_numba(arguments)
+
+    def _bound_to_numba(self, arguments: Sequence[Any]) -> Callable[[], None]:
+        function = self._compiled
+
+        def call() -> None:
+            function(*arguments)
+
+        return call
+
+    def _bound_to_object_code(self, arguments: Sequence[Any]) -> Callable[[], None]:
+        function = self._loaded
+        values = [value for argument in arguments for value in _flattened(argument)]
+
+        def call(held: Sequence[Any] = arguments) -> None:  # holds the arrays while their addresses are used
+            if not function(*values):
+                raise ArithmeticError(f"{self.name}: invalid arithmetic, such as a division by zero")
+
+        return call
+
+    @cached_property
+    def _loaded(self) -> Callable[..., int]:
+        function = ctypes.CDLL(str(self.library))[self.name]
+        function.restype = ctypes.c_int64
+        function.argtypes = [kind for argument in self.arguments for kind in _c_types(argument)]
+        return function
+
+    @cached_property
+    def _compiled(self) -> Callable[..., int]:
+        return cast("Callable[..., int]", self.by_numba(cache=True))
+
+    def by_numba(self, *, cache: bool) -> Any:
+        """Return the function compiled by numba for the declared types."""
+        from numba import njit  # noqa: PLC0415  # takes 0.4 s, and only the lack of object code needs it
+
+        entry = _linked(self._function, {}, njit)
+        return njit(f"int64({', '.join(self.arguments)})", cache=cache)(entry)
+
+
+def _linked(function: Callable[..., Any], known: dict[Any, Any], njit: Callable[..., Any]) -> FunctionType:
+    """Return a copy of *function* whose numeric globals are compiled by numba, and theirs in turn."""
+    source = cast("FunctionType", function)
+    scope = dict(source.__globals__)
+    for name in source.__code__.co_names:
+        value = scope.get(name)
+        if isinstance(value, FunctionType) and value in _numeric:
+            if value not in known:
+                known[value] = njit(_linked(value, known, njit))
+            scope[name] = known[value]
+    return FunctionType(source.__code__, scope, source.__name__, source.__defaults__, source.__closure__)
+
+
+def parsed(argument: str) -> tuple[str, int]:
+    """Return the type of the numbers and the number of dimensions: ``float64[:,::1]`` has two."""
+    kind, _, layout = argument.partition("[")
+    return kind, max(0, layout.count(":") - 1)
+
+
+def _check(name: str, declared: str, value: Any) -> None:
+    kind, dimensions = parsed(declared)
+    if dimensions:
+        right = (
+            isinstance(value, np.ndarray)
+            and value.dtype == np.dtype(kind)
+            and value.ndim == dimensions
+            and value.flags.c_contiguous
+        )
+        if not right:
+            raise UsageError(f"{name}: an argument must be a contiguous array {declared}")
+
+
+def _c_types(argument: str) -> list[Any]:
+    kind, dimensions = parsed(argument)
+    if dimensions:
+        return [ctypes.c_void_p, *[ctypes.c_int64] * dimensions]
+    return [ctypes.c_double if kind == "float64" else ctypes.c_int64]
+
+
+def _flattened(argument: Any) -> list[Any]:
+    return [argument.ctypes.data, *argument.shape] if isinstance(argument, np.ndarray) else [argument]
