@@ -15,7 +15,7 @@ cannot be sent is dropped with a warning.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -36,15 +36,13 @@ from volery.bridge.node_interface import InterfaceContext, NamingScheme, NodeInt
 from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.links.link import Frame, Link
 from volery.links.pprzlink_codec import FROM_ROS, PPRZROS_TYPE, TO_ROS, to_frame, to_message
-from volery.ros.graph import Node, Publisher, RosGraph, Work
+from volery.ros.graph import INVALID_VALUES, Node, Publisher, RosGraph, Work
 from volery.trace.events import Text
 
 ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4
 SAFETY_ARMED = 128
 """MAV_MODE_FLAG."""
 WARNING = 4
-INVALID_VALUES = (ValueError, OverflowError, UsageError)
-"""Errors that invalid numbers in a message or a frame cause."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +89,11 @@ class VehicleNode:
         self._publishers: dict[str, Publisher] = {}
         self._on_demand: set[str] = set()
         self._warned: set[str] = set()
+        self._batch: list[tuple[Publisher, Any]] | None = None
+        """What the present cycle publishes; None outside of a cycle."""
+        self._sources: list[str] = []
+        """For each message of the batch the name of the frame that it was made of."""
+        self._source = ""
         self._next_heartbeat: Ns = 0
         self.connected = False
         self._component = ""
@@ -134,7 +137,7 @@ class VehicleNode:
         self._serve(node, interface, helper, scope)
         rate = None if options.period is None else node.rate(options.period)
         while not node.closed:
-            self._cycle(interface)
+            self._cycle(node, interface)
             if rate is not None:
                 rate.sleep()
             else:
@@ -166,8 +169,13 @@ class VehicleNode:
 
     def _publish(self, topic: str, message: Any) -> None:
         publisher = self._publishers.get(topic)
-        if publisher is not None:
+        if publisher is None:
+            return
+        if self._batch is None:
             publisher.publish(message)
+        else:
+            self._batch.append((publisher, message))
+            self._sources.append(self._source)
 
     def _wanted(self, topic: str) -> bool:
         publisher = self._publishers.get(topic)
@@ -213,12 +221,11 @@ class VehicleNode:
 
     # -- the loop
 
-    def _cycle(self, interface: NodeInterface) -> None:
+    def _cycle(self, node: Node, interface: NodeInterface) -> None:
         with self._kernel as kernel:
             now = kernel.now()
             received = self.link.take_unpublished()
-        for one in received:
-            self._translate(interface, one)
+        self._publish_received(node, interface, received)
         last = self.link.last_heartbeat
         connected = last is not None and now - last < self.options.silent
         if self.connected and not connected:
@@ -229,16 +236,31 @@ class VehicleNode:
             self._send_heartbeat()
         self._streams.check(now)
 
-    def _translate(self, interface: NodeInterface, received: ReceivedFrame) -> None:
-        """Publish the content of a frame; warn of invalid content once per message name."""
-        frame, at = received
-        for translate in interface.translators.get(frame.name, ()):
-            try:
-                translate(frame.fields, self._graph.epoch + at)
-            except INVALID_VALUES as error:
-                if frame.name not in self._warned:
-                    self._warned.add(frame.name)
-                    self._warn(f"{frame.name}: not published: {error}")
+    def _publish_received(
+        self, node: Node, interface: NodeInterface, received: Sequence[ReceivedFrame]
+    ) -> None:
+        """Publish the content of frames as one batch."""
+        batch: list[tuple[Publisher, Any]] = []
+        sources: list[str] = []
+        self._batch, self._sources = batch, sources
+        try:
+            for frame, at in received:
+                self._source = frame.name
+                for translate in interface.translators.get(frame.name, ()):
+                    try:
+                        translate(frame.fields, self._graph.epoch + at)
+                    except INVALID_VALUES as error:
+                        self._refuse(frame.name, error)
+        finally:
+            self._batch = None
+        if batch:
+            node.publish_all(batch, lambda index, error: self._refuse(sources[index], error))
+
+    def _refuse(self, name: str, error: Exception) -> None:
+        """Warn of a frame with invalid content, once per name."""
+        if name not in self._warned:
+            self._warned.add(name)
+            self._warn(f"{name}: not published: {error}")
 
     def _send_heartbeat(self) -> None:
         fields = {

@@ -39,8 +39,9 @@ class Preemption(NamedTuple):
 class Charge(NamedTuple):
     """Execution time was added to a component's pending execution time on its processor.
 
-    ``kind`` is ``code``, ``stated``, ``operation:<name>``, ``activation`` or ``ros:<call>``. ``caller`` is
-    executed by the calling task before it continues, ``background`` by other threads of its process; both are
+    ``kind`` is ``code``, ``stated``, ``operation:<name>``, ``activation``, ``ros:<call>``, or
+    ``ros:<call>*<n>`` for *n* calls of one batch. ``caller`` is executed by the calling task before it
+    continues, ``background`` by other threads of its process; both are
     times at the processor's frequency. ``energy`` in joules is given only where the model states it for the
     operation, else 0.0.
     """

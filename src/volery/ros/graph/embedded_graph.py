@@ -7,8 +7,8 @@ part of the modelled system. `LocalNode` is the part that nodes of the transport
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
 
 from volery.base.errors import UsageError
 from volery.base.time import US, Ns, S
@@ -30,10 +30,12 @@ from volery.ros.graph.interface import (
     CLOCK_PERIOD,
     CLOCK_TYPE,
     DEFAULT,
+    INVALID_VALUES,
     Callback,
     Group,
     Handler,
     Node,
+    Publisher,
     QoS,
     RosGraph,
     Routing,
@@ -116,6 +118,16 @@ class LocalNode:
         self._graph.changed.notify()
         return part
 
+    def publish_all(
+        self, messages: Sequence[tuple[Publisher, Any]], refused: Callable[[int, Exception], None]
+    ) -> None:
+        """See ``Node``. Here the messages are sent one after the other."""
+        for index, (publisher, message) in enumerate(messages):
+            try:
+                publisher.publish(message)
+            except INVALID_VALUES as error:
+                refused(index, error)
+
     def timer(self, period: Ns, callback: Callable[[], None], group: Group | None = None) -> NodeTimer:
         """Call back every `period` ns."""
         with self._graph.kernel:
@@ -190,6 +202,20 @@ class EmbeddedNode(LocalNode):
             found = topic_named(self._graph, self.resolve(topic), message_type, self._node)
             self._node.consume("advertise")
             return self._keep(EmbeddedPublisher(self._node, found, qos))
+
+    def publish_all(
+        self, messages: Sequence[tuple[Publisher, Any]], refused: Callable[[int, Exception], None]
+    ) -> None:
+        """See ``Node``."""
+        publishers = [cast("EmbeddedPublisher", publisher) for publisher, _ in messages]
+        with self._graph.kernel:
+            self._node.check_open()
+            sent = self._node.consume_publications([publisher.connected for publisher in publishers])
+            for index, (publisher, (_, message)) in enumerate(zip(publishers, messages, strict=True)):
+                try:
+                    publisher.send(message, sent, fresh=True)
+                except INVALID_VALUES as error:
+                    refused(index, error)
 
     def subscribe(
         self,

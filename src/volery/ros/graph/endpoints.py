@@ -132,30 +132,38 @@ class EmbeddedPublisher:
     def publish(self, message: Any) -> None:
         """Send a copy of `message` as it is when the call has been served."""
         node = self.node
-        with node.kernel as kernel:
+        with node.kernel:
             if not self._open:
                 raise UsageError(f"node {node.name}: its publisher of {self.topic} is closed")
             if not isinstance(message, self._class):
                 kind = getattr(message, "__msgtype__", "") or f"a {type(message).__name__}"
                 raise UsageError(f"topic {self.topic} carries {self.type}, not {kind}")
-            sent = node.consume("publish", float(len(self._connections)))
-            connections = self._connections
-            if not (connections or self._checked or self._latches):
-                return
-            content = node.graph.copy(message) if node.graph.as_bytes else message.copy()
-            size = 0
-            if self._checked:
-                data = copied_to_cdr(content)
-                size = len(data)
-                if self._recorded:
-                    kernel.record(Published(sent, self.topic, self.type, node.name, data))
-            elif self._sized:
-                size = cdr_size(content)
-            if self._latches:
-                self._latched.append((content.copy(), sent, size))
-            single = len(connections) == 1
-            for connection in connections:
-                connection.deliver(content if single else content.copy(), sent, node.name, size)
+            self.send(message, node.consume("publish", float(len(self._connections))))
+
+    @property
+    def connected(self) -> int:
+        """Number of connections, without being an interaction point."""
+        return len(self._connections)
+
+    def send(self, message: Any, sent: Ns, *, fresh: bool = False) -> None:
+        """Send a message whose call has been executed; a `fresh` one was made for this call."""
+        node, connections = self.node, self._connections
+        if not (connections or self._latches or self._recorded or (self._checked and not fresh)):
+            return
+        content = node.graph.copy(message) if node.graph.as_bytes else message.copy()
+        size = 0
+        if self._recorded or (self._checked and not fresh):
+            data = copied_to_cdr(content)
+            size = len(data)
+            if self._recorded:
+                node.kernel.record(Published(sent, self.topic, self.type, node.name, data))
+        elif self._sized or self._checked:
+            size = cdr_size(content)
+        if self._latches:
+            self._latched.append((content.copy(), sent, size))
+        single = len(connections) == 1
+        for connection in connections:
+            connection.deliver(content if single else content.copy(), sent, node.name, size)
 
     def subscribers(self) -> int:
         """Return the number of subscriptions it is connected to."""

@@ -7,7 +7,7 @@ that implement them import this one and not each other.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -245,9 +245,40 @@ class NodeContext:
         if not self.graph.unrecorded:
             kind = _KINDS.get(call) or f"ros:{call}"
             kernel.record(Charge(now, self.id.component, self.id.processor, kind, caller, background, 0.0))
+        return self._execute(now, caller, background)
+
+    def consume_publications(self, subscribers: Sequence[int]) -> Ns:
+        """Execute one call of ``publish`` for each entry, as one batch with the sum of their prices.
+
+        Args:
+            subscribers: Number of connections of each publisher.
+
+        Returns:
+            Time at which the callers' parts have been executed, ns.
+        """
+        kernel, tariff = self.kernel, self._tariff
+        now = at = kernel.now()
+        if self._free or not subscribers:
+            return now
+        caller = background = 0
+        for connections in subscribers:
+            priced = "publish_next" if at - self.last_traffic < WARM else "publish"
+            self.last_traffic = at
+            if tariff is not None:
+                cost = tariff(priced, float(connections))
+                caller += cost.caller
+                background += cost.background
+                at += cost.caller
+        if not self.graph.unrecorded:
+            kind = f"ros:publish*{len(subscribers)}"
+            kernel.record(Charge(now, self.id.component, self.id.processor, kind, caller, background, 0.0))
+        return self._execute(now, caller, background)
+
+    def _execute(self, now: Ns, caller: Ns, background: Ns) -> Ns:
+        """Execute what has been charged at *now*; return the time at which the caller's part has been."""
         if caller:
-            if kernel.consume(caller):
-                now = kernel.now()
+            if self.kernel.consume(caller):
+                now = self.kernel.now()
             else:
                 background += caller
         if background and self.processor is not None:

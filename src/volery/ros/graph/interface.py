@@ -11,7 +11,7 @@ private to the node. See http://wiki.ros.org/Names and https://design.ros2.org/a
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -114,6 +114,9 @@ def no_route(sender: NodeId, receiver: NodeId) -> Route | None:
     """Return no route: messages arrive at once."""
     return None
 
+
+INVALID_VALUES = (ValueError, OverflowError, UsageError)
+"""Errors that invalid numbers in a message cause."""
 
 Callback = Callable[[Any], None]
 Handler = Callable[[Any], Any]
@@ -263,6 +266,19 @@ class Node(Protocol):
 
     def advertise(self, topic: str, message_type: str, qos: QoS = DEFAULT) -> Publisher:
         """Publish to a topic."""
+
+    def publish_all(
+        self, messages: Sequence[tuple[Publisher, Any]], refused: Callable[[int, Exception], None]
+    ) -> None:
+        """Send messages made for this call, each by a publisher of this node.
+
+        Where calls are priced, their prices are added up and executed at once, and all messages leave then:
+        the order in time inside the batch is lost, the sum is not.
+
+        Args:
+            messages: Publishers and messages. The messages must not be changed afterwards.
+            refused: Called with the index of a message that cannot be encoded, and why.
+        """
 
     def subscribe(
         self,
