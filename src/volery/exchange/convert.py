@@ -8,18 +8,25 @@ from pathlib import Path, PurePath
 
 from volery.base.errors import Location, ModelError, UsageError, choices
 from volery.base.files import read_bytes, write_text
-from volery.base.units import QuantityError
 from volery.exchange.aadl import aadl_text
 from volery.exchange.sysml import sysml_text
 from volery.exchange.uml.components_view import Rebase
 from volery.exchange.uml.context import Note
-from volery.exchange.uml.uml_model import Imported, export_uml, import_uml
+from volery.exchange.uml.uml_model import Imported, export_uml, import_uml, located
 from volery.exchange.uml.xmi import MOST_BYTES
 from volery.model.assembly import model_file, read_tree
+from volery.model.builder import ModelBuilder
+from volery.model.reading import Vocabulary
+from volery.model.rules import MISSING_FILE, RULES
+from volery.model.system_loader import load
+from volery.model.text import CollectedModelError
 from volery.model.writing import model_text
 
 FORMATS = {".uml": "UML with MARTE and S3D", ".aadl": "AADL", ".sysml": "SysML v2"}
 """Formats of an export by the ending of the file."""
+
+OF_THE_TEXT = frozenset(code for code in RULES if code < MISSING_FILE.code)
+"""Rules of the form of the text: without it nothing can be exported."""
 
 _BESIDE = (".di", ".notation", ".aird")
 
@@ -48,6 +55,25 @@ def read_uml(
     return import_uml(data, str(source), _rebase(source.parent, folder), catalogue, processors)
 
 
+def uml_model(
+    source: Path, catalogue: Iterable[str], processors: Mapping[str, str] | None = None
+) -> tuple[ModelBuilder, tuple[Note, ...]]:
+    """Return the model of a .uml file, each entry of which stands at the line of its element, and notes.
+
+    Args:
+        source: The .uml file. Paths of the model start in its folder.
+        catalogue: Names of the processors of the catalogue.
+        processors: The processor of the catalogue that each processor of the file is, by its name there.
+
+    Raises:
+        ModelError: the file cannot be read, or is no UML model with MARTE or S3D.
+    """
+    imported = read_uml(source, source.parent, catalogue, processors)
+    built = ModelBuilder("", folder=source.parent)
+    built.root = located(imported)
+    return built, imported.notes
+
+
 def import_model(
     source: Path,
     out: Path,
@@ -69,7 +95,7 @@ def import_model(
     return imported
 
 
-def export_model(model: Path, target: Path, catalogue: Iterable[str]) -> tuple[Note, ...]:
+def export_model(model: Path, target: Path, vocabulary: Vocabulary) -> tuple[Note, ...]:
     """Write a model to *target* in the format of its ending; return what has no place in it.
 
     A .uml file that exists is updated: ids, diagrams and what volery does not know stay valid.
@@ -77,28 +103,38 @@ def export_model(model: Path, target: Path, catalogue: Iterable[str]) -> tuple[N
     Args:
         model: The model's file, or its folder.
         target: The new file.
-        catalogue: Names of the processors of the catalogue.
+        vocabulary: Names that are defined outside the model.
 
     Raises:
-        ModelError: the model, or the existing .uml file, cannot be read.
+        ModelError: the text of the model is wrong, or the existing .uml file cannot be read.
         UsageError: the ending of *target* is of no known format, or it cannot be written.
     """
     if target.suffix not in FORMATS:
         listed = choices([f"{ending} ({what})" for ending, what in FORMATS.items()])
         raise UsageError(f"{target}: its ending chooses the format: {listed}")
     file = model_file(model)
+    _check_form(file, vocabulary)
     tree = read_tree(file).plain()
     if target.suffix == ".uml":
-        base = read_uml(target, file.parent, catalogue) if target.exists() else None
+        base = read_uml(target, file.parent, vocabulary.processors) if target.exists() else None
         text, notes = export_uml(tree, str(target), _rebase(file.parent, target.parent), base)
     else:
-        try:
-            text, notes = (aadl_text if target.suffix == ".aadl" else sysml_text)(tree)
-        except QuantityError as error:
-            what = f"{error}; `volery model check` names the line"
-            raise ModelError(what, "", Location(str(file), 0)) from None
+        text, notes = (aadl_text if target.suffix == ".aadl" else sysml_text)(tree)
     _write(target, text)
     return notes
+
+
+def _check_form(file: Path, vocabulary: Vocabulary) -> None:
+    """Raise what is wrong with the text of a model; it need not be complete to be exported."""
+    try:
+        load(file, vocabulary)
+    except CollectedModelError as several:
+        wrong = [one for one in several.errors if one.code in OF_THE_TEXT]
+        if wrong:
+            raise CollectedModelError(wrong) from None
+    except ModelError as error:
+        if error.code in OF_THE_TEXT:
+            raise
 
 
 def _rebase(of: Path, start: Path) -> Rebase:

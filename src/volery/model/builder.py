@@ -43,7 +43,7 @@ class ModelBuilder:
 
     def __init__(self, name: str, *, folder: str | FilePath = ".") -> None:
         self.folder = FilePath(folder)
-        self.root = _node({"volery": 1, "name": name}, _caller())
+        self.root = plain_node({"volery": 1, "name": name}, _caller())
 
     def add(self, section: str, name: str, /, **values: Any) -> None:
         """Add an entry to a section.
@@ -59,12 +59,12 @@ class ModelBuilder:
         below = self._mapping(section, _caller())
         if name in below:
             raise UsageError(f"{section} has {name!r} already, from {below[name].where}")
-        below[name] = _node({_key(key): value for key, value in values.items()} or None, _caller())
+        below[name] = plain_node({_key(key): value for key, value in values.items()} or None, _caller())
 
     def set(self, path: str, value: Any) -> None:
         """Set the value at a path, such as ``run.duration``; what leads to it is made if it is missing."""
         above, _, key = path.rpartition(".")
-        self._mapping(above, _caller())[key] = _node(value, _caller())
+        self._mapping(above, _caller())[key] = plain_node(value, _caller())
 
     def text(self) -> str:
         """Return the model as YAML."""
@@ -101,12 +101,12 @@ def _caller() -> Location:
     return Location(frame.f_code.co_filename, frame.f_lineno)
 
 
-def _node(value: Any, where: Location) -> Node:
-    """Return plain Python data as a tree."""
+def plain_node(value: Any, where: Location) -> Node:
+    """Return plain Python data as a tree, every node of which stands at *where*."""
     if isinstance(value, Mapping):
-        return Node({str(key): _node(below, where) for key, below in value.items()}, where)
+        return Node({str(key): plain_node(below, where) for key, below in value.items()}, where)
     if isinstance(value, list | tuple):
-        return Node([_node(below, where) for below in value], where)
+        return Node([plain_node(below, where) for below in value], where)
     if isinstance(value, FilePath):
         return Node(value.as_posix(), where)
     if isinstance(value, bool | int | float | str | None):

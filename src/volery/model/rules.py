@@ -306,6 +306,15 @@ CODE_MISMATCH = _rule(
     "Change the class, or the model.",
 )
 
+# -- models of other tools
+
+NOT_MAPPED = _warning(
+    "V901",
+    "not-mapped",
+    "Something in a UML file that a model of volery does not have.",
+    "Change the file, or import it and state the rest in YAML.",
+)
+
 # -- the model's own statements about rules
 
 BAD_SUPPRESSION = _rule(

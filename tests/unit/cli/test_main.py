@@ -142,6 +142,35 @@ def test_a_check_gives_sarif_that_names_rule_file_and_line(tmp_path):
     assert [rule["id"] for rule in log["runs"][0]["tool"]["driver"]["rules"]] == ["V201"]
 
 
+def test_a_uml_file_is_checked_with_its_own_lines(tmp_path):
+    folder = tmp_path / "model"
+    assert run("new", str(folder)).exit_code == OK
+    assert run("model", "export", str(folder), "--to", str(folder / "starter.uml")).exit_code == OK
+    assert run("model", "check", str(folder / "starter.uml")).exit_code == OK
+    file = folder / "starter.uml"
+    spoilt = file.read_text().replace("$path=components/patrol.py;", "$path=components/patrl.py;")
+    assert spoilt != file.read_text()
+    file.write_text(spoilt)
+    component = 'name="Patrol" isActive'
+    line = next(n for n, one in enumerate(spoilt.splitlines(), 1) if component in one)
+    result = run("model", "check", str(file))
+    assert result.exit_code == BAD_INPUT
+    assert f"starter.uml:{line}: components.Patrol.path: there is no file" in text(result)
+
+
+def test_an_import_says_what_it_made_and_what_did_not_map(tmp_path):
+    file = tmp_path / "empty.uml"
+    file.write_text("<a/>")
+    result = run("model", "import", str(file), "--out", str(tmp_path / "m.yaml"))
+    assert (result.exit_code, "there is no uml:Model in it" in text(result)) == (BAD_INPUT, True)
+    uml = tmp_path / "starter.uml"
+    assert run("model", "export", str(example("starter")), "--to", str(uml), "--quiet").output == ""
+    result = run("model", "import", str(uml), "--out", str(tmp_path / "m.yaml"), "--json")
+    assert json.loads(result.stdout) == {"model": str(tmp_path / "m.yaml"), "notes": []}
+    result = run("model", "import", str(uml), "--processor", "x=y", "--out", str(tmp_path / "n.yaml"))
+    assert "--processor x=y: NAME=KIND is expected; the kinds are generic-host" in text(result)
+
+
 def test_an_unknown_format_of_a_check_is_named():
     result = run("model", "check", str(example("starter")), "--format", "xml")
     assert result.exit_code == BAD_INPUT

@@ -12,7 +12,8 @@ from volery.model.assembly import read_tree
 from volery.model.system_loader import load
 from volery.run.assembly.model_checks import vocabulary
 
-CATALOGUE = tuple(vocabulary().processors)
+WORDS = vocabulary()
+CATALOGUE = tuple(WORDS.processors)
 
 
 @pytest.fixture
@@ -23,12 +24,11 @@ def watch(tmp_path):
 def test_a_model_is_the_same_after_uml_in_another_folder(watch, tmp_path):
     uml, back = tmp_path / "uml" / "watch.uml", watch.parent / "back.yaml"
     uml.parent.mkdir()
-    assert export_model(watch, uml, CATALOGUE) == ()
+    assert export_model(watch, uml, WORDS) == ()
     assert "$path=../watch/code/camera.py;" in uml.read_text()
     import_model(uml, back, CATALOGUE)
     assert read_tree(back).plain() == read_tree(watch).plain()
-    words = vocabulary()
-    one, other = load(watch, words), load(back, words)
+    one, other = load(watch, WORDS), load(back, WORDS)
     assert (one.instances, one.processors, one.networks) == (
         other.instances,
         other.processors,
@@ -43,12 +43,12 @@ def test_a_model_is_the_same_after_uml_in_another_folder(watch, tmp_path):
 
 def test_an_export_into_a_file_that_is_there_keeps_its_ids(watch, tmp_path):
     uml = tmp_path / "watch.uml"
-    export_model(watch, uml, CATALOGUE)
+    export_model(watch, uml, WORDS)
     before = re.findall(r'xmi:id="([^"]+)"', uml.read_text())
     text = uml.read_text().replace('name="lens"', 'name="lens" visibility="private"')
     uml.write_text(text)
     watch.write_text(watch.read_text().replace("priority: 7", "priority: 9"))
-    export_model(watch, uml, CATALOGUE)
+    export_model(watch, uml, WORDS)
     assert re.findall(r'xmi:id="([^"]+)"', uml.read_text()) == before
     assert 'visibility="private"' in uml.read_text()
     assert 'priority="9"' in uml.read_text()
@@ -56,7 +56,7 @@ def test_an_export_into_a_file_that_is_there_keeps_its_ids(watch, tmp_path):
 
 def test_a_model_that_is_there_is_not_written_over(watch, tmp_path):
     uml = tmp_path / "watch.uml"
-    export_model(watch, uml, CATALOGUE)
+    export_model(watch, uml, WORDS)
     with pytest.raises(UsageError, match="exists; --replace writes over it"):
         import_model(uml, watch, CATALOGUE)
     import_model(uml, watch, CATALOGUE, replace=True)
@@ -87,14 +87,27 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
 
 def test_the_ending_chooses_the_format(watch, tmp_path):
     with pytest.raises(UsageError, match=r"its ending chooses the format: \.aadl \(AADL\), \.sysml"):
-        export_model(watch, tmp_path / "x.xmi", CATALOGUE)
+        export_model(watch, tmp_path / "x.xmi", WORDS)
     with pytest.raises(UsageError, match="cannot write"):
-        export_model(watch, tmp_path / "none" / "x.sysml", CATALOGUE)
+        export_model(watch, tmp_path / "none" / "x.sysml", WORDS)
 
 
-def test_a_quantity_that_is_none_is_named(watch, tmp_path):
-    watch.write_text(watch.read_text().replace("period: 100 ms", "period: 100 msec"))
-    export_model(watch, tmp_path / "x.sysml", CATALOGUE)
-    watch.write_text(watch.read_text().replace("latency: 15 ms", "latency: 15 msec"))
-    with pytest.raises(ModelError, match=r"there is no unit 'msec'.*`volery model check` names the line"):
-        export_model(watch, tmp_path / "x.aadl", CATALOGUE)
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("latency: 15 ms", "latency: 15 msec", r"model\.yaml:\d+: .*there is no unit 'msec'"),
+        ("components:\n", "components: 5\nother:\n", "a mapping of keys is expected, not 5"),
+        ("requires: {eyes: Grab}", "requires: [eyes]", "a mapping of keys is expected, not a list"),
+    ],
+)
+@pytest.mark.parametrize("ending", [".uml", ".aadl", ".sysml"])
+def test_a_text_that_is_no_model_is_not_exported(watch, tmp_path, old, new, expected, ending):
+    watch.write_text(watch.read_text().replace(old, new, 1))
+    with pytest.raises(ModelError, match=expected):
+        export_model(watch, tmp_path / f"x{ending}", WORDS)
+    assert not (tmp_path / f"x{ending}").exists()
+
+
+def test_a_model_that_is_not_complete_is_exported(watch, tmp_path):
+    watch.write_text(watch.read_text().replace("code/pilot.py", "code/later.py").replace(", map: ground", ""))
+    assert export_model(watch, tmp_path / "x.uml", WORDS) == ()

@@ -1,6 +1,5 @@
 """SysML v2: names, structure, and the list of what has no place there."""
 
-
 from rigs.watch_model import write_watch_model
 from volery.cli.commands.first_steps import example
 from volery.exchange.sysml import name_text, sysml_text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -16,7 +17,10 @@ from volery.cli.console import Output, make_table
 from volery.cli.options import Model, Overrides
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from volery.checks.findings import CheckedModel
+    from volery.model.builder import ModelBuilder
     from volery.model.rules import Finding
     from volery.model.system import System
 
@@ -30,16 +34,25 @@ Format = Annotated[str, typer.Option("--format", metavar="text|json|sarif", help
 def check(output: Output, model: Model, overrides: Overrides = None, format_: Format = "text") -> int:
     """Check a model with each of its allocations and scenarios, and load its Python components.
 
-    The exit status is 2 if a finding keeps the model from running, else 0.
+    The model may be a .uml file. The exit status is 2 if a finding keeps the model from running, else 0.
     """
     if format_ not in FORMATS:
         raise UsageError(f"--format {format_}: give {choices(FORMATS)}")
     from volery.checks.findings import check as check_model
     from volery.checks.sarif import sarif
+    from volery.exchange.convert import uml_model
     from volery.model.assembly import model_file
+    from volery.model.rules import NOT_MAPPED, Finding
     from volery.run.assembly.model_checks import vocabulary
 
-    checked = check_model(model, vocabulary(), overrides or ())
+    words = vocabulary()
+    notes: tuple[Finding, ...] = ()
+    source: Path | ModelBuilder = model
+    if model.suffix == ".uml":
+        source, unmapped = uml_model(model, words.processors)
+        notes = tuple(Finding(NOT_MAPPED, one.what, one.element, one.where) for one in unmapped)
+    checked = check_model(source, words, overrides or ())
+    checked = replace(checked, findings=(*notes, *checked.findings))
     if format_ == "text":
         _show(output, checked)
     else:

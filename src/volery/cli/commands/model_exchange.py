@@ -64,7 +64,7 @@ def export(
     from volery.exchange.convert import export_model
     from volery.run.assembly.model_checks import vocabulary
 
-    notes = export_model(model, to, vocabulary().processors)
+    notes = export_model(model, to, vocabulary())
     output.show(f"{to} is written")
     _notes(output, notes)
     output.give({"file": str(to), "notes": [str(one) for one in notes]})

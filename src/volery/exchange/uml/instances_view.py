@@ -261,7 +261,7 @@ def _write_connectors(
             if part is None or role is None:
                 exp.note(f"{name}.{port}: {text!r} is nothing that can be connected to")
                 continue
-            place = exp.made[owner if inside else "world"]
+            place = exp.made[owner] if inside else exp.made.get("world", exp.made[owner])
             made = exp.element(key, place, "ownedConnector", "Connector", name=f"{name}.{port}")
             this = exp.made[f"instance:{name}"]
             _write_end(exp, made, f"{key}/from", 0, element, this)

@@ -110,7 +110,8 @@ def _processor(imp: Import, element: Element, kinds: Mapping[str, str]) -> dict[
     kind = str((typed if typed is not None else element).get("name", ""))
     made: dict[str, Any] = {"is": kinds.get(kind.lower(), kind)}
     if made["is"] not in kinds.values():
-        what = f"{kind!r} is not in the catalogue of processors; `--processor {kind}=NAME` says which it is"
+        remedy = f"`import --processor {kind}=NAME` says which it is"
+        what = f"{kind!r} is not in the catalogue of processors; {remedy}"
         imp.note(element, what)
     frequency = stated_quantity(tag(application, "frequency")) or stated_quantity(tag(of_kind, "frequency"))
     if frequency:

@@ -21,8 +21,10 @@ from volery.exchange.uml.context import Export, Import, Note, empty_file
 from volery.exchange.uml.notations import properties
 from volery.exchange.uml.stereotypes import NAMESPACES
 from volery.exchange.uml.xmi import Element, XmiFile, local, parse
+from volery.model.builder import plain_node
 from volery.model.document import Document, EnvironmentText
 from volery.model.fields import entries
+from volery.model.text import Node, Path
 from volery.model.text import parse as parse_yaml
 
 _BOUND = re.compile(r"\{?\s*(\S+)\s*(<=|>=|≤|≥)\s*(.+?)\s*\}?\s*\Z")
@@ -196,6 +198,37 @@ def _note_what_is_left(imp: Import) -> None:
         imp.note(element, "a stereotype of a profile that is not read; it stays in the file")
 
 
+_SECTIONS: Mapping[str, tuple[Path, ...]] = {
+    "interface": (("interfaces",),),
+    "type": (("types",),),
+    "component": (("components",),),
+    "instance": (("application",), ("environment", "components"), ("environment", "vehicles")),
+    "memory": (("memory_spaces",),),
+    "os": (("platform", "operating_systems"),),
+    "processor": (("platform", "processors"),),
+    "device": (("platform", "devices"),),
+    "network": (("platform", "networks"),),
+    "allocation": (("allocations",),),
+    "scenario": (("scenarios",),),
+    "requirement": (("requirements",),),
+    "chain": (("chains",),),
+    "design": (("design_parameters",),),
+}
+"""Sections of a model with the things that keys name."""
+
+
+def located(imported: Imported) -> Node:
+    """Return an imported model as a tree in which each entry of a section has the line of its element."""
+    root = plain_node(imported.tree, Location(imported.file.name, 0))
+    for key, element in imported.keys.items():
+        kind, _, name = key.partition(":")
+        for section in _SECTIONS.get(kind, ()):
+            entries = root.at(section)
+            if entries is not None and name in entries.items:
+                entries.items[name] = entries.items[name].moved(imported.file.where(element))
+    return root
+
+
 def export_uml(
     tree: Mapping[str, Any], name: str, rebase: components_view.Rebase = str, base: Imported | None = None
 ) -> tuple[str, tuple[Note, ...]]:
@@ -247,7 +280,8 @@ def _write_scenarios(exp: Export, model: Element, tree: Mapping[str, Any]) -> No
     scenarios = tree.get("scenarios") or {}
     if not scenarios:
         return
-    package = exp.package("package:scenarios", exp.made["view:verification"], "Scenarios")
+    verification = exp.view("view:verification", model, "Verification", "VerificationView")
+    package = exp.package("package:scenarios", verification, "Scenarios")
     for name, stated in scenarios.items():
         made = exp.element(f"scenario:{name}", package, "packagedElement", "Component", name=name)
         exp.annotate(f"scenario:{name}", made, {"scenario": stated or {}})

@@ -113,7 +113,7 @@ def test_empty_tags_and_expressions_are_noted_not_fatal():
         "it refers to 'gone', which does not exist",
         "it refers to 'nowhere', which does not exist",
         "a stereotype of a profile that is not read",
-        "`--processor board=NAME`",
+        "`import --processor board=NAME`",
     ):
         assert piece in notes, piece
     assert all(re.match(r"empty_tags\.uml:\d+: .*\([a-z]+\d*\): ", line) for line in said(imported))
