@@ -5,6 +5,7 @@ set to misbehave.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import radians
 from typing import Any, ClassVar
 
 from volery.base.time import MS, S
@@ -15,6 +16,7 @@ from volery.links.mavlink_messages import message_type
 ACCEPTED = 0
 INTERVAL, ASK, GET_HOME, RUN_CHECKS = 511, 512, 410, 401
 STREAMED = (
+    "ATTITUDE",
     "GLOBAL_POSITION_INT",
     "SYS_STATUS",
     "EXTENDED_SYS_STATE",
@@ -123,6 +125,9 @@ class Scripted:
         if self.craft.placed:
             latitude, longitude, altitude = self.home
             self.say("HOME_POSITION", latitude=latitude, longitude=longitude, altitude=altitude)
+
+    def _attitude(self) -> None:
+        self.say("ATTITUDE", roll=0.0, pitch=0.0, yaw=radians(self.craft.heading))
 
     def _gps_raw_int(self) -> None:
         self.say("GPS_RAW_INT", fix_type=3, satellites_visible=10)

@@ -20,6 +20,7 @@ from volery.base.time import Ns
 from volery.kernel.api import Action, Kernel
 from volery.links.link import Codec, Link, ReceiveStatistics
 from volery.links.mavlink_codec import MAVLINK
+from volery.vehicles.services import Services
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 
@@ -85,6 +86,8 @@ class Capability(Enum):
     GOTO = "go to a position"
     SPEED = "go at a stated speed"
     VELOCITY = "follow a velocity"
+    ACCELERATION = "follow an acceleration"
+    ATTITUDE = "follow an attitude"
     HEADING = "turn to a heading"
     RETURN_HOME = "return home"
     LAND = "land"
@@ -164,6 +167,29 @@ class ManualControl(NamedTuple):
     yaw: float = 0.0
 
 
+class AttitudeTarget(NamedTuple):
+    """An attitude to follow.
+
+    Roll (right positive) and pitch (nose up positive) are in degrees; thrust is in 0..1 and about 0.5 in
+    hover. The heading is in degrees clockwise from north; where it is NaN the vehicle turns at ``yaw_rate``,
+    degrees/s clockwise.
+    """
+
+    roll: float
+    pitch: float
+    thrust: float = 0.5
+    heading: float = nan
+    yaw_rate: float = 0.0
+
+
+class Acceleration(NamedTuple):
+    """Acceleration over ground, m/s²."""
+
+    north: float
+    east: float
+    up: float
+
+
 class Driver(Protocol):
     """Commands one autopilot. Each operation returns the steps to execute, in order.
 
@@ -193,6 +219,10 @@ class Driver(Protocol):
         rounds itself, so that their execution time is charged to it.
         """
 
+    @property
+    def services(self) -> Services | None:
+        """Services beside flying; ``None`` if the protocol or the link carries none."""
+
     def poll(self) -> None:
         """Process received messages without waiting."""
 
@@ -216,6 +246,12 @@ class Driver(Protocol):
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """Follow a velocity and *yaw_rate* (degrees/s, clockwise) for *lasting* or until another step."""
+
+    def acceleration(self, acceleration: Acceleration, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
+        """Follow an acceleration and *yaw_rate*, as ``velocity``."""
+
+    def attitude(self, target: AttitudeTarget, lasting: Ns) -> Sequence[Step]:
+        """Follow an attitude and thrust for *lasting* or until another step, then stop."""
 
     def heading(self, degrees: float) -> Sequence[Step]:
         """Turn to *degrees* clockwise from north."""

@@ -8,13 +8,15 @@ from volery.base.errors import OutOfBounds, Refused, UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S, from_seconds
-from volery.vehicles.driver import Capability, ManualControl
+from volery.vehicles.driver import Acceleration, AttitudeTarget, Capability, ManualControl
 from volery.vehicles.executor import NO_GOAL, RESTARTS, STREAM, TO_SAFETY, TRAVEL, TURN, Goal
 from volery.vehicles.limits import height_violation
 from volery.vehicles.telemetry import Velocity
 from volery.vehicles.vehicle import Vehicle, path_timeout, travel_timeout
 
 VELOCITY_LASTS_S = 3.0
+SETPOINT_LASTS_S = 1.0
+"""Duration of attitudes and accelerations, which a control loop sets several times a second."""
 SAFE_ACTION_WITHIN: Ns = 10 * S
 """Time for which an autopilot in a failsafe may hold before it lands or returns: 5 s by default in PX4."""
 RETURN_CLIMB = 30.0
@@ -56,12 +58,9 @@ class Drone(Vehicle):
             Refused: it flies already, or the autopilot refuses.
         """
         self._connect(Capability.TAKEOFF)
-        try:
-            asked = f"take off to {height:g} m"
-        except (TypeError, ValueError):
-            what = f"takeoff({height!r}): give metres above home, as in takeoff(10)"
-            raise UsageError(f"{self.name}: {what}") from None
-        if not isfinite(height) or height <= 0:
+        self._check_numbers(f"takeoff({height!r})", height, example="takeoff(10), in metres above home")
+        asked = f"take off to {height:g} m"
+        if height <= 0:
             raise UsageError(f"{self.name}: {asked}: give metres above home, above 0")
         telemetry = self._driver.telemetry
         if self.flying:
@@ -175,23 +174,99 @@ class Drone(Vehicle):
         """
         self._connect(Capability.VELOCITY)
         velocity = Velocity(north, east, up)
+        call = f"set_velocity({north!r}, {east!r}, {up!r}, {yaw_rate!r}, lasting={lasting!r})"
+        self._check_numbers(call, north, east, up, yaw_rate, lasting, example="set_velocity(north=2.0)")
+        self._check_lasting(call, lasting)
         asked = f"fly at {north:g} m/s north, {east:g} m/s east, {up:g} m/s up"
-        if not all(isfinite(part) for part in (*velocity, yaw_rate)):
-            raise UsageError(f"{self.name}: {asked}, {yaw_rate:g} degrees/s: not all of these are numbers")
-        if not (isfinite(lasting) and lasting > 0):
-            raise UsageError(f"{self.name}: {asked}, lasting {lasting:g} s; give seconds above 0")
         self._check_flying(asked)
-        try:
-            self._check_path(asked, self.position, self._position_after(velocity, lasting))
-        except OutOfBounds as error:
-            if self._monitor is None:
-                raise
-            # the velocity set before would go on over the bound
-            raise OutOfBounds(self.name, asked, f"{error.what}; {self._hold_back()}") from None
+        self._check_way(asked, velocity, lasting)
         self._operate(
             "set_velocity",
             asked,
             lambda: self._driver.velocity(velocity, yaw_rate, from_seconds(lasting)),
+            policy=STREAM,
+        )
+
+    def set_acceleration(
+        self,
+        north: float = 0.0,
+        east: float = 0.0,
+        up: float = 0.0,
+        yaw_rate: float = 0.0,
+        *,
+        lasting: float = SETPOINT_LASTS_S,
+    ) -> None:
+        """Accelerate and return as soon as the autopilot follows; then as ``set_velocity``.
+
+        Args:
+            north: acceleration to the north, m/s².
+            east: acceleration to the east, m/s².
+            up: acceleration upwards, m/s².
+            yaw_rate: turn rate, degrees/s, clockwise positive.
+            lasting: duration, s.
+
+        Raises:
+            OutOfBounds: it would leave limits or fence within *lasting* seconds.
+        """
+        self._connect(Capability.ACCELERATION)
+        call = f"set_acceleration({north!r}, {east!r}, {up!r}, {yaw_rate!r}, lasting={lasting!r})"
+        self._check_numbers(call, north, east, up, yaw_rate, lasting, example="set_acceleration(north=1.0)")
+        self._check_lasting(call, lasting)
+        asked = f"accelerate at {north:g} m/s² north, {east:g} m/s² east, {up:g} m/s² up"
+        self._check_flying(asked)
+        seen, half = self.velocity, 0.5 * lasting
+        mean = Velocity(seen.north + north * half, seen.east + east * half, seen.up + up * half)
+        self._check_way(asked, mean, lasting)
+        self._operate(
+            "set_acceleration",
+            asked,
+            lambda: self._driver.acceleration(Acceleration(north, east, up), yaw_rate, from_seconds(lasting)),
+            policy=STREAM,
+        )
+
+    def set_attitude(
+        self,
+        roll: float = 0.0,
+        pitch: float = 0.0,
+        heading: float | None = None,
+        *,
+        thrust: float = 0.5,
+        yaw_rate: float = 0.0,
+        lasting: float = SETPOINT_LASTS_S,
+    ) -> None:
+        """Fly at an attitude and return as soon as the autopilot follows; then as ``set_velocity``.
+
+        A thrust of 0.5 hovers. ArduPilot and DJI take thrust as a climb rate and keep the height at 0.5; PX4
+        takes it as collective thrust, which hovers at its ``MPC_THR_HOVER``.
+
+        Args:
+            roll: degrees, right positive.
+            pitch: degrees, nose up positive: a negative pitch flies forward.
+            heading: degrees clockwise from north; ``None`` turns at *yaw_rate*.
+            thrust: 0..1.
+            yaw_rate: turn rate, degrees/s, clockwise positive.
+            lasting: duration, s.
+
+        Raises:
+            UsageError: a value is out of range or not a number.
+        """
+        self._connect(Capability.ATTITUDE)
+        call = f"set_attitude({roll!r}, {pitch!r}, {heading!r}, thrust={thrust!r}, yaw_rate={yaw_rate!r})"
+        turn = nan if heading is None else heading
+        given = (roll, pitch, thrust, yaw_rate, 0.0 if heading is None else heading)
+        self._check_numbers(call, *given, lasting, example="set_attitude(pitch=-5, thrust=0.5)")
+        self._check_lasting(call, lasting)
+        if abs(roll) >= 90.0 or abs(pitch) >= 90.0:
+            raise UsageError(f"{self.name}: {call}: roll and pitch are degrees within -90 and 90")
+        if not 0.0 <= thrust <= 1.0:
+            raise UsageError(f"{self.name}: {call}: thrust goes from 0 to 1; 0.5 hovers")
+        asked = f"fly at a roll of {roll:g} and a pitch of {pitch:g} degrees"
+        self._check_flying(asked)
+        target = AttitudeTarget(roll, pitch, thrust, turn % 360.0, yaw_rate)
+        self._operate(
+            "set_attitude",
+            asked,
+            lambda: self._driver.attitude(target, from_seconds(lasting)),
             policy=STREAM,
         )
 
@@ -202,9 +277,8 @@ class Drone(Vehicle):
             degrees: heading, clockwise from north.
         """
         self._connect(Capability.HEADING)
+        self._check_numbers(f"set_heading({degrees!r})", degrees, example="set_heading(90)")
         asked = f"turn to {degrees:g} degrees"
-        if not isfinite(degrees):
-            raise UsageError(f"{self.name}: {asked}: not a number")
         self._check_flying(asked)
         self._operate("set_heading", asked, lambda: self._driver.heading(degrees % 360.0), policy=TURN)
 
@@ -259,6 +333,8 @@ class Drone(Vehicle):
             UsageError: a value is out of range or not a number.
         """
         self._connect(Capability.MANUAL_CONTROL)
+        call = f"manual_control({pitch!r}, {roll!r}, {throttle!r}, {yaw!r})"
+        self._check_numbers(call, pitch, roll, throttle, yaw, example="manual_control(0, 0, 0.5, 0)")
         control = ManualControl(pitch, roll, throttle, yaw)
         for name, value, low in zip(ManualControl._fields, control, (-1.0, -1.0, 0.0, -1.0), strict=True):
             if not low <= value <= 1.0:
@@ -360,6 +436,20 @@ class Drone(Vehicle):
             self._raise_bounds_error()
         if not self._driver.telemetry.flying:
             raise Refused(self.name, asked, "it is on the ground; takeoff(height) first")
+
+    def _check_lasting(self, call: str, lasting: float) -> None:
+        if lasting <= 0.0:
+            raise UsageError(f"{self.name}: {call}: lasting is in seconds, above 0")
+
+    def _check_way(self, asked: str, velocity: Velocity, lasting: float) -> None:
+        """Raise ``OutOfBounds`` if *lasting* seconds at *velocity* lead out of the bounds."""
+        try:
+            self._check_path(asked, self.position, self._position_after(velocity, lasting))
+        except OutOfBounds as error:
+            if self._monitor is None:
+                raise
+            # the set-point before would go on over the bound
+            raise OutOfBounds(self.name, asked, f"{error.what}; {self._hold_back()}") from None
 
     def _position_after(self, velocity: Velocity, seconds: float) -> Position:
         """Return the position after *seconds* at *velocity*; the ground stops a descent."""

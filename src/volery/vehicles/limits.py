@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import hypot, inf, isfinite, sqrt
-from typing import NamedTuple
+from numbers import Real
+from typing import NamedTuple, TypeGuard
 
 from shapely import LineString, Point, Polygon, get_parts, make_valid, prepare
 from shapely.geometry.base import BaseGeometry
@@ -72,6 +73,11 @@ class Limits:
     def reserve(self) -> float:
         """The battery reserve, stated or by default."""
         return DEFAULT_RESERVE if self.battery_reserve is None else self.battery_reserve
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Return whether *value* is a finite number, of Python or of numpy."""
+    return not isinstance(value, bool) and isinstance(value, Real) and isfinite(value)
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,13 @@ class Rover(Vehicle):
                 sent), or were violated on the way.
         """
         self._connect(Capability.GOTO)
-        latitude, longitude = (goal.latitude, goal.longitude) if isinstance(goal, Position) else goal
+        try:
+            latitude, longitude = (goal.latitude, goal.longitude) if isinstance(goal, Position) else goal
+        except (TypeError, ValueError):
+            raise UsageError(
+                f"{self.name}: drive({goal!r}): a goal is a Position or (latitude, longitude) in degrees, as "
+                "in drive((46.0826, -103.8995))"
+            ) from None
         there = Position(latitude, longitude, AboveHome(0.0))
         asked = f"drive to {latitude:.7f}, {longitude:.7f}"
         if speed is not None:
@@ -94,6 +100,8 @@ class Rover(Vehicle):
             UsageError: a value is out of range or not a number.
         """
         self._connect(Capability.MANUAL_CONTROL)
+        call = f"manual_control({steering!r}, {throttle!r})"
+        self._check_numbers(call, steering, throttle, example="manual_control(0.0, 0.5)")
         for name, value in (("steering", steering), ("throttle", throttle)):
             if not -1.0 <= value <= 1.0:
                 raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from -1 to 1")

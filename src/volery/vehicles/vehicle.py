@@ -19,12 +19,11 @@ Holding is skipped if another station has control; on the ground the vehicle is 
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import hypot, isfinite
-from numbers import Real
 
 from volery.base.errors import (
     CapabilityError,
@@ -72,7 +71,17 @@ from volery.vehicles.executor import (
     StepExecutor,
     distance_to,
 )
-from volery.vehicles.limits import Bounds, BoundsMonitor, Fence, Limits, Path, low_battery, states_amsl
+from volery.vehicles.limits import (
+    Bounds,
+    BoundsMonitor,
+    Fence,
+    Limits,
+    Path,
+    is_number,
+    low_battery,
+    states_amsl,
+)
+from volery.vehicles.serviced_vehicle import ServicedVehicle
 from volery.vehicles.telemetry import (
     REFRESHED_AFTER,
     Attitude,
@@ -132,7 +141,7 @@ def path_timeout(path: Path, speed: float | None) -> Ns:
     return travel_timeout(hypot(end[0] - start[0], end[1] - start[1]), end[2] - start[2], speed)
 
 
-class Vehicle(ABC):
+class Vehicle(ServicedVehicle):
     """A vehicle behind a driver. Use ``Drone`` or ``Rover``.
 
     Limits and fence are checked before anything is sent and at each position report while the vehicle
@@ -547,6 +556,9 @@ class Vehicle(ABC):
             return from_seconds(MARGIN_S)
         return path_timeout(bounds.path(here, goal), speed)
 
+    def _check_leg(self, asked: str, place: Position) -> None:
+        self._check_path(asked, self._amsl(place), place)
+
     def _check_altitude(self, goal: Position) -> None:
         if isinstance(goal.altitude, Ellipsoidal):
             raise CapabilityError(
@@ -568,7 +580,7 @@ class Vehicle(ABC):
             example: a valid call.
         """
         for number in numbers:
-            if isinstance(number, bool) or not isinstance(number, Real) or not isfinite(number):
+            if not is_number(number):
                 raise UsageError(
                     f"{self.name}: {call}: {number!r} is not a finite number; write it as in {example}"
                 )

@@ -24,6 +24,6 @@ def test_a_goal_is_a_position(drone: Drone, goal: object) -> None:
 
 @pytest.mark.parametrize("height", ["10", None, (10,)])
 def test_a_height_is_a_number(drone: Drone, height: object) -> None:
-    said = re.escape(f"takeoff({height!r}): give metres above home, as in takeoff(10)")
+    said = re.escape(f"takeoff({height!r}): {height!r} is not a finite number; write it as in takeoff(10)")
     with pytest.raises(UsageError, match=said):
         drone.takeoff(height)  # type: ignore[arg-type]

@@ -22,7 +22,7 @@ from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MINUTE, MS, Ns, S
 from volery.kernel.api import Action, Handle, Kernel
 from volery.vehicles.driver import ManualControl, Repeat, Step
-from volery.vehicles.telemetry import Telemetry, Velocity
+from volery.vehicles.telemetry import Telemetry
 
 DRONE_KIND, ROVER_KIND = "drone", "rover"
 """Values of ``Telemetry.kind``."""
@@ -339,13 +339,13 @@ class TargetMonitor:
 
 
 class SetpointRepeater(ABC):
-    """Repeats one velocity while the vehicle is in *mode*, and manual control while the mode is ours.
+    """Repeats one set-point while the vehicle is in *mode*, and manual control while the mode is ours.
 
     Args:
         kernel: clock.
         telemetry: telemetry of the vehicle.
-        mode: mode in which the vehicle follows velocities; in another one another station has control.
-        velocity_period: period of velocities, ns.
+        mode: mode in which the vehicle follows set-points; in another one another station has control.
+        velocity_period: period of set-points, ns.
         control_period: period of manual control, ns.
     """
 
@@ -354,7 +354,7 @@ class SetpointRepeater(ABC):
     ) -> None:
         self.held: ManualControl | None = None
         self.following = False
-        """Whether a velocity is repeated."""
+        """Whether a set-point is repeated."""
         self._kernel = kernel
         self._telemetry = telemetry
         self._mode = mode
@@ -363,10 +363,6 @@ class SetpointRepeater(ABC):
         self._control_handle: Handle | None = None
 
     # -- what differs between autopilots
-
-    @abstractmethod
-    def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
-        """Send a velocity (m/s) and a turn rate (degrees/s, clockwise) once."""
 
     @abstractmethod
     def send_stop(self) -> None:
@@ -386,8 +382,13 @@ class SetpointRepeater(ABC):
 
     # -- velocity
 
-    def follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
-        """Repeat a velocity for *lasting*, then a velocity of zero until the vehicle ``has_stopped``."""
+    def follow(self, send: Action, lasting: Ns) -> None:
+        """Repeat a set-point for *lasting*, then a velocity of zero until the vehicle ``has_stopped``.
+
+        Args:
+            send: sends the set-point once.
+            lasting: duration, ns.
+        """
         self.end_velocity()
         until = self._kernel.now() + lasting
 
@@ -395,7 +396,7 @@ class SetpointRepeater(ABC):
             if self._telemetry.mode != self._mode:
                 self.end_velocity()
             elif self._kernel.now() < until:
-                self.send_velocity(velocity, yaw_rate)
+                send()
             else:
                 self.send_stop()
                 if self.has_stopped():
@@ -405,7 +406,7 @@ class SetpointRepeater(ABC):
         self._velocity_handle = self._kernel.every(self._velocity_period, repeat)
 
     def end_velocity(self) -> None:
-        """Stop repeating a velocity."""
+        """Stop repeating a set-point."""
         if self._velocity_handle is not None:
             self._velocity_handle.cancel()
             self._velocity_handle = None

@@ -74,6 +74,10 @@ class FollowVelocity(Manoeuvre):
             )
         )
 
+    def reached(self) -> Vector:
+        """Return the commanded velocity now, north, east, down [m/s]."""
+        return self._after(to_seconds(self.vehicle.kernel.now() - self._given))
+
     def _after(self, seconds: float) -> Vector:
         """Return the velocity some seconds after the command."""
         north, east, down = self.velocity
@@ -220,9 +224,11 @@ class Guided(Manoeuvre):
         self._begin(FollowVelocity(self.vehicle, velocity, turn))
 
     def follow_acceleration(self, acceleration: Vector, turn: Turn = OWN_HEADING) -> None:
-        """Follow an acceleration north, east, down [m/s^2], from the present velocity."""
+        """Follow an acceleration north, east, down [m/s^2], from the present or the commanded velocity."""
         self.vehicle.commanded.yaw = None
-        self._begin(FollowVelocity(self.vehicle, self.vehicle.estimate.velocity, turn, acceleration))
+        before = self._doing
+        start = before.reached() if isinstance(before, FollowVelocity) else self.vehicle.estimate.velocity
+        self._begin(FollowVelocity(self.vehicle, start, turn, acceleration))
 
     def follow_attitude(self, attitude: Quaternion | None, yaw_rate: float | None, thrust: float) -> None:
         """Follow an attitude.

@@ -14,6 +14,7 @@ from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant
 from volery.ros.graph import Node
 from volery.ros.messages import new
+from volery.vehicles.driver import Acceleration, AttitudeTarget
 from volery.vehicles.drivers.ardupilot.modes import LINK_LOSS_PARAMETERS, NUMBERS, RESTING, mode_name
 from volery.vehicles.drivers.mavlink.backend import (
     INT_FRAMES,
@@ -23,6 +24,7 @@ from volery.vehicles.drivers.mavlink.backend import (
     VELOCITY_AND_YAW_RATE,
     Ack,
     Backend,
+    acceleration_fields,
 )
 from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
 from volery.vehicles.drivers.mavlink.decoder import Fields, TelemetryDecoder
@@ -41,6 +43,7 @@ ARDUPILOT_FIRMWARE = Firmware(
     called="an ArduPilot",
     oldest=(4, 0),  # the first version with requests of single messages
     estimator="EKF_STATUS_REPORT",
+    home_first=True,
 )
 
 
@@ -80,6 +83,12 @@ class ArduPilotBackend(Backend, Protocol):
 
     def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
         """Follow a velocity (m/s) and yaw rate (degrees/s, clockwise) in GUIDED for 3 s. Not acknowledged."""
+
+    def send_acceleration(self, acceleration: Acceleration, yaw_rate: float) -> None:
+        """Follow an acceleration and yaw rate (degrees/s, clockwise) in GUIDED for 3 s. Not acknowledged."""
+
+    def send_attitude(self, target: AttitudeTarget) -> None:
+        """Follow an attitude in GUIDED for 3 s; a thrust of 0.5 keeps the height. Not acknowledged."""
 
     def turn(self, degrees: float) -> None:
         """Turn to a heading in GUIDED."""
@@ -169,6 +178,10 @@ class ArduPilotMavlink(MavlinkClient):
             yaw_rate=radians(yaw_rate),
         )
 
+    def send_acceleration(self, acceleration: Acceleration, yaw_rate: float) -> None:
+        """Send SET_POSITION_TARGET_LOCAL_NED."""
+        self._send_to("SET_POSITION_TARGET_LOCAL_NED", **acceleration_fields(acceleration, yaw_rate))
+
     def turn(self, degrees: float) -> None:
         """Send CONDITION_YAW."""
         self._command("MAV_CMD_CONDITION_YAW", degrees, 0.0, SHORTEST_TURN, 0.0)
@@ -225,6 +238,10 @@ class ArduPilotMavros(MavrosBackend):
     def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
         """Publish on ``setpoint_raw/local``."""
         self._publish_velocity(velocity, VELOCITY_AND_YAW_RATE, yaw_rate=to_ros_yaw_rate(yaw_rate))
+
+    def send_acceleration(self, acceleration: Acceleration, yaw_rate: float) -> None:
+        """Publish on ``setpoint_raw/local``."""
+        self._publish_acceleration(acceleration, yaw_rate)
 
     def override_channels(self, channels: Sequence[int | None]) -> None:
         """Publish on ``rc/override``."""

@@ -14,8 +14,10 @@ from math import isfinite, isnan
 
 from volery.base.position import AboveHome, Position
 from volery.base.time import MS, Ns, S
-from volery.kernel.api import Kernel
+from volery.kernel.api import Action, Kernel
 from volery.vehicles.driver import (
+    Acceleration,
+    AttitudeTarget,
     ChangeSpeed,
     Land,
     ManualControl,
@@ -27,7 +29,7 @@ from volery.vehicles.driver import (
 )
 from volery.vehicles.drivers.ardupilot.backend import RELEASED, ArduPilotBackend
 from volery.vehicles.drivers.ardupilot.modes import GUIDED, RESTING, on_link_loss
-from volery.vehicles.drivers.mavlink.backend import GROUND_SPEED, UNCHANGED, Ack, Item, mission_item
+from volery.vehicles.drivers.mavlink.backend import GROUND_SPEED, UNCHANGED, Ack, mission_item
 from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
 from volery.vehicles.drivers.steps import (
     ANSWERED_WITHIN,
@@ -46,6 +48,7 @@ from volery.vehicles.drivers.steps import (
     mode_step,
     send_nothing,
 )
+from volery.vehicles.services import Item
 from volery.vehicles.telemetry import Velocity
 
 CONTROL_PERIOD: Ns = 200 * MS
@@ -58,7 +61,7 @@ STILL = Velocity(0.0, 0.0, 0.0)
 
 
 class ArduPilotSetpoints(SetpointRepeater):
-    """Repeats velocities in GUIDED, and manual control in GUIDED and in the mode commanded last.
+    """Repeats set-points in GUIDED, and manual control in GUIDED and in the mode commanded last.
 
     With a backend that has a cycle nothing is repeated here: the node's own loop does that.
     """
@@ -76,20 +79,16 @@ class ArduPilotSetpoints(SetpointRepeater):
 
     # -- velocity
 
-    def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
-        """Send a velocity and a turn rate once."""
-        self._backend.send_velocity(velocity, yaw_rate)
-
     def send_stop(self) -> None:
         """Send a velocity of zero once."""
         self._backend.send_velocity(STILL, 0.0)
 
-    def follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
-        """Repeat a velocity for *lasting*, then stop."""
+    def follow(self, send: Action, lasting: Ns) -> None:
+        """Repeat a set-point for *lasting*, then stop."""
         if self._backend.cycle is not None:
-            self._backend.send_velocity(velocity, yaw_rate)
+            send()
         else:
-            super().follow(velocity, yaw_rate, lasting)
+            super().follow(send, lasting)
 
     # -- manual control
 
@@ -235,7 +234,18 @@ class ArduPilot(MavlinkDriver):
 
     def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
         """Enter GUIDED and repeat a velocity for *lasting*, then stop."""
-        follow = immediate_step("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting))
+        return self._follow(lambda: self._backend.send_velocity(velocity, yaw_rate), lasting)
+
+    def acceleration(self, acceleration: Acceleration, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
+        """Enter GUIDED and repeat an acceleration for *lasting*, then stop."""
+        return self._follow(lambda: self._backend.send_acceleration(acceleration, yaw_rate), lasting)
+
+    def attitude(self, target: AttitudeTarget, lasting: Ns) -> Sequence[Step]:
+        """Enter GUIDED and repeat an attitude for *lasting*, then stop; thrust commands the climb rate."""
+        return self._follow(lambda: self._backend.send_attitude(target), lasting)
+
+    def _follow(self, send: Action, lasting: Ns) -> Sequence[Step]:
+        follow = immediate_step("fly on", lambda: self._setpoints.follow(send, lasting))
         return (*self._guided(), follow)
 
     def heading(self, degrees: float) -> Sequence[Step]:

@@ -16,7 +16,7 @@ from volery.base.position import Position
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import Action, Kernel
 from volery.ros.messages.dji_constants import GUIDES, HEADERS, HEALTHY_GPS, DisplayMode, Source
-from volery.vehicles.driver import Capability, ManualControl, Step
+from volery.vehicles.driver import Acceleration, AttitudeTarget, Capability, ManualControl, Step
 from volery.vehicles.drivers.dji.backend import QUIET, DjiBackend
 from volery.vehicles.drivers.dji.decoder import MOST_VOLTS, SETTLED, STALE, TAKEN_OVER_FOR
 from volery.vehicles.drivers.dji.missions import MissionRunner, above_home, check_amsl
@@ -30,6 +30,7 @@ from volery.vehicles.drivers.dji.setpoints import (
     Manual,
     Moving,
     Point,
+    Tilted,
     yaw_of,
 )
 from volery.vehicles.drivers.steps import (
@@ -47,13 +48,14 @@ from volery.vehicles.telemetry import Telemetry, Velocity
 LOW_THROTTLE = 0.3
 """Throttle below which an aircraft flown by thrust would fall."""
 
-CAPABILITIES = frozenset(Capability) - {Capability.TERRAIN}
+CAPABILITIES = frozenset(Capability) - {Capability.TERRAIN, Capability.ACCELERATION}
 _NONE: frozenset[Capability] = frozenset()
 
 
 class Dji:
     """Driver of a DJI aircraft. See ``vehicles.driver.Driver`` for the operations."""
 
+    services = None
     landing_modes = LANDING_MODES
     cycle: Action | None = None
 
@@ -84,7 +86,7 @@ class Dji:
 
     @property
     def capabilities(self) -> frozenset[Capability]:
-        """All capabilities but terrain; none before the first message."""
+        """All capabilities but terrain and acceleration; none before the first message."""
         return CAPABILITIES if self.telemetry.kind else _NONE
 
     def poll(self) -> None:
@@ -145,6 +147,16 @@ class Dji:
 
     def _stream_velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
         self._steps.follow(Moving(velocity, -radians(yaw_rate), self._kernel.now() + lasting))
+
+    def attitude(self, target: AttitudeTarget, lasting: Ns) -> Sequence[Step]:
+        """Stream tilt, climb rate and turn rate for *lasting*, then stop."""
+        until = self._kernel.now() + lasting
+        follow = immediate_step("fly on", lambda: self._steps.follow(Tilted(target, until)), enters=SDK)
+        return (*self._steps.leave_descent("follow an attitude"), self._steps.authority(), follow)
+
+    def acceleration(self, acceleration: Acceleration, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
+        """Raise ``CapabilityError``: the SDK takes positions, velocities and attitudes."""
+        raise CapabilityError(f"{self.name}: a DJI follows positions, velocities and attitudes only")
 
     def heading(self, degrees: float) -> Sequence[Step]:
         """Turn in place."""

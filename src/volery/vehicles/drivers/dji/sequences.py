@@ -15,7 +15,7 @@ from volery.vehicles.driver import Step
 from volery.vehicles.drivers.dji.backend import Ack, DjiBackend
 from volery.vehicles.drivers.dji.decoder import DESCENDING_MODES, TAKES_OFF
 from volery.vehicles.drivers.dji.node_interfaces import GO_HOME, LAND, TAKE_OFF
-from volery.vehicles.drivers.dji.setpoints import Manual, Moving, Point, yaw_of
+from volery.vehicles.drivers.dji.setpoints import Point, Target, yaw_of
 from volery.vehicles.drivers.steps import (
     ANSWERED_WITHIN,
     ARMED_WITHIN,
@@ -147,7 +147,7 @@ class DjiSteps:
 
     # -- set-points
 
-    def follow(self, target: Point | Moving | Manual) -> None:
+    def follow(self, target: Target) -> None:
         """Stream set-points for *target* from now on."""
         self.decoder.commanded = SDK
         self.stream.follow(target)

@@ -7,7 +7,7 @@ offset from an old position.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, isfinite, pi, radians
+from math import hypot, isfinite, isnan, pi, radians
 from typing import NamedTuple
 
 from volery.base.frames import LocalFrame, heading_to_yaw
@@ -20,7 +20,7 @@ from volery.ros.messages.dji_constants import (
     VELOCITY_YAW_RATE,
     DisplayMode,
 )
-from volery.vehicles.driver import ManualControl
+from volery.vehicles.driver import AttitudeTarget, ManualControl
 from volery.vehicles.drivers.dji.decoder import WAITS, DjiDecoder
 from volery.vehicles.telemetry import Telemetry, Velocity
 
@@ -65,13 +65,20 @@ class Moving(NamedTuple):
     until: Ns
 
 
+class Tilted(NamedTuple):
+    """An attitude until a time."""
+
+    attitude: AttitudeTarget
+    until: Ns
+
+
 class Manual(NamedTuple):
     """Manual control; with ``keeps_height`` the throttle commands a climb rate, else the thrust."""
 
     keeps_height: bool
 
 
-Target = Point | Moving | Manual
+Target = Point | Moving | Tilted | Manual
 
 
 class SetpointStream:
@@ -143,6 +150,8 @@ class SetpointStream:
             return self._towards(target)
         if isinstance(target, Moving):
             return self._along(target)
+        if isinstance(target, Tilted):
+            return self._tilted(target)
         return None if target is None else self._manual(target)
 
     def _towards(self, target: Point) -> Setpoint | None:
@@ -174,6 +183,19 @@ class SetpointStream:
             return None
         velocity, turn = (target.velocity, target.turn) if now < target.until else (STILL, 0.0)
         return VELOCITY_YAW_RATE, (velocity.east, velocity.north, velocity.up, turn)
+
+    def _tilted(self, target: Tilted) -> Setpoint | None:
+        """Return tilt, climb rate and turn rate; a heading is turned to, slower near it."""
+        now = self._kernel.now()
+        if now >= target.until:
+            return self._along(Moving(STILL, 0.0, target.until))
+        attitude = target.attitude
+        lean = (radians(attitude.roll), -radians(attitude.pitch))
+        rate = attitude.yaw_rate
+        if not isnan(attitude.heading):
+            rate = (attitude.heading - self._telemetry.attitude.heading + 180.0) % 360.0 - 180.0
+        turn = -min(STICK_YAW_RATE, max(-STICK_YAW_RATE, radians(rate)))
+        return ANGLE_YAW_RATE_CLIMB, (*lean, _climb(attitude.thrust), turn)
 
     def _manual(self, target: Manual) -> Setpoint | None:
         control = self.held

@@ -6,19 +6,27 @@ A driver reaches its autopilot through a backend: a MAVLink link, or MAVROS topi
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, Protocol
+from math import isfinite, isnan, radians
+from typing import Any, Protocol
 
 from volery.base.errors import CapabilityError, LinkError, UsageError
+from volery.base.frames import euler_to_quaternion
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.base.time import Ns
 from volery.kernel.api import Action
 from volery.links.mavlink_messages import constant
+from volery.vehicles.driver import Acceleration, AttitudeTarget
+from volery.vehicles.services import Item, Services
 from volery.vehicles.telemetry import Telemetry
 
 POSITION_ONLY = 0x0DF8
 VELOCITY_AND_YAW_RATE = 0x05C7
 VELOCITY_AND_YAW = 0x09C7
+ACCELERATION_AND_YAW_RATE = 0x043F
 """Type masks of SET_POSITION_TARGET_*: a bit that is set means ignore that field."""
+
+ATTITUDE_AND_HEADING, ATTITUDE_AND_YAW_RATE = 0b111, 0b011
+"""Type masks of SET_ATTITUDE_TARGET, likewise."""
 
 FORCE = 21196.0
 """Parameter 2 of COMPONENT_ARM_DISARM: skip the checks; disarm in the air, too."""
@@ -67,17 +75,6 @@ class Ack:
     START = "mission start"
 
 
-class Item(NamedTuple):
-    """A mission item as in MAVLink: latitude and longitude in degrees, ``z`` in metres of ``frame``."""
-
-    command: int
-    frame: int
-    parameters: tuple[float, float, float, float]
-    latitude: float
-    longitude: float
-    z: float
-
-
 def mission_item(
     command: str, *parameters: float, at: Position | None = None, z: float = 0.0, frame: int = ABOVE_HOME
 ) -> Item:
@@ -100,6 +97,34 @@ def mission_item(
     return Item(constant(command), at_frame, given, at.latitude, at.longitude, at.altitude.metres)
 
 
+def acceleration_fields(acceleration: Acceleration, yaw_rate: float) -> dict[str, Any]:
+    """Return an acceleration and yaw rate (degrees/s) as the fields of SET_POSITION_TARGET_LOCAL_NED."""
+    return {
+        "coordinate_frame": constant("MAV_FRAME_LOCAL_NED"),
+        "type_mask": ACCELERATION_AND_YAW_RATE,
+        "afx": acceleration.north,
+        "afy": acceleration.east,
+        "afz": -acceleration.up,
+        "yaw_rate": radians(yaw_rate),
+    }
+
+
+def attitude_fields(target: AttitudeTarget, seen: Telemetry) -> dict[str, Any]:
+    """Return an attitude as the fields of SET_ATTITUDE_TARGET.
+
+    Beside a yaw rate the quaternion has the present heading, because some firmware reads both.
+    """
+    turns = isnan(target.heading)
+    heading = seen.attitude.heading if turns else target.heading
+    heading = heading if isfinite(heading) else 0.0
+    return {
+        "type_mask": ATTITUDE_AND_YAW_RATE if turns else ATTITUDE_AND_HEADING,
+        "q": euler_to_quaternion(radians(target.roll), radians(target.pitch), radians(heading)),
+        "body_yaw_rate": radians(target.yaw_rate) if turns else 0.0,
+        "thrust": target.thrust,
+    }
+
+
 class Backend(Protocol):
     """Sends commands to a MAVLink autopilot. Acknowledgements arrive in ``telemetry.answers`` under ``Ack``.
 
@@ -119,6 +144,10 @@ class Backend(Protocol):
         Parameters that the firmware does not have are missing.
         """
 
+    @property
+    def services(self) -> Services | None:
+        """See ``Driver``."""
+
     def poll(self) -> None:
         """Process received messages without waiting."""
 
@@ -130,6 +159,9 @@ class Backend(Protocol):
 
     def set_speed(self, speed: float) -> None:
         """Set the speed over ground, m/s, for movements to a position; -1 means the autopilot's own."""
+
+    def send_attitude(self, target: AttitudeTarget) -> None:
+        """Send one attitude set-point. Not acknowledged."""
 
     def request_arming_checks(self) -> None:
         """Request the texts of the arming checks that fail now."""

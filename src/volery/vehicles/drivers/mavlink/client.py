@@ -17,9 +17,17 @@ from volery.links.link import Frame, Link
 from volery.links.mavlink_messages import constant, entry_name, from_bytewise, message_type
 from volery.trace.events import LinkState
 from volery.vehicles.address import rate_option, records_texts, system_option
-from volery.vehicles.driver import link_error
-from volery.vehicles.drivers.mavlink.backend import FORCE, GROUND_SPEED, UNCHANGED, Ack, Item
+from volery.vehicles.driver import AttitudeTarget, link_error
+from volery.vehicles.drivers.mavlink.backend import (
+    FORCE,
+    GROUND_SPEED,
+    UNCHANGED,
+    Ack,
+    attitude_fields,
+)
 from volery.vehicles.drivers.mavlink.decoder import TelemetryDecoder
+from volery.vehicles.drivers.mavlink.services import MavlinkServices, item_fields
+from volery.vehicles.services import Item
 from volery.vehicles.telemetry import Answer, Telemetry
 
 GCS_SYSTEM, GCS_COMPONENT = 255, 190
@@ -68,6 +76,7 @@ class Firmware(NamedTuple):
         called: name with its article.
         oldest: oldest supported version, major and minor.
         estimator: message with the state of its estimator.
+        home_first: item 0 of its missions is home.
         bytewise: whole parameter values lie in the bytes of the float (see ``from_bytewise``), as in PX4.
     """
 
@@ -77,6 +86,7 @@ class Firmware(NamedTuple):
     oldest: tuple[int, int]
     estimator: str
     bytewise: bool = False
+    home_first: bool = False
 
 
 class StreamRequests:
@@ -181,24 +191,7 @@ class MissionUpload:
         self._requested_at = now
         if not 0 <= number < len(self._items):
             return
-        item = self._items[number]
-        first, second, third, fourth = item.parameters
-        self._send_to(
-            "MISSION_ITEM_INT",
-            seq=number,
-            frame=item.frame,
-            command=item.command,
-            current=0,
-            autocontinue=1,
-            param1=first,
-            param2=second,
-            param3=third,
-            param4=fourth,
-            x=round(item.latitude * 1e7),
-            y=round(item.longitude * 1e7),
-            z=item.z,
-            mission_type=MISSION_TYPE,
-        )
+        self._send_to("MISSION_ITEM_INT", **item_fields(self._items[number], number, MISSION_TYPE))
 
 
 def stream_periods(firmware: Firmware, options: Mapping[str, str]) -> dict[str, Ns]:
@@ -208,7 +201,7 @@ def stream_periods(firmware: Firmware, options: Mapping[str, str]) -> dict[str, 
         firmware: firmware of the autopilot.
         options: ``rate`` of the position, ``attitude`` and ``rc`` channels in Hz (0 for none).
     """
-    attitude = rate_option("attitude", options, 0.0)
+    attitude = rate_option("attitude", options, 4.0)
     periods = {
         "GLOBAL_POSITION_INT": round(S / rate_option("rate", options, 10.0, least=0.1)),
         "EXTENDED_SYS_STATE": 500 * MS,
@@ -252,6 +245,14 @@ class MavlinkClient:
         self._other_autopilot = ""  # another autopilot that sends heartbeats on this link
         self._unsupported = ""  # why this one is not supported
         self._silent = False
+        self.services = MavlinkServices(
+            kernel,
+            self.telemetry,
+            self._send,
+            self._send_to,
+            bytewise=self.firmware.bytewise,
+            home_first=self.firmware.home_first,
+        )
         link.receive(self._receive)
         self._heartbeat = kernel.every(HEARTBEAT_PERIOD, self._tick)
 
@@ -289,6 +290,7 @@ class MavlinkClient:
             self._requests.begin((VERSION, *self._requested_parameters()))
             self._streams.check(now)
             self._requests.check(now)
+        self.services.receive(frame)
         if used or self._handle_answer(frame):
             self.telemetry.changed.notify()
 
@@ -436,6 +438,10 @@ class MavlinkClient:
     def set_speed(self, speed: float) -> None:
         """Send DO_CHANGE_SPEED."""
         self._command("MAV_CMD_DO_CHANGE_SPEED", GROUND_SPEED, speed, UNCHANGED)
+
+    def send_attitude(self, target: AttitudeTarget) -> None:
+        """Send SET_ATTITUDE_TARGET."""
+        self._send_to("SET_ATTITUDE_TARGET", **attitude_fields(target, self.telemetry))
 
     def request_arming_checks(self) -> None:
         """Send RUN_PREARM_CHECKS; the reasons arrive as texts."""

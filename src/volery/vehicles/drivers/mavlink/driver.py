@@ -15,7 +15,7 @@ from volery.links.link import Link
 from volery.ros.graph import Node
 from volery.vehicles.address import MAVLINK_OPTIONS, check_options
 from volery.vehicles.driver import Capability, MissionItem, Repeat, Step
-from volery.vehicles.drivers.mavlink.backend import Ack, Backend, Item
+from volery.vehicles.drivers.mavlink.backend import Ack, Backend
 from volery.vehicles.drivers.mavlink.mavros_backend import namespace_and_geoid
 from volery.vehicles.drivers.steps import (
     ANSWERED_WITHIN,
@@ -29,6 +29,7 @@ from volery.vehicles.drivers.steps import (
     ready_step,
     send_nothing,
 )
+from volery.vehicles.services import Item
 from volery.vehicles.telemetry import Telemetry
 
 ARMING_CHECKS_PERIOD: Ns = 5 * S
@@ -48,6 +49,8 @@ ROVER_CAPABILITIES = frozenset(
 DRONE_CAPABILITIES = ROVER_CAPABILITIES | {
     Capability.TAKEOFF,
     Capability.VELOCITY,
+    Capability.ACCELERATION,
+    Capability.ATTITUDE,
     Capability.HEADING,
     Capability.LAND,
     Capability.STABILIZE,
@@ -112,6 +115,7 @@ class MavlinkDriver:
         self.cycle: Action | None = backend.cycle
         self.poll = backend.poll
         self.problem = backend.problem
+        self.services = backend.services
         self._kernel = kernel
         self._backend = backend
         self._takeover = Takeover(kernel, backend.telemetry, self.obeys)

@@ -12,21 +12,23 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from math import nan, radians
+from math import degrees, nan, radians
 from typing import Any, NamedTuple
 
 from volery.base.errors import LinkError, LinkSilent
-from volery.base.frames import enu_to_ned, ned_to_enu
+from volery.base.frames import attitude_ned_to_enu, enu_to_ned, ned_to_enu
 from volery.base.geoid import EGM96, EGM96_NAME, Geoid, parse_geoid
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.links.mavlink_messages import constant, entry_name
-from volery.ros.graph import Node, ServiceError
+from volery.ros.graph import Node, Publisher, ServiceError
 from volery.ros.graph.interface import Work
 from volery.ros.messages import message_class, new, request
 from volery.vehicles.address import check_options
+from volery.vehicles.driver import Acceleration, AttitudeTarget
 from volery.vehicles.drivers.mavlink.backend import (
+    ACCELERATION_AND_YAW_RATE,
     ACTIVE,
     FAILSAFE,
     FORCE,
@@ -35,9 +37,10 @@ from volery.vehicles.drivers.mavlink.backend import (
     UNCHANGED,
     UNDEFINED,
     Ack,
-    Item,
+    attitude_fields,
 )
 from volery.vehicles.drivers.steps import ROVER_KIND
+from volery.vehicles.services import Item
 from volery.vehicles.telemetry import Answer, Battery, StatusText, Telemetry, Velocity
 
 PERIOD: Ns = 100 * MS
@@ -187,6 +190,7 @@ class MavrosBackend:
     """
 
     firmware: FirmwareBehind
+    services = None
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         self.telemetry = Telemetry(kernel, name)
@@ -207,6 +211,7 @@ class MavrosBackend:
         self._takeoff = node.client(self._name("cmd/takeoff"), "mavros_msgs/srv/CommandTOL")
         self._long = node.client(self._name("cmd/command"), "mavros_msgs/srv/CommandLong")
         self._push = node.client(self._name("mission/push"), "mavros_msgs/srv/WaypointPush")
+        self._attitude: Publisher | None = None
         self._rate = node.rate(PERIOD)
 
     def _name(self, name: str) -> str:
@@ -323,6 +328,36 @@ class MavrosBackend:
         vector = message_class("geometry_msgs/msg/Vector3")
         message.velocity = vector(*ned_to_enu((velocity.north, velocity.east, -velocity.up)))
         self._velocity.publish(message)
+
+    def _publish_acceleration(self, acceleration: Acceleration, yaw_rate: float) -> None:
+        """Publish an acceleration and yaw rate (degrees/s, clockwise) on ``setpoint_raw/local``."""
+        north, east, up = acceleration
+        vector = message_class("geometry_msgs/msg/Vector3")
+        message = new(
+            "mavros_msgs/msg/PositionTarget",
+            coordinate_frame=constant("MAV_FRAME_LOCAL_NED"),
+            type_mask=ACCELERATION_AND_YAW_RATE,
+            acceleration_or_force=vector(*ned_to_enu((north, east, -up))),
+            yaw_rate=to_ros_yaw_rate(yaw_rate),
+        )
+        self._velocity.publish(message)
+
+    def send_attitude(self, target: AttitudeTarget) -> None:
+        """Publish on ``setpoint_raw/attitude``, which is advertised at the first call."""
+        if self._attitude is None:
+            name = self._name("setpoint_raw/attitude")
+            self._attitude = self._node.advertise(name, "mavros_msgs/msg/AttitudeTarget")
+        fields = attitude_fields(target, self.telemetry)
+        w, x, y, z = attitude_ned_to_enu(fields["q"])
+        rate = to_ros_yaw_rate(degrees(fields["body_yaw_rate"]))
+        message = new(
+            "mavros_msgs/msg/AttitudeTarget",
+            type_mask=fields["type_mask"],
+            orientation=message_class("geometry_msgs/msg/Quaternion")(x=x, y=y, z=z, w=w),
+            body_rate=message_class("geometry_msgs/msg/Vector3")(0.0, 0.0, rate),
+            thrust=target.thrust,
+        )
+        self._attitude.publish(message)
 
 
 def to_ros_yaw_rate(degrees: float) -> float:

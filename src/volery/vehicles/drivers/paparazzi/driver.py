@@ -20,7 +20,7 @@ from volery.base.errors import CapabilityError, NotArrived, Refused
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.vehicles.driver import Capability, MissionItem, Step
+from volery.vehicles.driver import Acceleration, AttitudeTarget, Capability, MissionItem, Step
 from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
 from volery.vehicles.drivers.paparazzi.decoder import ATTITUDE_MODE, FAILSAFE, GUIDED, HEIGHT_MODE
 from volery.vehicles.drivers.paparazzi.sequences import PaparazziSteps
@@ -62,6 +62,7 @@ class Paparazzi:
     Raises ``UsageError`` if the aircraft's flight plan does not have *blocks*.
     """
 
+    services = None
     landing_modes = frozenset({FAILSAFE})
     cycle: Action | None = None
 
@@ -157,8 +158,18 @@ class Paparazzi:
         """Enter GUIDED and repeat a velocity for *lasting*, then stop."""
         self._steps.check_position("follow a velocity")
         self._steps.yaw = None
-        follow = immediate_step("fly on", lambda: self._setpoints.follow(velocity, yaw_rate, lasting))
+        follow = immediate_step(
+            "fly on", lambda: self._setpoints.follow_velocity(velocity, yaw_rate, lasting)
+        )
         return (*self._steps.guided(), follow)
+
+    def acceleration(self, acceleration: Acceleration, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
+        """Raise ``CapabilityError``: GUIDED takes positions and velocities only."""
+        raise CapabilityError(f"{self.name}: a Paparazzi in GUIDED follows positions and velocities only")
+
+    def attitude(self, target: AttitudeTarget, lasting: Ns) -> Sequence[Step]:
+        """Raise ``CapabilityError``: GUIDED takes positions and velocities only."""
+        raise CapabilityError(f"{self.name}: a Paparazzi in GUIDED follows positions and velocities only")
 
     def heading(self, degrees: float) -> Sequence[Step]:
         """Turn in place in GUIDED."""

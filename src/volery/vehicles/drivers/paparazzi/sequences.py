@@ -51,11 +51,11 @@ class PaparazziSetpoints(SetpointRepeater):
         self._speed = 0.0  # commanded last, m/s
         self._headings: list[float] = []  # degrees, at each velocity of zero at the end of a velocity
 
-    def follow(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
+    def follow_velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> None:
         """Repeat a velocity for *lasting*, then a velocity of zero until the vehicle is seen to stand."""
         self._speed = hypot(*velocity)
         self._headings = []
-        super().follow(velocity, yaw_rate, lasting)
+        self.follow(lambda: self.send_velocity(velocity, yaw_rate), lasting)
 
     def has_stopped(self) -> bool:
         """Return whether a fresh position shows that it has stopped, and turns no more.

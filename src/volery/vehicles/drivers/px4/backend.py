@@ -20,13 +20,14 @@ from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant
 from volery.ros.graph import Node
 from volery.ros.messages import new, request
-from volery.vehicles.driver import ManualControl
+from volery.vehicles.driver import Acceleration, AttitudeTarget, ManualControl
 from volery.vehicles.drivers.mavlink.backend import (
     INT_FRAMES,
     VELOCITY_AND_YAW,
     VELOCITY_AND_YAW_RATE,
     Ack,
     Backend,
+    acceleration_fields,
 )
 from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
 from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend, to_ros_yaw_rate
@@ -53,11 +54,15 @@ _NO_SPEED = -1.0
 
 
 class Setpoint(NamedTuple):
-    """A set-point of OFFBOARD: velocity, and heading in degrees or, where NaN, yaw rate in degrees/s."""
+    """A set-point of OFFBOARD: velocity, and heading in degrees or, where NaN, yaw rate in degrees/s.
+
+    An acceleration, where given, takes the place of the velocity.
+    """
 
     velocity: Velocity
     yaw_rate: float = 0.0
     heading: float = nan
+    acceleration: Acceleration | None = None
 
 
 def reposition_fields(goal: Position) -> dict[str, Any]:
@@ -98,7 +103,7 @@ class PX4Backend(Backend, Protocol):
     def reposition(self, goal: Position) -> None:
         """Enter AUTO.LOITER and go to *goal*, whose altitude is AMSL."""
 
-    def send_setpoint(self, setpoint: Setpoint) -> None:
+    def send_setpoint(self, setpoint: Setpoint | AttitudeTarget) -> None:
         """Send one set-point of the stream that OFFBOARD needs."""
 
     def send_manual_control(self, control: ManualControl) -> None:
@@ -156,8 +161,15 @@ class PX4Mavlink(MavlinkClient):
         """Send DO_REPOSITION."""
         self._send_to("COMMAND_INT", **reposition_fields(goal))
 
-    def send_setpoint(self, setpoint: Setpoint) -> None:
-        """Send SET_POSITION_TARGET_LOCAL_NED in frame 1; PX4 accepts only 1 and 8."""
+    def send_setpoint(self, setpoint: Setpoint | AttitudeTarget) -> None:
+        """Send SET_ATTITUDE_TARGET, or SET_POSITION_TARGET_LOCAL_NED in frame 1; PX4 accepts only 1 and 8."""
+        if isinstance(setpoint, AttitudeTarget):
+            self.send_attitude(setpoint)
+            return
+        if setpoint.acceleration is not None:
+            fields = acceleration_fields(setpoint.acceleration, setpoint.yaw_rate)
+            self._send_to("SET_POSITION_TARGET_LOCAL_NED", **fields)
+            return
         turning = isnan(setpoint.heading)
         north, east, up = setpoint.velocity
         self._send_to(
@@ -212,9 +224,13 @@ class PX4Mavros(MavrosBackend):
         asked = request("mavros_msgs/srv/CommandInt", **reposition_fields(goal))
         self._call(self._command_int, asked)
 
-    def send_setpoint(self, setpoint: Setpoint) -> None:
-        """Publish on ``setpoint_raw/local``."""
-        if isnan(setpoint.heading):
+    def send_setpoint(self, setpoint: Setpoint | AttitudeTarget) -> None:
+        """Publish on ``setpoint_raw/attitude`` or ``setpoint_raw/local``."""
+        if isinstance(setpoint, AttitudeTarget):
+            self.send_attitude(setpoint)
+        elif setpoint.acceleration is not None:
+            self._publish_acceleration(setpoint.acceleration, setpoint.yaw_rate)
+        elif isnan(setpoint.heading):
             yaw_rate = to_ros_yaw_rate(setpoint.yaw_rate)
             self._publish_velocity(setpoint.velocity, VELOCITY_AND_YAW_RATE, yaw_rate=yaw_rate)
         else:

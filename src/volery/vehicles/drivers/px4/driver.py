@@ -29,6 +29,8 @@ from volery.base.time import MINUTE, MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant
 from volery.vehicles.driver import (
+    Acceleration,
+    AttitudeTarget,
     ChangeSpeed,
     Land,
     ManualControl,
@@ -44,7 +46,6 @@ from volery.vehicles.drivers.mavlink.backend import (
     OWN_SPEED,
     UNCHANGED,
     Ack,
-    Item,
     mission_item,
 )
 from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
@@ -68,6 +69,7 @@ from volery.vehicles.drivers.steps import (
     mode_step,
     send_nothing,
 )
+from volery.vehicles.services import Item
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 TAKEOFF_SHORT_M = 1.5
@@ -256,6 +258,14 @@ class PX4(MavlinkDriver):
         """Stream a velocity in OFFBOARD for *lasting*, then enter AUTO.LOITER."""
         return self._streamed(Setpoint(velocity, yaw_rate), lasting)
 
+    def acceleration(self, acceleration: Acceleration, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
+        """Stream an acceleration in OFFBOARD for *lasting*, then enter AUTO.LOITER."""
+        return self._streamed(STILL._replace(acceleration=acceleration, yaw_rate=yaw_rate), lasting)
+
+    def attitude(self, target: AttitudeTarget, lasting: Ns) -> Sequence[Step]:
+        """Stream an attitude and thrust in OFFBOARD for *lasting*, then enter AUTO.LOITER."""
+        return self._streamed(target, lasting)
+
     def heading(self, degrees: float) -> Sequence[Step]:
         """Turn in place in OFFBOARD, then enter AUTO.LOITER, which keeps the heading."""
         turn = Step(
@@ -269,7 +279,7 @@ class PX4(MavlinkDriver):
         )
         return (*self._streamed(STILL._replace(heading=degrees), None), turn, self._change_mode(HOLD))
 
-    def _streamed(self, setpoint: Setpoint, lasting: Ns | None) -> Sequence[Step]:
+    def _streamed(self, setpoint: Setpoint | AttitudeTarget, lasting: Ns | None) -> Sequence[Step]:
         """Start the stream, without which PX4 does not enter OFFBOARD; leave a failsafe by way of Hold."""
         seen = self.telemetry
         in_failsafe = seen.failsafe and seen.mode not in {HOLD, OFFBOARD}
@@ -417,7 +427,9 @@ class PX4(MavlinkDriver):
     # -- common steps
 
     def _change_mode(self, mode: str) -> Step:
-        return mode_step(self.telemetry, mode, Ack.MODE, self._note_commanded, self._backend.set_mode)
+        step = mode_step(self.telemetry, mode, Ack.MODE, self._note_commanded, self._backend.set_mode)
+        # a stream that ends enters AUTO.LOITER; on a bad link this shows only after the next command
+        return replace(step, leads_to=(HOLD,)) if self._offboard.leaving else step
 
     def _note_commanded(self, mode: str) -> None:
         self._manual.note_commanded(mode)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Handle, Kernel
-from volery.vehicles.driver import ManualControl
+from volery.vehicles.driver import AttitudeTarget, ManualControl
 from volery.vehicles.drivers.mavlink.backend import Ack
 from volery.vehicles.drivers.px4.backend import PX4Backend, Setpoint
 from volery.vehicles.drivers.px4.modes import HOLD, MANUAL_MODES, OFFBOARD
@@ -46,7 +46,7 @@ class OffboardStream:
         self._backend = backend
         self._takeover = takeover
         self._telemetry = backend.telemetry
-        self._setpoint = STILL
+        self._setpoint: Setpoint | AttitudeTarget = STILL
         self._until: Ns | None = None
         self._began: Ns = 0
         self._commanded_at: Ns | None = None  # when OFFBOARD was commanded
@@ -68,6 +68,11 @@ class OffboardStream:
         entered = self._streaming and self._entered and not self._leaving
         return entered and self._telemetry.mode == OFFBOARD
 
+    @property
+    def leaving(self) -> bool:
+        """Whether the stream is ending, so that AUTO.LOITER is our own."""
+        return self._streaming and self._leaving
+
     def entered(self) -> bool:
         """Return whether OFFBOARD was entered by our command.
 
@@ -86,7 +91,7 @@ class OffboardStream:
         """Note that OFFBOARD is being commanded."""
         self._commanded_at = self._kernel.now()
 
-    def begin(self, setpoint: Setpoint, lasting: Ns | None = None) -> None:
+    def begin(self, setpoint: Setpoint | AttitudeTarget, lasting: Ns | None = None) -> None:
         """Stream *setpoint*; after *lasting* enter AUTO.LOITER."""
         now = self._kernel.now()
         self._setpoint = setpoint

@@ -8,6 +8,7 @@ import pytest
 
 from rigs.airstrip import FRAME, Airstrip, at
 from volery.base.errors import Failsafe, LinkLost, Overridden, Refused
+from volery.base.position import Position
 from volery.base.time import MS, S
 from volery.kernel.waiting import sleep
 from volery.links.wire_faults import WireFaults
@@ -318,11 +319,56 @@ def test_a_home_that_was_just_moved_is_where_it_returns_to() -> None:
         drone.takeoff(5)
         amsl = drone.home.altitude.metres
         place = {"x": round(moved.latitude * 1e7), "y": round(moved.longitude * 1e7), "z": amsl}
-        old = drone.home
+        old, commander = drone.home, field.autopilot.vehicle.firmware_state
+        checked = commander.return_to
         field.station_sends("COMMAND_INT", 0.1, command=179, frame=0, **place)
         drone.telemetry.changed.wait_for(lambda: drone.home != old, 5 * S)
+        commander.return_to, commander._return_checked = checked, field.kernel.now()  # just before the move
         drone.return_home()
 
     field.fly(flight)
     landed = field.vehicle.position
     assert abs(landed.latitude - moved.latitude) * 111_200.0 < 2.0
+
+
+def test_what_has_returned_has_settled() -> None:
+    """The recorded one swings 16 degrees past a heading and 1.5 m past a goal, and comes back slowly."""
+    field = Field()
+    off: list[float] = []
+    strayed: list[float] = []
+    waited: list[float] = []
+
+    def flight(drone: Drone) -> None:
+        drone.takeoff(10)
+        goal = at(0, 50)
+        passed: list[float] = []
+
+        def look() -> None:
+            if not passed and away(drone, goal) < 1.0:
+                passed.append(drone.kernel.now() / S)
+
+        watch = drone.kernel.every(100 * MS, look)
+        drone.goto(goal)
+        watch.cancel()
+        waited.append(drone.kernel.now() / S - passed[0])
+        for _ in range(50):
+            sleep(drone.kernel, 100 * MS)
+            strayed.append(away(drone, goal))
+        for heading in (270.0, 45.0, 200.0):
+            drone.set_heading(heading)
+            for _ in range(20):
+                sleep(drone.kernel, 100 * MS)
+                off.append(abs((drone.attitude.heading - heading + 180.0) % 360.0 - 180.0))
+        drone.land()
+
+    def away(drone: Drone, goal: Position) -> float:
+        here = drone.telemetry.position
+        assert here is not None
+        east, north, _ = FRAME.to_enu(here.latitude, here.longitude, 0.0)
+        to_east, to_north, _ = FRAME.to_enu(goal.latitude, goal.longitude, 0.0)
+        return hypot(east - to_east, north - to_north)
+
+    field.fly(flight)
+    assert max(strayed) < 0.8
+    assert max(off) < 4.0
+    assert waited[0] < 11.0

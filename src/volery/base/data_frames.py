@@ -1,0 +1,27 @@
+"""Tables as pandas data frames: pandas is optional, and imported only when one is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from typing import Any
+
+from volery.base.errors import UsageError
+
+
+def to_frame(columns: Mapping[str, Sequence[Any]], index: str) -> Any:
+    """Return a ``pandas.DataFrame``.
+
+    Args:
+        columns: Columns of the same length, by name.
+        index: Name of the column that is the index.
+
+    Raises:
+        UsageError: pandas is not installed.
+    """
+    try:
+        pandas = import_module("pandas")
+    except ModuleNotFoundError:
+        raise UsageError("a data frame needs pandas: pip install pandas") from None
+    frame = pandas.DataFrame(columns)
+    return frame.set_index(index) if index in frame else frame

@@ -1,0 +1,433 @@
+"""MAVLink's microservices as a client: parameters, plans, logs, commands and corrections.
+
+Each request is sent again until its answer arrives, as the protocols ask: messages are lost on radios. The
+calls block the calling task; several tasks may ask at once, because an answer is recognised by its content.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import isclose
+from typing import Any, TypeVar
+
+from volery.base.errors import CapabilityError, NotArrived, Refused, did_you_mean
+from volery.base.time import MS, Ns, S
+from volery.kernel.api import Action, Kernel
+from volery.kernel.waiting import Lock, Signal
+from volery.links.link import Frame
+from volery.links.mavlink_messages import constant, entry_name, from_bytewise, to_bytewise
+from volery.vehicles.services import Item, LogEntry, Parameter
+from volery.vehicles.telemetry import Telemetry
+
+TRIES = 5
+AGAIN: Ns = 1500 * MS
+"""Time after which a request is sent again: a parameter is read in 0.1 s, a radio delays by a second."""
+ANSWERED_WITHIN: Ns = 10 * S
+STALLED: Ns = S
+"""Time without a further parameter or piece of a log after which the missing ones are requested."""
+MISSING_AT_ONCE = 20
+"""Number of missing parameters that are requested together."""
+
+CORRECTION_PART, CORRECTION_PARTS = 180, 4
+"""Bytes in one GPS_RTCM_DATA, and the greatest number of parts of one RTCM message."""
+LOG_PART = 90
+"""Bytes in one LOG_DATA."""
+
+_ACCEPTED = constant("MAV_RESULT_ACCEPTED")
+_IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
+_UNSUPPORTED = constant("MAV_RESULT_UNSUPPORTED")
+_REAL32, _REAL64 = constant("MAV_PARAM_TYPE_REAL32"), constant("MAV_PARAM_TYPE_REAL64")
+
+T = TypeVar("T")
+Send = Callable[..., None]
+
+
+class MavlinkServices:
+    """``Services`` of one autopilot on a MAVLink link.
+
+    Args:
+        kernel: clock and tasks.
+        telemetry: telemetry of the vehicle.
+        send: sends a message without a target.
+        send_to: sends a message, given its name and its fields without the target.
+        bytewise: whether whole parameters lie in the bytes of the float, as in PX4.
+        home_first: whether item 0 of a mission is home, as in ArduPilot.
+    """
+
+    def __init__(
+        self,
+        kernel: Kernel,
+        telemetry: Telemetry,
+        send: Send,
+        send_to: Send,
+        *,
+        bytewise: bool,
+        home_first: bool,
+    ) -> None:
+        self.home_first = home_first
+        self._kernel = kernel
+        self._telemetry = telemetry
+        self._name = telemetry.name
+        self._send, self._send_to = send, send_to
+        self._bytewise = bytewise
+        self._listeners: list[Callable[[Frame], None]] = []
+        self._arrived = Signal(kernel, f"an answer of {telemetry.name}")
+        self._plan_lock = Lock(kernel, f"plan of {telemetry.name}")
+        self._known: dict[str, Parameter] = {}
+        self._correction = 0
+
+    def receive(self, frame: Frame) -> None:
+        """Pass a frame of the autopilot to the requests in progress."""
+        if self._listeners:
+            for listener in tuple(self._listeners):
+                listener(frame)
+            self._arrived.notify()
+
+    # -- requests
+
+    def _ask(
+        self,
+        asked: str,
+        send: Action,
+        answer: Callable[[Frame], T | None],
+        *,
+        within: Ns = AGAIN * TRIES,
+        again: Ns = AGAIN,
+        unanswered: str = "",
+    ) -> T:
+        """Send a request, again each *again* ns, until *answer* returns something; return that."""
+        found: list[T] = []
+        failed: list[Exception] = []
+
+        def listen(frame: Frame) -> None:
+            if found or failed:
+                return
+            try:
+                taken = answer(frame)
+            except (CapabilityError, Refused) as error:
+                failed.append(error)
+                return
+            if taken is not None:
+                found.append(taken)
+
+        with self._kernel.joined(), _Listening(self._kernel, self._listeners, listen):
+            until = self._kernel.now() + within
+            while self._kernel.now() < until:
+                with self._kernel:
+                    send()
+                wait = min(again, until - self._kernel.now())
+                if self._arrived.wait_for(lambda: found or failed, wait, ends_activation=True):
+                    if failed:
+                        raise failed[0]
+                    return found[0]
+        raise NotArrived(self._name, asked, f"no answer within {within / S:g} s{unanswered}")
+
+    def command(self, asked: str, command: str, *parameters: float, within: Ns = 0) -> None:
+        """See ``Services``."""
+        number = constant(command)
+        named = {f"param{place}": float(value) for place, value in enumerate(parameters, 1)}
+        began = self._kernel.now()
+
+        def acknowledged(frame: Frame) -> bool | None:
+            if frame.name != "COMMAND_ACK" or frame.fields["command"] != number:
+                return None
+            result = frame.fields["result"]
+            if result == _IN_PROGRESS:
+                return None
+            if result == _UNSUPPORTED:
+                raise CapabilityError(f"{self._name}: {asked}: the autopilot does not support {command}")
+            if result != _ACCEPTED:
+                said = self._telemetry.texts_since(began)
+                why = f"; it said {said[-1]!r}" if said else ""
+                raise Refused(self._name, asked, f"{entry_name('MAV_RESULT', result)} to {command}{why}")
+            return True
+
+        def send() -> None:
+            self._send_to("COMMAND_LONG", command=number, **named)
+
+        self._ask(asked, send, acknowledged, within=within or ANSWERED_WITHIN, again=2 * S)
+
+    # -- parameters
+
+    def _parameter(self, frame: Frame) -> Parameter | None:
+        if frame.name != "PARAM_VALUE":
+            return None
+        fields = frame.fields
+        value = fields["param_value"]
+        if self._bytewise:
+            value = from_bytewise(fields["param_type"], value)
+        found = Parameter(fields["param_id"], float(value), fields["param_type"])
+        self._known[found.name] = found
+        return found
+
+    def read_parameter(self, name: str) -> Parameter:
+        """See ``Services``."""
+
+        def answer(frame: Frame) -> Parameter | None:
+            found = self._parameter(frame)
+            return found if found is not None and found.name == name else None
+
+        hint = did_you_mean(name, self._known) if name not in self._known else ""
+        return self._ask(
+            f"read the parameter {name}",
+            lambda: self._send_to("PARAM_REQUEST_READ", param_id=name, param_index=-1),
+            answer,
+            unanswered=f": an autopilot does not answer for a parameter that it does not have{hint}",
+        )
+
+    def write_parameter(self, name: str, value: float) -> Parameter:
+        """See ``Services``."""
+        before = self.read_parameter(name)
+        asked = f"set the parameter {name} to {value:g}"
+        if before.type not in (_REAL32, _REAL64) and value != round(value):
+            raise Refused(self._name, asked, "it takes whole numbers only")
+        sent = to_bytewise(before.type, value) if self._bytewise else value
+
+        def answer(frame: Frame) -> Parameter | None:
+            found = self._parameter(frame)
+            return found if found is not None and found.name == name else None
+
+        after = self._ask(
+            asked,
+            lambda: self._send_to("PARAM_SET", param_id=name, param_value=sent, param_type=before.type),
+            answer,
+        )
+        if not isclose(after.value, value, rel_tol=1e-6, abs_tol=1e-6):
+            raise Refused(self._name, asked, f"the autopilot keeps {after.value:g}")
+        return after
+
+    def read_parameters(self) -> dict[str, Parameter]:
+        """See ``Services``."""
+        by_index: dict[int, Parameter] = {}
+        counts = [0]
+
+        def listen(frame: Frame) -> None:
+            found = self._parameter(frame)
+            if found is not None:
+                counts[0] = max(counts[0], frame.fields["param_count"])
+                if frame.fields["param_index"] < frame.fields["param_count"]:
+                    by_index[frame.fields["param_index"]] = found
+
+        with self._kernel.joined(), _Listening(self._kernel, self._listeners, listen):
+            stalled = 0
+            with self._kernel:
+                self._send_to("PARAM_REQUEST_LIST")
+            while not counts[0] or len(by_index) < counts[0]:
+                before = len(by_index)
+                self._arrived.wait_for(lambda: 0 < counts[0] <= len(by_index), STALLED, ends_activation=True)
+                if len(by_index) > before:
+                    stalled = 0
+                    continue
+                stalled += 1
+                if stalled > TRIES:
+                    what = f"{len(by_index)} of {counts[0]} arrived" if counts[0] else "no answer"
+                    raise NotArrived(self._name, "read all parameters", what)
+                missing = [index for index in range(counts[0]) if index not in by_index]
+                with self._kernel:
+                    for index in missing[:MISSING_AT_ONCE]:
+                        self._send_to("PARAM_REQUEST_READ", param_id="", param_index=index)
+                    if not counts[0]:
+                        self._send_to("PARAM_REQUEST_LIST")
+        return {found.name: found for _, found in sorted(by_index.items())}
+
+    # -- plans
+
+    def download_items(self, kind: int) -> list[Item]:
+        """See ``Services``."""
+
+        def counted(frame: Frame) -> int | None:
+            _refuse_list(self._name, frame, kind)
+            mine = frame.name == "MISSION_COUNT" and _kind(frame) == kind
+            return int(frame.fields["count"]) if mine else None
+
+        with self._kernel.joined(), self._plan_lock:
+            asked = f"read its {_LISTS[kind]}"
+            count = self._ask(
+                asked, lambda: self._send_to("MISSION_REQUEST_LIST", mission_type=kind), counted
+            )
+            items = [self._download_item(asked, kind, number) for number in range(count)]
+            with self._kernel:
+                self._send_to("MISSION_ACK", type=0, mission_type=kind)
+        return items
+
+    def _download_item(self, asked: str, kind: int, number: int) -> Item:
+        def item(frame: Frame) -> Item | None:
+            _refuse_list(self._name, frame, kind)
+            fields = frame.fields
+            if frame.name != "MISSION_ITEM_INT" or _kind(frame) != kind or fields["seq"] != number:
+                return None
+            parameters = (fields["param1"], fields["param2"], fields["param3"], fields["param4"])
+            place = fields["x"] / 1e7, fields["y"] / 1e7
+            return Item(fields["command"], fields["frame"], parameters, *place, fields["z"])
+
+        return self._ask(
+            asked, lambda: self._send_to("MISSION_REQUEST_INT", seq=number, mission_type=kind), item
+        )
+
+    def upload_items(self, kind: int, items: Sequence[Item]) -> None:
+        """See ``Services``."""
+        asked = f"store {len(items)} items of its {_LISTS[kind]}"
+
+        def answer(frame: Frame) -> bool | None:
+            if _kind(frame) != kind:
+                return None
+            if frame.name in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
+                number = frame.fields["seq"]
+                if number < len(items):
+                    self._send_to("MISSION_ITEM_INT", **item_fields(items[number], number, kind))
+                return None
+            _refuse_list(self._name, frame, kind, asked)
+            return True if frame.name == "MISSION_ACK" else None
+
+        def send() -> None:
+            if items:
+                self._send_to("MISSION_COUNT", count=len(items), mission_type=kind)
+            else:
+                self._send_to("MISSION_CLEAR_ALL", mission_type=kind)
+
+        with self._kernel.joined(), self._plan_lock:
+            lasting = 30 * S + len(items) * S
+            self._ask(asked, send, answer, within=lasting, again=10 * S + len(items) * 200 * MS)
+
+    # -- logs
+
+    def list_logs(self) -> list[LogEntry]:
+        """See ``Services``."""
+        entries: dict[int, LogEntry] = {}
+
+        def answer(frame: Frame) -> list[LogEntry] | None:
+            if frame.name != "LOG_ENTRY":
+                return None
+            fields = frame.fields
+            if not fields["num_logs"]:
+                return []
+            entries[fields["id"]] = LogEntry(fields["id"], fields["size"], fields["time_utc"])
+            whole = len(entries) >= fields["num_logs"]
+            return [entries[number] for number in sorted(entries)] if whole else None
+
+        return self._ask(
+            "list its logs", lambda: self._send_to("LOG_REQUEST_LIST", start=0, end=0xFFFF), answer
+        )
+
+    def read_log(self, entry: LogEntry, offset: int, count: int) -> bytes:
+        """See ``Services``."""
+        count = min(count, entry.size - offset)
+        parts: dict[int, bytes] = {}
+
+        def missing() -> int:
+            place = offset
+            while place < offset + count and place in parts:
+                place += len(parts[place])
+            return place
+
+        def answer(frame: Frame) -> bytes | None:
+            fields = frame.fields
+            if frame.name != "LOG_DATA" or fields["id"] != entry.number:
+                return None
+            if fields["count"]:
+                parts[fields["ofs"]] = bytes(fields["data"][: fields["count"]])
+            if missing() < offset + count:
+                return None
+            return b"".join(parts[place] for place in sorted(parts) if place >= offset)[:count]
+
+        def send() -> None:
+            place = missing()
+            rest = offset + count - place
+            self._send_to("LOG_REQUEST_DATA", id=entry.number, ofs=place, count=rest)
+
+        return self._ask(f"read log {entry.number} from byte {offset}", send, answer, within=20 * S)
+
+    def end_log_transfer(self) -> None:
+        """See ``Services``."""
+        with self._kernel.joined(), self._kernel:
+            self._send_to("LOG_REQUEST_END")
+
+    # -- corrections
+
+    def send_corrections(self, message: bytes) -> None:
+        """See ``Services``."""
+        with self._kernel.joined(), self._kernel:
+            for fields in correction_parts(message, self._correction):
+                self._send("GPS_RTCM_DATA", **fields)
+            self._correction = (self._correction + 1) % 32
+
+
+class _Listening:
+    """Adds a listener while the context lasts."""
+
+    def __init__(
+        self, kernel: Kernel, listeners: list[Callable[[Frame], None]], listener: Callable[[Frame], None]
+    ) -> None:
+        self._kernel, self._listeners, self._listener = kernel, listeners, listener
+
+    def __enter__(self) -> None:
+        with self._kernel.guard:
+            self._listeners.append(self._listener)
+
+    def __exit__(self, *_error: object) -> None:
+        with self._kernel.guard:
+            self._listeners.remove(self._listener)
+
+
+_LISTS = {0: "mission", 1: "geofence", 2: "rally points"}
+
+
+def _kind(frame: Frame) -> int:
+    kind: int = frame.fields.get("mission_type", 0)
+    return kind
+
+
+def _refuse_list(name: str, frame: Frame, kind: int, asked: str = "") -> None:
+    """Raise if *frame* is the refusal of a list of that kind."""
+    if frame.name != "MISSION_ACK" or _kind(frame) != kind or frame.fields["type"] == 0:
+        return
+    result = entry_name("MAV_MISSION_RESULT", frame.fields["type"]).removeprefix("MAV_MISSION_")
+    if result == "UNSUPPORTED":
+        raise CapabilityError(f"{name}: {asked or 'read'}: the autopilot keeps no {_LISTS[kind]}")
+    raise Refused(name, asked or f"read its {_LISTS[kind]}", f"the autopilot answered {result}")
+
+
+def item_fields(item: Item, number: int, kind: int) -> dict[str, Any]:
+    """Return an item as the fields of MISSION_ITEM_INT."""
+    first, second, third, fourth = item.parameters
+    return {
+        "seq": number,
+        "frame": item.frame,
+        "command": item.command,
+        "current": 0,
+        "autocontinue": 1,
+        "param1": first,
+        "param2": second,
+        "param3": third,
+        "param4": fourth,
+        "x": round(item.latitude * 1e7),
+        "y": round(item.longitude * 1e7),
+        "z": item.z,
+        "mission_type": kind,
+    }
+
+
+def correction_parts(message: bytes, sequence: int) -> list[dict[str, Any]]:
+    """Return one RTCM message as the fields of GPS_RTCM_DATA.
+
+    Bit 0 of the flags states that there are several parts, bits 1 and 2 number them, bits 3 to 7 number the
+    messages. A receiver knows the last part by its length: one that is full is followed by an empty one.
+
+    Args:
+        message: at most 720 bytes.
+        sequence: number of the message, 0 to 31.
+    """
+    if len(message) <= CORRECTION_PART:
+        whole = list(message.ljust(CORRECTION_PART, b"\0"))
+        return [{"flags": sequence << 3, "len": len(message), "data": whole}]
+    pieces = [message[at : at + CORRECTION_PART] for at in range(0, len(message), CORRECTION_PART)]
+    if len(pieces[-1]) == CORRECTION_PART and len(pieces) < CORRECTION_PARTS:
+        pieces.append(b"")
+    return [
+        {
+            "flags": 1 | number << 1 | sequence << 3,
+            "len": len(piece),
+            "data": list(piece.ljust(CORRECTION_PART, b"\0")),
+        }
+        for number, piece in enumerate(pieces)
+    ]

@@ -1,0 +1,197 @@
+"""The parameters of an autopilot: get, set, load, save and compare.
+
+Files are those of the ground stations: ``.params`` of QGroundControl (columns for vehicle, component, name,
+value and type) and ``.param`` or ``.parm`` of Mission Planner and MAVProxy (name and value). Both are read by
+content; the suffix chooses what is written.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from math import isclose, isfinite
+from pathlib import Path
+from typing import NamedTuple
+
+from volery.base.errors import UsageError, VehicleError
+from volery.vehicles.limits import is_number
+from volery.vehicles.services import Parameter, Services
+
+LONGEST_NAME = 16
+"""Characters in the name of a parameter, by MAVLink."""
+LARGEST_FILE = 4_000_000
+QGC, PLAIN = ".params", (".param", ".parm")
+SYSTEM, COMPONENT = 1, 1
+COUNTERS = frozenset({"_HASH_CHECK"})
+"""Values that are no settings: a checksum over the others."""
+
+
+class Difference(NamedTuple):
+    """One parameter that differs; ``None`` where a side does not have it."""
+
+    name: str
+    here: float | None
+    there: float | None
+
+
+class Parameters:
+    """Parameters of one vehicle, read from and written to its autopilot.
+
+    Every call blocks until the autopilot has answered; nothing is cached: another station may change a
+    parameter. Values are numbers; the autopilot's own type is kept.
+
+    Args:
+        name: name of the vehicle.
+        services: services of its autopilot.
+        system: MAVLink system id, for files.
+    """
+
+    def __init__(self, name: str, services: Services, system: int = SYSTEM) -> None:
+        self._name = name
+        self._services = services
+        self._system = system or SYSTEM
+
+    def get(self, name: str) -> float:
+        """Return the value of one parameter.
+
+        Raises:
+            NotArrived: the autopilot does not answer, as for a name that it does not have.
+        """
+        return self._services.read_parameter(self._checked(name)).value
+
+    def set(self, name: str, value: float) -> None:
+        """Set one parameter and return when the autopilot reports the value.
+
+        Raises:
+            UsageError: the value is no finite number.
+            Refused: the autopilot keeps another value, or takes whole numbers only.
+            NotArrived: it does not answer.
+        """
+        if not is_number(value):
+            raise UsageError(f"{self._name}: {name} = {value!r}: a parameter is a finite number")
+        self._services.write_parameter(self._checked(name), float(value))
+
+    def all(self) -> dict[str, float]:
+        """Return all parameters by name, in the autopilot's order."""
+        return {name: found.value for name, found in self._services.read_parameters().items()}
+
+    def save(self, file: str | Path) -> int:
+        """Write all parameters to a file and return their number.
+
+        Args:
+            file: path that ends in .params (QGroundControl), .param or .parm (Mission Planner, MAVProxy).
+        """
+        path = Path(file)
+        if path.suffix not in (QGC, *PLAIN):
+            raise UsageError(f"{path}: end the name in .params (QGroundControl), .param or .parm")
+        found = self._services.read_parameters()
+        text = _qgc_text(found, self._system) if path.suffix == QGC else _plain_text(found)
+        try:
+            path.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
+        return len(found)
+
+    def load(self, file: str | Path) -> list[Difference]:
+        """Set the parameters of a file that differ, and return what was changed (``here`` is the old value).
+
+        A parameter that the autopilot refuses or does not have does not stop the others.
+
+        Raises:
+            VehicleError: some were not set; the error names them. The others are set.
+        """
+        changed, failed = [], []
+        for one in self.compare(file):
+            if one.there is None:
+                continue
+            if one.here is None:
+                failed.append(f"{one.name} (the autopilot has none)")
+                continue
+            try:
+                self.set(one.name, one.there)
+            except VehicleError as error:
+                failed.append(f"{one.name} ({error.what})")
+            else:
+                changed.append(one)
+        if failed:
+            raise VehicleError(
+                self._name,
+                f"load {file}",
+                f"{len(changed)} parameters were set, {len(failed)} were not: {', '.join(failed)}",
+            )
+        return changed
+
+    def compare(self, file: str | Path | Mapping[str, float]) -> list[Difference]:
+        """Return where the vehicle (``here``) and a file or mapping (``there``) differ, by name.
+
+        Parameters that only the vehicle has are left out: a file usually states a part of them.
+        """
+        there = file if isinstance(file, Mapping) else read_parameter_file(file)
+        return [one for one in differences(self.all(), there) if one.there is not None]
+
+    def _checked(self, name: str) -> str:
+        if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9_]{1,16}", name):
+            raise UsageError(
+                f"{self._name}: {name!r} is no name of a parameter: {LONGEST_NAME} letters, digits, _"
+            )
+        return name.upper()
+
+
+def differences(here: Mapping[str, float], there: Mapping[str, float]) -> list[Difference]:
+    """Return the parameters that differ by more than a 32-bit float does, in alphabetical order."""
+    found = []
+    for name in sorted({*here, *there} - COUNTERS):
+        mine, other = here.get(name), there.get(name)
+        same = mine is not None and other is not None and isclose(mine, other, rel_tol=1e-6, abs_tol=1e-9)
+        if not same:
+            found.append(Difference(name, mine, other))
+    return found
+
+
+def read_parameter_file(file: str | Path) -> dict[str, float]:
+    """Return the parameters of a file of QGroundControl, Mission Planner or MAVProxy.
+
+    Raises:
+        UsageError: the file cannot be read; the error names the line.
+    """
+    path = Path(file)
+    try:
+        if not path.is_file():
+            raise UsageError(f"{path}: there is no such file")
+        if path.stat().st_size > LARGEST_FILE:
+            raise UsageError(f"{path}: larger than {LARGEST_FILE} bytes; this is no file of parameters")
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except UnicodeDecodeError:
+        raise UsageError(f"{path}: no text; this is no file of parameters") from None
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
+    found: dict[str, float] = {}
+    for number, line in enumerate(lines, 1):
+        words = re.split(r"[\s,]+", line.split("#", 1)[0].strip())
+        if words == [""]:
+            continue
+        name, value = words[2:4] if len(words) == 5 else [*words, ""][:2]
+        try:
+            found[name] = float(value)
+        except ValueError:
+            raise UsageError(f"{path}:{number}: {value!r} is no value of {name!r}") from None
+        if not isfinite(found[name]) or not re.fullmatch(r"[A-Za-z0-9_]{1,16}", name):
+            raise UsageError(f"{path}:{number}: {line.strip()!r} is no parameter and its value")
+    if not found:
+        raise UsageError(f"{path}: there is no parameter in it")
+    return found
+
+
+def _qgc_text(found: Mapping[str, Parameter], system: int) -> str:
+    rows = [f"{system}\t{COMPONENT}\t{one.name}\t{_number(one)}\t{one.type}" for one in found.values()]
+    head = "# Vehicle-Id Component-Id Name Value Type"
+    return "\n".join(["# Onboard parameters", "#", head, *rows, ""])
+
+
+def _plain_text(found: Mapping[str, Parameter]) -> str:
+    return "\n".join([*(f"{one.name},{_number(one)}" for one in found.values()), ""])
+
+
+def _number(one: Parameter) -> str:
+    """Return the value with the digits of a 32-bit float; whole types without a point."""
+    return f"{one.value:.9g}" if one.type >= 9 else f"{one.value:.0f}"

@@ -1,0 +1,162 @@
+"""What a vehicle offers beside flying: parameters, plan, logs, payload, corrections, telemetry in time.
+
+``Vehicle`` extends it by the operations that move. None of this needs control of the vehicle, and it may
+go on beside an operation of another task.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+from volery.base.errors import CapabilityError, Refused, UsageError
+from volery.base.position import Position
+from volery.base.time import MS, Ns, S, from_seconds
+from volery.kernel.api import Handle, Kernel
+from volery.kernel.waiting import sleep
+from volery.vehicles.driver import Driver
+from volery.vehicles.executor import StepExecutor
+from volery.vehicles.onboard_logs import OnboardLogs
+from volery.vehicles.onboard_plan import OnboardPlan
+from volery.vehicles.parameters import Parameters
+from volery.vehicles.payload import Payload
+from volery.vehicles.rtcm import messages_of
+from volery.vehicles.services import Services
+from volery.vehicles.telemetry_feed import Quantity, TelemetryHistory, read_quantity, subscribe
+
+REBOOT_WITHIN_S = 60.0
+SILENT_WITHIN: Ns = 5 * S
+"""Time for which the old firmware may still send after it has accepted a restart."""
+DOWN_AFTER: Ns = 1500 * MS
+"""Silence that shows the restart: heartbeats arrive each second."""
+
+
+class ServicedVehicle(ABC):
+    """State over time and services of a vehicle; see ``Vehicle``."""
+
+    name: str
+    kernel: Kernel
+    _driver: Driver
+    _executor: StepExecutor
+
+    @abstractmethod
+    def _connect(self) -> None:
+        """Wait for the first message."""
+
+    @abstractmethod
+    def _check_leg(self, asked: str, place: Position) -> None:
+        """Raise ``OutOfBounds`` if *place* is out of bounds."""
+
+    def _services(self, what: str) -> Services:
+        """Return the services; raise ``CapabilityError`` where there is no *what*."""
+        self._connect()
+        services = self._driver.services
+        if services is None:
+            autopilot = self._driver.telemetry.autopilot or "this autopilot"
+            raise CapabilityError(
+                f"{self.name}: {what}: {autopilot} offers this over a MAVLink link only; here it has none"
+            )
+        return services
+
+    # -- nouns
+
+    @property
+    def parameters(self) -> Parameters:
+        """Parameters of the autopilot: ``get``, ``set``, ``all``, ``load``, ``save``, ``compare``."""
+        services = self._services("parameters")
+        return Parameters(self.name, services, self._driver.telemetry.system)
+
+    @property
+    def plan(self) -> OnboardPlan:
+        """Mission, geofence and rally points on board: ``upload``, ``download``, ``clear``."""
+        return OnboardPlan(self._driver.telemetry, self._services("a plan on board"), self._check_leg)
+
+    @property
+    def logs(self) -> OnboardLogs:
+        """Logs on board: ``list``, ``download``."""
+        return OnboardLogs(self._driver.telemetry, self._services("logs on board"))
+
+    @property
+    def payload(self) -> Payload:
+        """Gimbal, camera, servos and gripper."""
+        return Payload(self.name, self._services("a payload"))
+
+    # -- single requests
+
+    def reboot(self, within: float = REBOOT_WITHIN_S) -> None:
+        """Restart the autopilot and return when it sends again. ``Refused`` while it is armed.
+
+        Args:
+            within: longest time to wait for it, s.
+        """
+        services = self._services("a restart")
+        seen = self._driver.telemetry
+        if seen.armed:
+            raise Refused(self.name, "restart", "it is armed; land and disarm first")
+        services.command("restart", "MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN", 1)
+        accepted = self.kernel.now()
+        with self.kernel.joined():
+            while self.kernel.now() - max(seen.last_message_ns, accepted) < DOWN_AFTER:
+                if self.kernel.now() - accepted > SILENT_WITHIN:
+                    return  # it restarts faster than its heartbeats show
+                sleep(self.kernel, 100 * MS)
+            silent = seen.last_message_ns
+            back = self._executor.wait(lambda: seen.last_message_ns > silent, from_seconds(within))
+        if not back:
+            raise Refused(self.name, "restart", f"it has not sent anything for {within:g} s since")
+
+    def send_corrections(self, data: bytes) -> None:
+        """Pass RTCM corrections of an RTK base or an NTRIP caster to the GPS receiver. It never waits.
+
+        Args:
+            data: one or more whole RTCM 3 messages, as they arrive.
+
+        Raises:
+            UsageError: this is no RTCM 3, or a message is longer than a receiver takes.
+        """
+        services = self._services("RTK corrections")
+        for message in messages_of(data):
+            services.send_corrections(message)
+
+    # -- telemetry in time
+
+    def subscribe(
+        self, quantity: Quantity, callback: Callable[[object], object], period: float = 0.1
+    ) -> Handle:
+        """Call *callback* with a quantity each time it has changed, until the handle is cancelled.
+
+        The callback runs beside the program and must not block: it sets a flag or appends to a list; it does
+        not command the vehicle.
+
+        Args:
+            quantity: ``position``, ``altitude``, ``velocity``, ``attitude``, ``battery``, ``mode``,
+                ``armed``, ``home``, ``satellites``, ``fix`` or ``text``.
+            callback: takes the new value.
+            period: shortest time between two calls, s.
+        """
+        self._connect()
+        return subscribe(self.kernel, self._driver.telemetry, quantity, callback, _period(period))
+
+    def record_telemetry(
+        self, *quantities: Quantity, period: float = 0.1, keep: float = 600.0
+    ) -> TelemetryHistory:
+        """Keep quantities over time from now on, and return the growing history.
+
+        Args:
+            quantities: as in ``subscribe``; ``text`` is not recorded.
+            period: time between two samples, s.
+            keep: age up to which samples are kept, s.
+        """
+        self._connect()
+        telemetry = self._driver.telemetry
+        if not quantities:
+            raise UsageError(f"{self.name}: record_telemetry(): state a quantity, such as 'position'")
+        for quantity in quantities:
+            read_quantity(telemetry, quantity)
+        return TelemetryHistory(self.kernel, telemetry, quantities, _period(period), _period(keep))
+
+
+def _period(seconds: float) -> Ns:
+    if not seconds > 0:
+        raise UsageError(f"{seconds!r} s; give seconds above 0")
+    return from_seconds(seconds)

@@ -1,0 +1,92 @@
+"""What an autopilot offers beside flying: parameters, plans, logs, commands of payloads, corrections.
+
+A driver has a ``Services`` where its protocol carries them, as MAVLink does. The nouns that users see are
+built on it: ``Parameters``, ``OnboardPlan``, ``OnboardLogs`` and ``Payload``. All calls block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+from volery.base.time import Ns
+
+
+class Item(NamedTuple):
+    """An item of a plan as in MAVLink: latitude and longitude in degrees, ``z`` in metres of ``frame``."""
+
+    command: int
+    frame: int
+    parameters: tuple[float, float, float, float]
+    latitude: float
+    longitude: float
+    z: float
+
+
+MISSION, FENCE, RALLY = 0, 1, 2
+"""MAV_MISSION_TYPE of the three lists that an autopilot keeps."""
+
+
+class Parameter(NamedTuple):
+    """A parameter of an autopilot: its value, and its MAV_PARAM_TYPE (9 and 10 are real, others whole)."""
+
+    name: str
+    value: float
+    type: int
+
+
+class LogEntry(NamedTuple):
+    """A log on board: number, size in bytes, and the end of its recording in s since 1970 (0 if unknown)."""
+
+    number: int
+    size: int
+    utc: int
+
+
+class Services(Protocol):
+    """Services of one autopilot. Every method blocks; without an answer it raises ``NotArrived``."""
+
+    @property
+    def home_first(self) -> bool:
+        """Whether item 0 of its mission is home, as in ArduPilot."""
+
+    def read_parameter(self, name: str) -> Parameter:
+        """Read one parameter."""
+
+    def read_parameters(self) -> dict[str, Parameter]:
+        """Read all parameters."""
+
+    def write_parameter(self, name: str, value: float) -> Parameter:
+        """Write one parameter; return what the autopilot then reports. ``Refused`` if it keeps another."""
+
+    def download_items(self, kind: int) -> list[Item]:
+        """Read a list of items."""
+
+    def upload_items(self, kind: int, items: Sequence[Item]) -> None:
+        """Replace a list of items; an empty one clears it."""
+
+    def command(self, asked: str, command: str, *parameters: float, within: Ns = 0) -> None:
+        """Send COMMAND_LONG and wait for its acknowledgement.
+
+        Args:
+            asked: the command in words, for errors.
+            command: name of the MAV_CMD.
+            parameters: up to seven.
+            within: time-out, ns; 0 means the usual one.
+
+        Raises:
+            CapabilityError: the autopilot does not support it.
+            Refused: the autopilot refuses; the error quotes its result and its last text.
+        """
+
+    def list_logs(self) -> list[LogEntry]:
+        """Return the logs on board."""
+
+    def read_log(self, entry: LogEntry, offset: int, count: int) -> bytes:
+        """Return up to *count* bytes of a log from *offset*; fewer only at its end."""
+
+    def end_log_transfer(self) -> None:
+        """Let the autopilot record again."""
+
+    def send_corrections(self, message: bytes) -> None:
+        """Send one RTCM message to the GPS receivers. It is not acknowledged."""
