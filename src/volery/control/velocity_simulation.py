@@ -142,7 +142,7 @@ TOLERANCE = 0.05
 class CubeController:
     """The thesis's controller as a node: ``poseupdate`` in, ``cmd_vel`` out, one PID law for each axis.
 
-    The node's parameters ``kp``, ``ki``, ``kd`` and ``tolerance`` may be changed at any time.
+    The node's private parameters ``kp``, ``ki``, ``kd`` and ``tolerance`` may be changed at any time.
 
     Args:
         kernel: clock and record.
@@ -165,7 +165,7 @@ class CubeController:
         if not self.goals or self.rounds < 0:
             raise UsageError(f"{len(self.goals)} goals in {self.rounds} rounds: give at least one goal")
         for name, value in zip(("kp", "ki", "kd", "tolerance"), (*THESIS_GAINS, TOLERANCE), strict=True):
-            self.node.set_parameter(name, self.node.get_parameter(name, value))
+            self.node.set_parameter(f"~{name}", self.node.get_parameter(f"~{name}", value))
         self._states: list[PidState] = [PID_START] * 4
         self._index = 0
         self._last: Ns | None = None
@@ -175,7 +175,7 @@ class CubeController:
 
     def _gains(self) -> tuple[PidGains, float]:
         kp, ki, kd, tolerance = (
-            float(self.node.get_parameter(one)) for one in ("kp", "ki", "kd", "tolerance")
+            float(self.node.get_parameter(f"~{one}")) for one in ("kp", "ki", "kd", "tolerance")
         )
         _, integral, derivative = per_sample(kp, ki, kd, to_seconds(PUBLISH))
         return PidGains(kp=kp, ki=integral, kd=derivative, on_measurement=False), tolerance

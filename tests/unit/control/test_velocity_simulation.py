@@ -46,7 +46,7 @@ def flown(rounds: int = 1, seconds: int = 200, **parameters: float) -> CubeContr
     VelocityVehicle(kernel, graph.node("vehicle"))
     node = graph.node("controller")
     for name, value in parameters.items():
-        node.set_parameter(name, value)
+        node.set_parameter(f"~{name}", value)
     controller = CubeController(kernel, node, rounds=rounds)
     for second in range(1, seconds):
         kernel.run(second * S)

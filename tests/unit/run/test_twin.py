@@ -1,0 +1,53 @@
+"""A twin of a vehicle and of a record, and the cube of goals on a velocity-level vehicle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from volery.base.errors import UsageError
+from volery.control.log_signals import read_signals
+from volery.control.step_response import step_responses
+from volery.run.result import Options
+from volery.run.twin import follow_record, follow_vehicle
+from volery.run.velocity_cube import fly_cube
+
+MISSION = """
+from volery import Drone, AboveHome, Position
+def mission(drone: Drone):
+    drone.takeoff(6)
+    drone.set_heading(60)
+    drone.goto(Position(46.08265, -103.8995, AboveHome(6)))
+    drone.land()
+"""
+
+
+def test_a_twin_follows_a_vehicle_that_flies_a_mission(tmp_path: Path) -> None:
+    mission = tmp_path / "mission.py"
+    mission.write_text(MISSION)
+    run, errors = follow_vehicle(
+        "sim:px4?start=warm", "sim:ardupilot?start=warm", Options(out=tmp_path / "run"), mission
+    )
+    assert run.error is None
+    found = {one.quantity.split()[-1]: one for one in errors}
+    assert found["north"].rms < 1.5
+    assert found["yaw"].rms < 8.0
+
+
+def test_a_record_without_a_flight_is_no_reference(tmp_path: Path) -> None:
+    fly_cube(tmp_path / "cube")
+    with pytest.raises(UsageError, match="has no north"):
+        follow_record(tmp_path / "cube", "sim:ardupilot", Options())
+
+
+def test_the_loops_of_the_cube_can_be_judged(tmp_path: Path) -> None:
+    reached = fly_cube(tmp_path)
+    assert len(reached) == 11
+    (z,) = (one for one in read_signals(tmp_path) if one.name == "z")
+    assert [round(one.size, 1) for one in step_responses(z)] == pytest.approx([1.0, 2.0], abs=0.1)
+
+
+def test_a_missing_mission_of_the_leader_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="nowhere"):
+        follow_vehicle("sim:px4", "sim:ardupilot", Options(), tmp_path / "nowhere.py")
