@@ -76,10 +76,10 @@ def conformance(
     with _ended_by_signals(), _progress(output, len(chosen(names, kind))) as progress:
 
         def show(one: Check, result: Result | None) -> None:
-            progress(one, result)
             if result is not None:
                 found.append(result)
                 _write(folder, Report(url, seed, tuple(found), interrupted=True))
+            progress(one, result)
 
         report = run_checks(url, only=names, kind=kind, fly=allow_flight, seed=seed, second=second, show=show)
     _write(folder, report)

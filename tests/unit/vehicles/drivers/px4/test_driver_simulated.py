@@ -8,6 +8,7 @@ import pytest
 
 from rigs.airstrip import FRAME, Airstrip, at
 from volery.base.errors import Failsafe, LinkLost, Overridden, Refused
+from volery.base.frames import LocalFrame
 from volery.base.position import Position
 from volery.base.time import MS, S
 from volery.kernel.waiting import sleep
@@ -328,7 +329,10 @@ def test_a_home_that_was_just_moved_is_where_it_returns_to() -> None:
 
     field.fly(flight)
     landed = field.vehicle.position
-    assert abs(landed.latitude - moved.latitude) * 111_200.0 < 2.0
+    east, north, _ = LocalFrame(moved.latitude, moved.longitude, 0.0).to_enu(
+        landed.latitude, landed.longitude, 0.0
+    )
+    assert hypot(east, north) < 2.0
 
 
 def test_what_has_returned_has_settled() -> None:
