@@ -31,6 +31,11 @@ USER_MODULE_PREFIX = f"{_PREFIX}."
 SHARED_MODULE_PREFIX = f"{_PREFIX}.shared."
 """Prefix of the modules that components share: those beside their files."""
 FRAMEWORK_PACKAGE = "volery"
+COMPUTING_MODULES = frozenset(
+    ("bz2", "csv", "decimal", "difflib", "fractions", "gzip", "hashlib", "hmac", "html", "json", "lzma")
+    + ("marshal", "pickle", "re", "sqlite3", "statistics", "tarfile", "xml", "zipfile", "zlib")
+)
+"""Modules of Python whose calls take a time that grows with their arguments: their code is not counted."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +100,8 @@ class Loader:
     Attributes:
         replacements: Modules that are imported in place of others, by dotted name.
         steps: Counter of the code, or None where code is not counted.
-        libraries: Top-level names of imported libraries outside Python's own, whose code is not counted.
+        libraries: Top-level names of imported libraries whose code is not counted: those outside Python's
+            own, and ``COMPUTING_MODULES``.
     """
 
     replacements: Mapping[str, ModuleType] = field(default_factory=dict)
@@ -216,7 +222,7 @@ class _Import:
     ) -> ModuleType:
         module = builtins.__import__(name, globals_, None, fromlist or ())
         top = name.partition(".")[0]
-        if top not in sys.stdlib_module_names and top != FRAMEWORK_PACKAGE:
+        if top in COMPUTING_MODULES or (top not in sys.stdlib_module_names and top != FRAMEWORK_PACKAGE):
             self._loader.libraries.add(top)
         return module
 

@@ -354,12 +354,13 @@ def test_printed_text_goes_to_the_trace_and_not_to_standard_output(desk, capsys)
 
 def test_an_error_is_placed_in_the_users_file_and_libraries_are_noted(desk):
     path = desk.write(
-        "user.py", "import json\nimport networkx\nclass User:\n    def run(self):\n        json.loads('{')\n"
+        "user.py",
+        "import json, math\nimport networkx\nclass User:\n    def run(self):\n        json.loads('{')\n",
     )
     desk.start(path, "User")
     desk.kernel.run(S)
     assert str(desk.failures[0][1]).endswith("(user.py:5)")
-    assert desk.loader.libraries == {"networkx"}
+    assert desk.loader.libraries == {"json", "networkx"}
 
 
 def test_packages_import_as_they_do_elsewhere(desk):
