@@ -138,3 +138,81 @@ def launched(share: Path, package: str) -> list[tuple[str, Path]]:
                 found.append((executable, share / "config" / f"{executable}.yaml"))
                 assert found[-1][1].is_file()
     return found
+
+
+PAIR = """
+volery: 1
+name: pair
+interfaces: {Echo: {say: {args: {words: Words}, returns: Words}}}
+components:
+  Speaker: {language: python, path: speaker.py, requires: {other: Echo}, parameters: {text: a}, active: true}
+  Echoer: {language: python, path: echoer.py, provides: {voice: Echo}}
+application: {speaker: {is: Speaker, other: echoer.voice}, echoer: {is: Echoer}}
+platform: {processors: {pc: {is: intel-i5-3470, frequency: 3000 MHz}}}
+allocations: {all: {speaker: pc, echoer: pc}}
+"""
+WORDS = """
+from dataclasses import dataclass
+
+@dataclass(frozen=True)
+class Words:
+    text: str
+"""
+SPEAKER = """
+import sys
+import volery
+from words import Words
+
+class Speaker:
+    def __init__(self, other, text):
+        self._other, self._text = other, text
+
+    def run(self):
+        print(self._other.say(Words(self._text)).text, flush=True)
+        volery.sleep(3600)
+"""
+ECHOER = """
+from words import Words
+
+class Echoer:
+    def say(self, words):
+        return Words(words.text.upper())
+"""
+
+
+def test_in_reality_a_component_waits_for_its_services_and_ends_with_sigterm(roscore, tmp_path):
+    model = tmp_path / "model"
+    model.mkdir()
+    for name, text in (
+        ("model.yaml", PAIR),
+        ("words.py", WORDS),
+        ("speaker.py", SPEAKER),
+        ("echoer.py", ECHOER),
+    ):
+        (model / name).write_text(text)
+    made = deploy(load(model, vocabulary()), tmp_path / "out", 1)
+    package = made.folder / made.packages["pc"]
+    (package / "config" / "speaker.yaml").write_text("text: good morning\n")
+    env = {**os.environ, "ROS_MASTER_URI": roscore.uri}
+
+    def host(name):
+        command = [
+            sys.executable,
+            package / "scripts" / name,
+            "--parameters",
+            package / "config" / f"{name}.yaml",
+        ]
+        return subprocess.Popen(command, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+    speaker = host("speaker")
+    echoer = host("echoer")
+    try:
+        said = next(line for line in speaker.stdout if "waits for" not in line)
+        assert said == "GOOD MORNING\n"
+        for process in (speaker, echoer):
+            process.send_signal(signal.SIGTERM)
+        assert [process.wait(60) for process in (speaker, echoer)] == [0, 0]
+    finally:
+        for process in (speaker, echoer):
+            process.kill()
+            process.communicate()
