@@ -4,8 +4,8 @@ import importlib
 import warnings
 
 import pytest
-from rigs.requirements import lacking
 
+from rigs.requirements import lacking
 from volery.cli.commands.first_steps import example
 from volery.exchange.sysml import sysml_text
 from volery.model.assembly import read_tree
