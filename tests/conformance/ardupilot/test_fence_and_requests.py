@@ -283,6 +283,19 @@ def test_the_nose_follows_a_region_of_interest_until_it_is_cleared(bench: Any) -
     assert rig.vehicle.commanded.look_at is None
 
 
+def test_without_a_position_it_takes_off_by_thrust(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    assert rig.mode(20) == ACCEPTED
+    assert rig.command(400, 1) == ACCEPTED
+    rig.run(2.5)
+    assert rig.height < 0.2
+    for _ in range(30):
+        rig.send("SET_ATTITUDE_TARGET", **TARGET, type_mask=4, q=[1, 0, 0, 0], thrust=0.7)
+        rig.run(0.2)
+    assert rig.height > 2.0
+
+
 def test_terrain_is_unknown_on_board(bench: Any) -> None:
     rig = bench()
     rig.run(0.5)

@@ -130,6 +130,10 @@ class FollowAttitude(Manoeuvre):
         self._thrust = thrust
         self._given: Ns = vehicle.kernel.now()
 
+    def takeoff_requested(self) -> bool:
+        """Return whether the thrust climbs."""
+        return self._thrust > 0.5
+
     def step(self) -> None:
         """Give the attitude and a climb rate: thrust 0 and 1 descend and climb at the largest speeds."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
@@ -247,6 +251,10 @@ class GuidedAttitude(Guided):
     def enter(self) -> None:
         """Hold the height, level."""
         self.follow_attitude(None, 0.0, 0.5)
+
+    def takeoff_requested(self) -> bool:
+        """Return whether the commanded thrust climbs: without a position there is no other take-off."""
+        return self._doing.takeoff_requested()
 
     def take_off(self, height: float) -> None:
         """Ignore the command: it requires a position."""

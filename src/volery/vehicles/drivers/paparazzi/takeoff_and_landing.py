@@ -31,6 +31,8 @@ from volery.vehicles.drivers.steps import AT_REST_M_S, NEAR_UP_M, disarmed_step,
 from volery.vehicles.telemetry import Telemetry
 
 BLOCK_WITHIN: Ns = 15 * S
+LANDING_BLOCK_WITHIN: Ns = 30 * S
+"""A damaged frame can keep the aircraft's parser waiting for up to 255 bytes; the repetitions supply them."""
 BLOCK_REPORTED_WITHIN: Ns = 5 * S
 """Time without ROTORCRAFT_NAV_STATUS, which is sent each 1.6 s, after which it is not waited for."""
 LIFTED_M = 1.0
@@ -321,8 +323,8 @@ class TakeoffAndLanding:
             ask=f"go to block {self._blocks.land!r}",
             send=send,
             done=landing,
-            within=BLOCK_WITHIN,
-            again=4 * S,
+            within=LANDING_BLOCK_WITHIN,
+            again=S,
             mode=self._telemetry.mode,
         )
 
