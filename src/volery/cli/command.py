@@ -73,6 +73,7 @@ class Commands:
             target = next(known, None) or typer.Typer(help=self.summary, no_args_is_help=True)
             if target not in [one.typer_instance for one in app.registered_groups]:
                 app.add_typer(target, name=self.group, rich_help_panel=self.section)
+            target.info.help = self.summary or target.info.help  # one of the group's files has the summary
         for name, function in self.members:
             target.command(name, rich_help_panel=None if self.group else self.section)(function)
 
