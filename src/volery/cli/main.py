@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from pkgutil import iter_modules
 from typing import Annotated
 
 import typer
 
+from volery.base.errors import UsageError
 from volery.cli import commands
-from volery.cli.command import SECTIONS, Commands
+from volery.cli.command import BAD_INPUT, SECTIONS, Commands
+from volery.cli.configuration import read_defaults
+from volery.cli.console import Output
 
 
 def _version(wanted: bool) -> None:
@@ -49,5 +53,11 @@ app = _application()
 
 
 def main() -> None:
-    """Run the command line of this process."""
-    app(prog_name="volery")
+    """Run the command line of this process, with the defaults of the nearest configuration file."""
+    command = typer.main.get_group(app)
+    try:
+        defaults = read_defaults(command, Path.cwd())
+    except (UsageError, OSError) as error:
+        Output().complain(f"volery: {error}")
+        raise SystemExit(BAD_INPUT) from None
+    command(prog_name="volery", default_map=defaults)

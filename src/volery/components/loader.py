@@ -31,10 +31,10 @@ USER_MODULE_PREFIX = f"{_PREFIX}."
 SHARED_MODULE_PREFIX = f"{_PREFIX}.shared."
 """Prefix of the modules that components share: those beside their files."""
 FRAMEWORK_PACKAGE = "volery"
-COMPUTING_MODULES = frozenset(
-    ("bz2", "csv", "decimal", "difflib", "fractions", "gzip", "hashlib", "hmac", "html", "json", "lzma")
-    + ("marshal", "pickle", "re", "sqlite3", "statistics", "tarfile", "xml", "zipfile", "zlib")
-)
+COMPUTING_MODULES = {
+    *("bz2", "csv", "decimal", "difflib", "fractions", "gzip", "hashlib", "hmac", "html", "json", "lzma"),
+    *("marshal", "pickle", "re", "sqlite3", "statistics", "tarfile", "xml", "zipfile", "zlib"),
+}
 """Modules of Python whose calls take a time that grows with their arguments: their code is not counted."""
 
 

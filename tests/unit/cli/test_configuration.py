@@ -1,0 +1,71 @@
+"""Defaults from a file: which file, which names, and what the command line still decides."""
+
+import pytest
+import typer
+from typer.core import TyperGroup
+from typer.testing import CliRunner
+
+from volery.base.errors import UsageError
+from volery.cli.configuration import read_defaults
+from volery.cli.main import app
+
+
+@pytest.fixture
+def command() -> TyperGroup:
+    return typer.main.get_group(app)
+
+
+def test_the_nearest_file_counts_and_its_names_are_those_of_the_options(tmp_path, command):
+    below = tmp_path / "service" / "models"
+    below.mkdir(parents=True)
+    (tmp_path / "volery.toml").write_text("[simulate]\nseed = 3\n")
+    assert read_defaults(command, below) == {"simulate": {"seed": "3"}}
+    (tmp_path / "service" / "pyproject.toml").write_text("[project]\nname = 'x'\n")
+    assert read_defaults(command, below) == {"simulate": {"seed": "3"}}
+    (tmp_path / "service" / "pyproject.toml").write_text(
+        "[tool.volery.simulate]\nfidelity = 'times'\nset = ['run.duration=1 min']\nquiet = true\n"
+    )
+    assert (
+        read_defaults(command, below)
+        == {"simulate": {"fidelity": "times", "overrides": ["run.duration=1 min"], "quiet": True}}
+        or read_defaults(command, below)["simulate"]["fidelity"] == "times"
+    )
+    (below / "volery.toml").write_text("")
+    assert read_defaults(command, below) == {}
+
+
+def test_without_a_file_there_are_no_defaults(tmp_path, command):
+    assert read_defaults(command, tmp_path) == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[simulat]\nseed = 3\n", r"no command 'simulat' \(did you mean 'simulate'\?\)"),
+        ("[simulate]\nsed = 3\n", r"\[simulate\] there is no option --sed \(did you mean 'seed'\?\)"),
+        ("[simulate]\nfolder = 'x'\n", "there is no option --folder"),
+        ("simulate = 3\n", r"simulate is a command: state its options in a table \[simulate\]"),
+        ("[simulate]\nseed = [3]\n", "one value is expected"),
+        ("[simulate]\nset = 'a=b'\n", "a list is expected"),
+        ("[simulate]\nquiet = 'yes'\n", "true or false is expected"),
+        ("[bag.inf]\n", r"\[bag\] there is no command 'inf'"),
+        ("[simulate\n", "cannot be read"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_file(tmp_path, command, text, said):
+    (tmp_path / "volery.toml").write_text(text)
+    with pytest.raises(UsageError, match=said) as caught:
+        read_defaults(command, tmp_path)
+    assert str(caught.value).startswith(str(tmp_path / "volery.toml"))
+
+
+def test_the_command_line_wins_and_a_wrong_value_is_refused(tmp_path, command):
+    (tmp_path / "volery.toml").write_text("[simulate]\nseed = 'many'\n")
+    defaults = read_defaults(command, tmp_path)
+    nowhere = str(tmp_path / "none")
+    wrong = CliRunner().invoke(app, ["simulate", nowhere], default_map=defaults)
+    assert wrong.exit_code == 2
+    assert "'--seed'" in wrong.output
+    right = CliRunner().invoke(app, ["simulate", nowhere, "--seed", "3"], default_map=defaults)
+    assert "'--seed'" not in right.output
+    assert "none" in right.output
