@@ -229,8 +229,11 @@ DOCUMENTED: Mapping[str, Source] = {
     ),
     "no transmitter since power-on": Source(
         f"stays within {NO_RC_RADIUS_M:g} m and {NO_RC_HEIGHT_M:g} m: missions beyond are refused; "
-        "set-points, which stop there, are not limited in the simulation",
+        "set-points stop there",
         "support (Onboard-SDK #359; ROS #169)",
+    ),
+    "no-fly zone": Source(
+        "no start inside; it hovers at the border; a mission across is refused", "support (ROS #471); headers"
     ),
     "low battery": Source("goes home after 10 s; critical: lands at once; both override the program", GUIDES),
     "missions": Source(

@@ -6,7 +6,7 @@ Requests return the answer of the aircraft as a code. Topics and services are no
 from __future__ import annotations
 
 from itertools import pairwise
-from math import hypot, radians
+from math import dist, hypot, inf, radians
 from typing import Any
 
 from volery.base.time import Ns, S, from_seconds
@@ -61,6 +61,8 @@ RC_LOST_HOVERS = 1
 """Value of RC_LOST_ACTION: it hovers."""
 NO_RC_RADIUS_M, NO_RC_HEIGHT_M = 50.0, 30.0
 """Farthest distance from home, and greatest height, of a flight without a transmitter since power-on."""
+BORDER_M = 1.0
+"""Distance from a border at which a set-point that leads across it ends: assumed."""
 HOME_IS_LEVEL, HOME_IS_UNKNOWN = 5, 0
 """``gps_health`` with the position trusted, and without."""
 RANGE_M = 7.0
@@ -246,9 +248,45 @@ class FlightController:
             self.vehicle.send_text(INFO, "motors stopped")
             self.hover()
 
+    def bars(self, north: float, east: float) -> bool:
+        """Return whether motion in this direction leads into a no-fly zone, or too far without a transmitter.
+
+        The aircraft brakes ahead of the border and hovers there.
+        """
+        vehicle, size = self.vehicle, hypot(north, east)
+        if size == 0.0 or not vehicle.has_position:
+            return False
+        here, velocity = vehicle.estimate.position, vehicle.estimate.velocity
+        reach = (BORDER_M + hypot(velocity[0], velocity[1]) ** 2 / (2.0 * vehicle.tuning.accel)) / size
+        ahead = here[0] + reach * north, here[1] + reach * east
+        middle, radius = self._no_fly_zone()
+        closer = dist(ahead, middle) < dist(here[:2], middle)
+        if closer and dist(ahead, middle) < radius:
+            self._warn_once("a no-fly zone is ahead")
+            return True
+        if not self.without_rc or vehicle.home is None:
+            return False
+        home = vehicle.home.ned[:2]
+        return dist(ahead, home) > NO_RC_RADIUS_M and dist(ahead, home) > dist(here[:2], home)
+
+    @property
+    def ceiling(self) -> float:
+        """Greatest height above home of a set-point [m]; infinite with a transmitter."""
+        return NO_RC_HEIGHT_M if self.without_rc else inf
+
+    def _no_fly_zone(self) -> tuple[tuple[float, float], float]:
+        """Return the middle of the no-fly zone, north and east, and its radius [m]; 0: none."""
+        parameters = self.vehicle.parameters
+        middle = parameters["NO_FLY_NORTH"], parameters["NO_FLY_EAST"]
+        return middle, parameters["NO_FLY_RADIUS"]
+
     def _start_motors(self) -> bool:
         vehicle = self.vehicle
         if not vehicle.landed or not self.activated:
+            return False
+        middle, radius = self._no_fly_zone()
+        if vehicle.has_position and dist(vehicle.estimate.position[:2], middle) < radius:
+            vehicle.send_text(WARNING, "it stands in a no-fly zone")
             return False
         if vehicle.has_position:
             vehicle.set_home_here()
@@ -381,6 +419,9 @@ class FlightController:
         ]
         if sum(hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(places)) > LONGEST_PATH_M:
             return MissionAck.PATH_TOO_LONG
+        middle, radius = self._no_fly_zone()
+        if any(_distance_to_leg(middle, a[:2], b[:2]) < radius for a, b in pairwise(places)):
+            return MissionAck.CROSSES_NO_FLY_ZONE
         if not self.without_rc:
             return MissionAck.OK
         home = vehicle.home.ned if vehicle.home else vehicle.estimate.position
@@ -552,6 +593,15 @@ class FlightController:
         self._requested_by_sdk = by_sdk
         self.landing_confirmed = False
         self.vehicle.enter_mode(self.vehicle.rules.modes[mode])
+
+
+def _distance_to_leg(point: tuple[float, float], start: tuple[float, ...], end: tuple[float, ...]) -> float:
+    """Return the distance of a point from a straight leg [m]."""
+    north, east = end[0] - start[0], end[1] - start[1]
+    square = north * north + east * east
+    along = (point[0] - start[0]) * north + (point[1] - start[1]) * east
+    share = min(1.0, max(0.0, along / square)) if square else 0.0
+    return dist(point, (start[0] + share * north, start[1] + share * east))
 
 
 def controller_of(vehicle: Vehicle) -> FlightController:

@@ -41,6 +41,9 @@ _FIGURES: tuple[tuple[str, int, float, str], ...] = (
     ("SINK_SPEED", REAL32, 2.0, "metres per second down towards a height"),
     ("LAND_SPEED", REAL32, 0.7, "metres per second near the ground in a landing; an M600 has 0.5"),
     ("RC_CONNECTED", INT8, 1.0, "0: the transmitter is off"),
+    ("NO_FLY_NORTH", REAL32, 0.0, "metres from the place of power-on to the middle of a no-fly zone"),
+    ("NO_FLY_EAST", REAL32, 0.0, "the same to the east"),
+    ("NO_FLY_RADIUS", REAL32, 0.0, "metres of its radius; 0: none"),
     ("RC_LOST_ACTION", INT8, 0.0, "3 s after the transmitter is lost: 0 goes home, 1 hovers"),
 )
 

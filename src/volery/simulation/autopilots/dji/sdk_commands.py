@@ -6,7 +6,7 @@ east-north-up or forward-left-up, anticlockwise, radians. Heights count from the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, hypot, isfinite, pi, sin
 from typing import TYPE_CHECKING, Any
 
@@ -97,6 +97,8 @@ class SdkControl(Manoeuvre):
     def step(self) -> None:
         """Command the set-point."""
         command, vehicle = self.command, self.vehicle
+        if command is not None and command.needs_position:
+            command = self._within_borders(command)
         if command is None:
             vehicle.drive(Setpoint(Control.CLIMB, accel_z=vehicle.tuning.accel_z))
         elif command.needs_position and not vehicle.firmware_state.gps_health:
@@ -107,6 +109,18 @@ class SdkControl(Manoeuvre):
             vehicle.drive(self._velocity_setpoint(command))
         else:
             vehicle.drive(self._attitude_setpoint(command))
+
+    @property
+    def _ceiling(self) -> float:
+        ceiling: float = self.vehicle.firmware_state.ceiling
+        return ceiling
+
+    def _within_borders(self, command: SdkCommand) -> SdkCommand:
+        """Return the set-point, or one that stays here if it leads across a border."""
+        controller = self.vehicle.firmware_state
+        if controller.bars(*self._north_east(command)):
+            return replace(command, x=0.0, y=0.0, anchor=self.vehicle.estimate.position)
+        return command
 
     def _north_east(self, command: SdkCommand) -> tuple[float, float]:
         """Return ``x`` and ``y`` as north and east."""
@@ -119,6 +133,7 @@ class SdkControl(Manoeuvre):
     def _down(self, command: SdkCommand) -> float:
         home = self.vehicle.home
         low, high = SETPOINT_HEIGHTS
+        high = min(high, self._ceiling)
         return (home.ned[2] if home else 0.0) - min(high, max(low, command.z))
 
     def _climb(self, command: SdkCommand) -> float:
@@ -126,7 +141,8 @@ class SdkControl(Manoeuvre):
         if command.vertical == Flag.VERTICAL_POSITION:
             wanted = command.z - self.vehicle.height
             return min(tuning.speed_up, max(-tuning.speed_down, wanted))
-        return min(SDK_CLIMB, max(-SDK_CLIMB, command.z))
+        left = max(0.0, self._ceiling - self.vehicle.height)
+        return min(SDK_CLIMB, left, max(-SDK_CLIMB, command.z))
 
     def _turn(self, command: SdkCommand) -> tuple[float | None, float | None]:
         """Return heading [rad] or yaw rate [rad/s], clockwise; the other is None."""

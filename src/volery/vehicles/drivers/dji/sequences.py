@@ -37,7 +37,8 @@ LANDING_MODES = frozenset(mode.name for mode in DESCENDING_MODES)
 
 ON_THE_WAY = (
     "towards a position a DJI aircraft is slow (an M600 at most 3 m/s); without GPS (gps_health below 4), "
-    "and beyond 30 m height or 50 m from home without a transmitter since power-on, it does not obey"
+    "into a no-fly zone, and beyond 30 m height or 50 m from home without a transmitter since power-on, it "
+    "does not obey"
 )
 WAITS_LOW = (
     "aircraft with downward vision may wait at about 0.7 m where the ground looks unsuitable: the pilot "

@@ -475,6 +475,8 @@ def test_missions_that_make_no_sense_are_refused(
         ({"RC_CONNECTED": 0}, 40.0, 35.0, 0xC0),  # too high
         ({"RC_CONNECTED": 0}, 40.0, 10.0, 0),
         ({}, 31_000.0, 10.0, 0xE2),  # too long
+        ({"NO_FLY_NORTH": 20.0, "NO_FLY_RADIUS": 10.0}, 60.0, 10.0, 0xDD),  # crosses a no-fly zone
+        ({"NO_FLY_NORTH": 20.0, "NO_FLY_EAST": 40.0, "NO_FLY_RADIUS": 10.0}, 60.0, 10.0, 0),
         ({"AIRCRAFT": 5}, 40.0, 10.0, 255),  # an M300 takes missions of another kind
     ],
 )

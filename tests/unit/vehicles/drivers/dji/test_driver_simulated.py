@@ -355,3 +355,46 @@ def test_what_never_arrives_is_said_so() -> None:
             drone.goto(at(0.0, 80.0, 3.0))
 
     flown.fly(mission)
+
+
+def _farthest(options: str, metres: float) -> tuple[list[Operation], float, str]:
+    """Fly north until something ends it; return the operations, the greatest true distance, and the error."""
+    flown, reached, said = Flown(options), [0.0], [""]
+
+    def mission(drone: Drone) -> None:
+        drone.takeoff(10)
+        truth = flown.fleet.flights["d"]
+
+        def look() -> None:
+            reached[0] = max(reached[0], float(truth.truth().position[1]))
+
+        watch = flown.kernel.every(100 * MS, look)
+        latitude, longitude, _ = FRAME.from_enu((0.0, metres, 0.0))
+        try:
+            drone.goto(Position(latitude, longitude, AboveHome(10)), speed=5.0)
+        except VehicleError as error:
+            said[0] = str(error)
+        watch.cancel()
+        drone.land()
+
+    return flown.fly(mission), reached[0], said[0]
+
+
+def test_it_hovers_at_the_border_of_a_no_fly_zone() -> None:
+    operations, reached, said = _farthest("&parameters=NO_FLY_NORTH:60,NO_FLY_RADIUS:20", 60.0)
+    assert 34.0 < reached < 40.5
+    assert [one.outcome for one in operations] == ["ok", "NotArrived", "ok"]
+    assert "no-fly zone" in said
+
+
+def test_without_a_transmitter_it_stops_at_fifty_metres() -> None:
+    operations, reached, _ = _farthest("&parameters=RC_CONNECTED:0", 80.0)
+    assert 44.0 < reached < 51.0
+    assert operations[1].outcome == "NotArrived"
+
+
+def test_it_does_not_start_in_a_no_fly_zone() -> None:
+    flown = Flown("&parameters=NO_FLY_RADIUS:30")
+    with pytest.raises(VehicleError):
+        flown.fly(lambda drone: drone.takeoff(10))
+    assert not flown.drone.armed
