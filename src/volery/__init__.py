@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     from volery.components.component_api import now as now
     from volery.components.component_api import sleep as sleep
     from volery.model.builder import ModelBuilder as ModelBuilder
+    from volery.run.asynchronous import connect_async as connect_async
+    from volery.run.connect import attach as attach
     from volery.run.connect import connect as connect
     from volery.run.connect import connect_fleet as connect_fleet
     from volery.run.fly import fly as fly
@@ -57,6 +59,7 @@ if TYPE_CHECKING:
     from volery.vehicles import Limits as Limits
     from volery.vehicles import Rover as Rover
     from volery.vehicles import Zone as Zone
+    from volery.vehicles.vehicle_plan import Plan as Plan
 
 
 def _public_names() -> dict[str, str]:

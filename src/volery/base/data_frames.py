@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
 from volery.base.errors import UsageError
 
 
-def to_frame(columns: Mapping[str, Sequence[Any]], index: str) -> Any:
+def to_frame(columns: Mapping[str, Any], index: str) -> Any:
     """Return a ``pandas.DataFrame``.
 
     Args:
@@ -23,5 +23,5 @@ def to_frame(columns: Mapping[str, Sequence[Any]], index: str) -> Any:
         pandas = import_module("pandas")
     except ModuleNotFoundError:
         raise UsageError("a data frame needs pandas: pip install pandas") from None
-    frame = pandas.DataFrame(columns)
+    frame = pandas.DataFrame(dict(columns))
     return frame.set_index(index) if index in frame else frame

@@ -65,6 +65,28 @@ def connect(
 
 
 @contextmanager
+def attach(url: str, kind: type[V] = Drone, *, seed: int = 1) -> Iterator[V]:  # type: ignore[assignment]  # as above
+    """Connect to the vehicle at *url* without commanding it: an armed vehicle flies on at the end.
+
+    For tools that read or set parameters, plans and logs. It does not wait for a position.
+
+    Args:
+        url: Address, as of ``connect``.
+        kind: ``Drone`` or ``Rover``.
+        seed: Seed of the simulation.
+
+    Raises:
+        VoleryError: As for ``connect``.
+    """
+    name = parse(url).driver
+    with _opened({name: url}, {name: kind}, VehicleSettings(seed=seed)) as opened:
+        vehicle = opened.vehicles[0]
+        assert isinstance(vehicle, kind)
+        vehicle.wait_connected()
+        yield vehicle
+
+
+@contextmanager
 def connect_fleet(
     urls: Mapping[str, str],
     kind: type[Vehicle] | Mapping[str, type[Vehicle]] = Drone,

@@ -6,12 +6,16 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from volery.base.errors import VoleryError
+from numpy.typing import NDArray
+
+from volery.base.data_frames import to_frame
+from volery.base.errors import UsageError, VoleryError, choices
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.run.event_log import LogOptions
+from volery.run.vehicle_arrays import INDEX, vehicle_arrays
 from volery.trace.events import Event, Milestone, Text
 from volery.vehicles.vehicle import ON_LINK_LOSS
 
@@ -122,9 +126,21 @@ class Run:
         """True if the run completed, met every requirement and could be written."""
         return self.completed and self.record.outcome.requirements_met is not False and not self.problems
 
+    def arrays(self, vehicle: str) -> dict[str, NDArray[Any]]:
+        """Return the recorded states of a vehicle as numpy arrays by name; see ``vehicle_arrays``."""
+        return vehicle_arrays(self.folder, vehicle)
+
+    def to_pandas(self, vehicle: str) -> Any:
+        """Return the recorded states of a vehicle as a ``pandas.DataFrame`` with the index ``time_s``."""
+        return to_frame(self.arrays(vehicle), INDEX)
+
 
 SAMPLING_PERIOD: Ns = 200 * MS
 """Period at which the state of every vehicle is recorded."""
+
+
+FULL, SUMMARY, NOTHING = "full", "summary", "none"
+"""What is recorded of a run. ``NOTHING`` is stated by ``Options.out = None``."""
 
 
 @dataclass(frozen=True)
@@ -136,6 +152,8 @@ class Options:
         seed: Seed of every random stream.
         pace: Simulated seconds per wall second, or None for as fast as possible.
         out: Run folder, or None to keep nothing.
+        record: What the run folder gets: ``full`` is everything, ``summary`` is ``run.json`` alone, without trace
+            and report. The figures of ``run.json`` are the same.
         show: Receives the progress about once a simulated second.
         tell: Receives single lines that the user should read at once.
         graph: ``ros1`` or ``ros2`` to run the components as processes on that graph, at a pace of 1 unless
@@ -149,12 +167,22 @@ class Options:
     seed: int = 1
     pace: float | None = None
     out: Path | None = None
+    record: str = FULL
     show: Show | None = None
     tell: Tell | None = None
     graph: str = ""
     deployed: bool = False
     traces: Path | None = None
     log: LogOptions | None = None
+
+    def __post_init__(self) -> None:
+        if self.record not in (FULL, SUMMARY):
+            raise UsageError(f"no record {self.record!r}; there is {choices((FULL, SUMMARY))}, or no folder")
+
+    @property
+    def traced(self) -> bool:
+        """Whether the run writes a trace."""
+        return self.out is not None and self.record == FULL
 
 
 DEFAULT_OPTIONS = Options()

@@ -9,7 +9,9 @@ from volery.base.errors import Refused, UsageError, choices
 from volery.base.position import AMSL, AboveHome, Position
 from volery.links.mavlink_messages import constant
 from volery.vehicles.limits import Fence as ClientFence
-from volery.vehicles.plan import (
+from volery.vehicles.services import FENCE, MISSION, RALLY, Item, Services
+from volery.vehicles.telemetry import Telemetry
+from volery.vehicles.vehicle_plan import (
     DO_JUMP,
     Plan,
     areas_of,
@@ -18,8 +20,6 @@ from volery.vehicles.plan import (
     rally_items,
     rally_places,
 )
-from volery.vehicles.services import FENCE, MISSION, RALLY, Item, Services
-from volery.vehicles.telemetry import Telemetry
 
 PARTS = ("mission", "fence", "rally")
 _WAYPOINT = constant("MAV_CMD_NAV_WAYPOINT")

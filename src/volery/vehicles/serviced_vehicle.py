@@ -52,9 +52,8 @@ class ServicedVehicle(ABC):
         self._connect()
         services = self._driver.services
         if services is None:
-            autopilot = self._driver.telemetry.autopilot or "this autopilot"
             raise CapabilityError(
-                f"{self.name}: {what}: {autopilot} offers this over a MAVLink link only; here it has none"
+                f"{self.name}: {what}: not with this driver; an ArduPilot or PX4 on a MAVLink link offers it"
             )
         return services
 
@@ -95,6 +94,8 @@ class ServicedVehicle(ABC):
             raise Refused(self.name, "restart", "it is armed; land and disarm first")
         services.command("restart", "MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN", 1)
         accepted = self.kernel.now()
+        with self.kernel.guard:
+            seen.forget()
         with self.kernel.joined():
             while self.kernel.now() - max(seen.last_message_ns, accepted) < DOWN_AFTER:
                 if self.kernel.now() - accepted > SILENT_WITHIN:

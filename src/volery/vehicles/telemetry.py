@@ -164,6 +164,11 @@ class Telemetry:
         self.rc_ns: Ns = -1
         self.changed = Signal(kernel, f"telemetry of {name}")
 
+    def forget(self) -> None:
+        """Forget what a restart of the autopilot has undone, until it is reported again."""
+        self.position = self.home = None
+        self.ready = self.armable = self.flying = False
+
     # -- age
 
     def note_message(self, now: Ns) -> None:

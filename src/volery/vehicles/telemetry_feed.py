@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from math import isnan
 from typing import Any, Literal, NamedTuple
 
 from volery.base.data_frames import to_frame
@@ -51,6 +52,13 @@ def read_quantity(telemetry: Telemetry, quantity: str) -> Any:
     return read(telemetry)
 
 
+def _is_known(value: Any) -> bool:
+    """Return whether a value was reported: neither ``None`` nor NaN, and no tuple of NaN alone."""
+    if isinstance(value, tuple):
+        return any(_is_known(part) for part in value)
+    return value is not None and not (isinstance(value, float) and isnan(value))
+
+
 def subscribe(
     kernel: Kernel, telemetry: Telemetry, quantity: str, callback: Callable[[Any], object], period: Ns
 ) -> Handle:
@@ -61,7 +69,7 @@ def subscribe(
 
     def check() -> None:
         value = read(telemetry)
-        if value is not None and value != last[0]:
+        if _is_known(value) and value != last[0]:
             last[0] = value
             callback(value)
 

@@ -7,9 +7,10 @@ from math import hypot, nan
 import pytest
 
 from rigs.airstrip import Airstrip
-from volery.base.errors import OutOfBounds, Refused, UsageError
+from volery.base.errors import CapabilityError, OutOfBounds, Refused, UsageError
 from volery.base.time import MS, S
 from volery.kernel.waiting import sleep
+from volery.run.connect import connect
 from volery.vehicles import Drone
 from volery.vehicles.drivers.ardupilot import open_driver as open_ardupilot
 from volery.vehicles.drivers.px4 import open_driver as open_px4
@@ -99,3 +100,19 @@ def test_setpoints_that_make_no_sense_are_refused() -> None:
             drone.set_acceleration(up=8.0, lasting=10.0)
 
     field.fly(mission)
+
+
+def test_attitudes_of_a_dji_and_what_it_and_a_paparazzi_cannot_do() -> None:
+    with connect("sim:dji") as drone:
+        drone.takeoff(10)
+        drone.set_attitude(pitch=-8.0, lasting=3.0)
+        sleep(drone.kernel, 2500 * MS)
+        assert hypot(drone.velocity.north, drone.velocity.east) > 1.0
+        sleep(drone.kernel, 8 * S)
+        assert hypot(drone.velocity.north, drone.velocity.east) < 0.5
+        with pytest.raises(CapabilityError, match="cannot follow an acceleration"):
+            drone.set_acceleration(north=1.0)
+        with pytest.raises(CapabilityError, match="parameters: not with this driver"):
+            assert drone.parameters
+    with connect("sim:paparazzi") as drone, pytest.raises(CapabilityError, match="cannot follow an attitude"):
+        drone.set_attitude(pitch=-5.0)

@@ -1,0 +1,191 @@
+"""``volery params``, ``volery mission`` and ``volery logs``: what an autopilot keeps on board.
+
+None of these commands moves a vehicle, and one that flies goes on flying.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from volery.base.errors import UsageError, choices
+from volery.cli.command import FAILED, OK, Commands
+from volery.cli.console import Output, make_table, number_column
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from volery.vehicles import Vehicle
+    from volery.vehicles.parameters import Difference
+
+parameters = Commands("Fly", group="params", summary="Read and write the parameters of an autopilot.")
+missions = Commands("Fly", group="mission", summary="Upload and download missions, geofences, rally points.")
+commands = Commands("Fly")
+
+Url = Annotated[str, typer.Argument(metavar="URL", help="Address, such as px4+udp://:14550 or sim:px4.")]
+Kind = Annotated[str, typer.Option(help="drone or rover.")]
+Only = Annotated[
+    str | None, typer.Option(metavar="PART,...", help="Only these parts: mission, fence, rally.")
+]
+ParameterFile = Annotated[
+    Path, typer.Argument(metavar="FILE", help=".params of QGroundControl; .param or .parm of others.")
+]
+PlanFile = Annotated[Path, typer.Argument(metavar="FILE.plan", help="Plan of QGroundControl.")]
+
+KINDS = ("drone", "rover")
+
+
+@contextmanager
+def _attached(url: str, kind: str) -> Iterator[Vehicle]:
+    from volery.run.connect import attach
+    from volery.vehicles import Drone, Rover
+
+    if kind not in KINDS:
+        raise UsageError(f"--kind {kind}: give {choices(KINDS)}")
+    with attach(url, Rover if kind == "rover" else Drone) as vehicle:
+        yield vehicle
+
+
+@parameters.add("quiet", "json", "debug", name="get")
+def get(
+    output: Output,
+    url: Url,
+    names: Annotated[list[str] | None, typer.Argument(metavar="NAME...", help="By default all.")] = None,
+    kind: Kind = "drone",
+) -> int:
+    """Print parameters."""
+    with _attached(url, kind) as vehicle:
+        found = {name: vehicle.parameters.get(name) for name in names} if names else vehicle.parameters.all()
+    table = make_table("parameter", number_column("value"))
+    for name, value in found.items():
+        table.add_row(name, f"{value:.9g}")
+    output.show(table)
+    output.give(found)
+    return OK
+
+
+@parameters.add("quiet", "debug", name="set")
+def set_one(
+    output: Output,
+    url: Url,
+    name: Annotated[str, typer.Argument(metavar="NAME")],
+    value: Annotated[float, typer.Argument(metavar="VALUE")],
+    kind: Kind = "drone",
+) -> int:
+    """Set a parameter, and wait until the autopilot reports the value."""
+    with _attached(url, kind) as vehicle:
+        before = vehicle.parameters.get(name)
+        vehicle.parameters.set(name, value)
+    output.note(f"{name}: {before:.9g} -> {value:.9g}")
+    return OK
+
+
+@parameters.add("quiet", "debug", name="save")
+def save(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
+    """Write all parameters into a file."""
+    with _attached(url, kind) as vehicle:
+        count = vehicle.parameters.save(file)
+    output.note(f"{count} parameters: {file}")
+    return OK
+
+
+@parameters.add("quiet", "json", "debug", name="load")
+def load(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
+    """Set the parameters of a file that differ from the vehicle's."""
+    with _attached(url, kind) as vehicle:
+        changed = vehicle.parameters.load(file)
+    _show(output, changed, "before", "now")
+    output.note(f"{len(changed)} parameters were set")
+    return OK
+
+
+@parameters.add("quiet", "json", "debug", name="diff")
+def diff(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
+    """Compare a vehicle with a file. Exit status: 0 if no parameter of the file differs, else 1."""
+    with _attached(url, kind) as vehicle:
+        found = vehicle.parameters.compare(file)
+    _show(output, found, "vehicle", "file")
+    return FAILED if found else OK
+
+
+def _show(output: Output, found: Sequence[Difference], here: str, there: str) -> None:
+    if found:
+        table = make_table("parameter", number_column(here), number_column(there))
+        for one in found:
+            table.add_row(one.name, *("-" if one is None else f"{one:.9g}" for one in one[1:]))
+        output.show(table)
+    output.give([one._asdict() for one in found])
+
+
+@missions.add("quiet", "debug", name="upload")
+def upload(output: Output, url: Url, file: PlanFile, only: Only = None, kind: Kind = "drone") -> int:
+    """Replace mission, geofence and rally points on board by those of a plan; an empty part clears."""
+    from volery.vehicles.vehicle_plan import Plan
+
+    plan = Plan.read(file)
+    with _attached(url, kind) as vehicle:
+        if plan.mission and "mission" in _parts(only):
+            vehicle.wait_ready()
+        vehicle.plan.upload(plan, _parts(only))
+    output.note(f"{_count(plan)} are on board of {url}")
+    return OK
+
+
+@missions.add("quiet", "debug", name="download")
+def download(output: Output, url: Url, file: PlanFile, only: Only = None, kind: Kind = "drone") -> int:
+    """Write mission, geofence and rally points on board into a plan."""
+    with _attached(url, kind) as vehicle:
+        plan = vehicle.plan.download(_parts(only))
+    plan.write(file)
+    output.note(f"{_count(plan)}: {file}")
+    return OK
+
+
+def _parts(only: str | None) -> tuple[str, ...]:
+    from volery.vehicles.onboard_plan import PARTS
+
+    return tuple(part.strip() for part in only.split(",")) if only else PARTS
+
+
+def _count(plan: object) -> str:
+    from volery.vehicles.vehicle_plan import Plan
+
+    assert isinstance(plan, Plan)
+    return f"{len(plan.mission)} mission items, {len(plan.fence)} areas, {len(plan.rally)} rally points"
+
+
+@commands.add("quiet", "json", "debug")
+def logs(
+    output: Output,
+    url: Url,
+    get: Annotated[int | None, typer.Option(metavar="NUMBER", help="Download this log.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="File to download into.")] = None,
+    kind: Kind = "drone",
+) -> int:
+    """List the logs on board of an autopilot, or download one; a download goes on where it was ended."""
+    with _attached(url, kind) as vehicle:
+        entries = vehicle.logs.list()
+        if get is not None:
+            entry = next((one for one in entries if one.number == get), None)
+            if entry is None:
+                numbers = choices(str(one.number) for one in entries)
+                raise UsageError(f"--get {get}: there is no such log; there is {numbers}")
+            suffix = ".ulg" if vehicle.telemetry.autopilot == "PX4" else ".bin"
+            path = vehicle.logs.download(entry, out or Path(f"log-{get}{suffix}"))
+            output.note(f"{entry.size} bytes: {path}")
+            return OK
+    table = make_table(number_column("log"), number_column("bytes"), "ended (UTC)")
+    for one in entries:
+        ended = f"{datetime.fromtimestamp(one.utc, UTC):%Y-%m-%d %H:%M:%S}" if one.utc else "-"
+        table.add_row(str(one.number), str(one.size), ended)
+    if entries:
+        output.show(table)
+    else:
+        output.note("there are no logs on board")
+    output.give([one._asdict() for one in entries])
+    return OK

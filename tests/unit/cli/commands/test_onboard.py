@@ -1,0 +1,52 @@
+"""``volery params``, ``mission`` and ``logs`` on a simulated autopilot, as a user calls them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from typer.testing import CliRunner, Result
+
+from volery.cli.main import app
+
+
+def volery(*words: object) -> Result:
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def test_parameters_are_saved_compared_and_set(tmp_path: Path) -> None:
+    file = tmp_path / "all.params"
+    assert volery("params", "save", "sim:px4", file).exit_code == 0
+    assert volery("params", "diff", "sim:px4", file).exit_code == 0
+    file.write_text("MPC_XY_CRUISE 3.5\n", encoding="utf-8")
+    found = volery("params", "diff", "sim:px4", file, "--json")
+    assert found.exit_code == 1
+    assert json.loads(found.stdout)[0]["there"] == 3.5
+    assert "1 parameters were set" in volery("params", "load", "sim:px4", file).output
+    assert json.loads(volery("params", "get", "sim:px4", "MPC_XY_CRUISE", "--json").stdout).keys() == {
+        "MPC_XY_CRUISE"
+    }
+    assert "-> 4" in volery("params", "set", "sim:px4", "MPC_XY_CRUISE", "4").output
+
+
+def test_mistakes_are_answered_in_one_line(tmp_path: Path) -> None:
+    for words, said in (
+        (("params", "get", "sim:dji", "X"), "an ArduPilot or PX4 on a MAVLink link offers it"),
+        (("params", "get", "sim:px4", "NO_SUCH"), "does not answer for a parameter that it does not have"),
+        (("params", "get", "sim:px4", "--kind", "plane"), "--kind plane: give drone or rover"),
+        (("mission", "upload", "sim:px4", tmp_path / "no.plan"), "there is no such file"),
+        (("mission", "download", "sim:px4", tmp_path / "a.plan", "--only", "fences"), "no part 'fences'"),
+        (("logs", "sim:ardupilot", "--get", "7"), "--get 7: there is no such log"),
+    ):
+        result = volery(*words)
+        assert result.exit_code != 0
+        assert said in " ".join(result.output.split())
+        assert "Traceback" not in result.output
+
+
+def test_a_plan_and_the_logs(tmp_path: Path) -> None:
+    file = tmp_path / "empty.plan"
+    assert volery("mission", "download", "sim:ardupilot", file).exit_code == 0
+    assert json.loads(file.read_text(encoding="utf-8"))["fileType"] == "Plan"
+    assert "0 mission items" in volery("mission", "upload", "sim:ardupilot", file).output
+    assert volery("logs", "sim:ardupilot", "--json").exit_code == 0
