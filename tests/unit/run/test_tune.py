@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,10 @@ from volery.run.tune import tune
 def test_tuned_gains_have_margins_and_cost_less_on_the_fitted_process(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(tuning, "ROUNDS", 3)
+    short = replace(module.LOOPS["rotation"], training=(0.0, 90.0), held_back=(0.0, 60.0), seconds=4.0)
+    monkeypatch.setattr(module, "LOOPS", {**module.LOOPS, "rotation": short})
+    monkeypatch.setattr(tuning, "ROUNDS", 2)
+    monkeypatch.setattr(tuning, "CANDIDATES", 24)
     monkeypatch.setattr(module, "TRAINING", 6)
     monkeypatch.setattr(module, "HELD_BACK", 8)
     monkeypatch.setattr(module, "CANDIDATES", 2)  # the gains by hand and those of the process, in flights
