@@ -31,7 +31,7 @@ def main() -> None:
     for driver in DRIVERS:
         frames = frames_for(driver)
         start = process_time()
-        siege = fuzz(driver, frames, SOME)
+        campaign = fuzz(driver, frames, SOME)
         each = (process_time() - start) / SOME
         growth = Growth(count)
         tracemalloc.start()
@@ -39,7 +39,7 @@ def main() -> None:
         tracemalloc.stop()
         kept = growth.late - growth.early
         print(
-            f"{driver:10} {1e6 * each:5.1f} us a frame, {siege.received / siege.fed:4.0%} decoded; from "
+            f"{driver:10} {1e6 * each:5.1f} us a frame, {campaign.received / campaign.fed:4.0%} decoded; from "
             f"{count // EARLY} to {count} frames {kept / 1e3:+.0f} kB ({growth.late / growth.early:.2f} x)"
         )
 

@@ -34,7 +34,7 @@ WORDS = (
     r"summons",
     r"portraits?",
     r"airfields?",
-    r"besieged?",
+    r"(be)?sieged?",
     r"stand[-_]ins?",
     r"faces?",
     r"houses?",

@@ -57,21 +57,21 @@ class Growth:
 
 
 @pytest.mark.parametrize(("driver", "count"), [("ardupilot", MANY), ("px4", SOME), ("paparazzi", SOME)])
-def test_a_siege_ends_as_it_began(driver: str, count: int) -> None:
+def test_fuzzing_leaves_nothing_behind(driver: str, count: int) -> None:
     growth = Growth(count)
     tracemalloc.start()
     try:
-        siege = fuzz(driver, frames_for(driver), count, after=growth.look)
+        campaign = fuzz(driver, frames_for(driver), count, after=growth.look)
     finally:
         tracemalloc.stop()
-    assert siege.fed == count
-    assert siege.received > 0.5 * count
-    assert sum(siege.ended.values()) > 100  # its program was not stuck
+    assert campaign.fed == count
+    assert campaign.received > 0.5 * count
+    assert sum(campaign.ended.values()) > 100  # its program was not stuck
     assert growth.early > 0
     assert growth.late - growth.early < MOST_GROWTH
 
 
-def test_the_same_seed_lays_the_same_siege() -> None:
+def test_the_same_seed_gives_the_same_campaign() -> None:
     frames = recorded("ardu")
     first, second, other = (
         [data for data, _ in zip(Mutator("MAVLink", frames, stream(seed, "x")), range(500), strict=False)]

@@ -171,7 +171,7 @@ class FuzzTarget(CodedLink):
 
 
 @dataclass
-class Siege:
+class FuzzResult:
     """Result of fuzzing: ``received`` counts complete frames, ``ended`` outcomes of operations by name."""
 
     fed: int = 0
@@ -191,7 +191,7 @@ def fuzz(
     *,
     seed: int = 1,
     after: Callable[[int], None] = lambda fed: None,
-) -> Siege:
+) -> FuzzResult:
     """Pass mutated frames to a driver while a program flies with it.
 
     Exceptions that are not errors of this project, in the parser, the driver or the program's calls, are
@@ -200,11 +200,11 @@ def fuzz(
     kernel = VirtualKernel()
     factory = drivers.load(driver)
     assert factory.on_link is not None, "hostile bytes need a link"
-    link = FuzzTarget(kernel, "siege", factory.codec)
+    link = FuzzTarget(kernel, "campaign", factory.codec)
     opened = factory.on_link(kernel, link, "craft", {})
     drone = Drone(kernel, "craft", opened)
     random = stream(seed, f"hostile/{driver}")
-    result = Siege()
+    result = FuzzResult()
     kernel.spawn(lambda: _fly_on(kernel, drone, result), "program", ExecutionContext("program"))
     portion: list[bytes] = []
     for data in Mutator(factory.codec.name, frames, random):
@@ -233,7 +233,7 @@ def _arrive(link: FuzzTarget, data: bytes, random: Random) -> None:
         place += size
 
 
-def _fly_on(kernel: VirtualKernel, drone: Drone, result: Siege) -> None:
+def _fly_on(kernel: VirtualKernel, drone: Drone, result: FuzzResult) -> None:
     """Run operations one after the other without end; those that fail are repeated."""
     tries: tuple[Callable[[], object], ...] = (
         lambda: drone.wait_ready(within=2.0),
