@@ -14,6 +14,10 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on 
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")]
 Seed = Annotated[int, typer.Option(help="Seed of every random stream of the run.")]
 Out = Annotated[Path | None, typer.Option(help="Run folder; by default a new one in ./runs.")]
+Record = Annotated[
+    str,
+    typer.Option(metavar="full|summary|none", help="Keep everything, run.json alone, or no run folder."),
+]
 Overrides = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="PATH=VALUE", help="Override a value of the model; may be repeated."),

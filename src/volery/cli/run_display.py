@@ -17,6 +17,7 @@ from rich.table import Table
 from rich.text import Text
 from rich.traceback import Traceback
 
+from volery.base.errors import UsageError, choices
 from volery.base.time import clock, to_seconds
 from volery.cli.command import BAD_INPUT, BAD_INPUT_ERRORS, FAILED, OK
 from volery.cli.console import Output
@@ -24,7 +25,7 @@ from volery.report.terminal import summary_table
 from volery.requirements.record import RequirementRecord
 from volery.run.event_log import LogOptions, parse_level
 from volery.run.recording import make_folder
-from volery.run.result import Progress, Run
+from volery.run.result import FULL, NOTHING, SUMMARY, Progress, Run
 
 DRAWING_PERIOD_S = 0.1
 """Wall seconds between two drawings: to draw takes longer than to simulate one second."""
@@ -161,6 +162,29 @@ def run_folder(out: Path | None, name: str) -> Iterator[Path]:
         with suppress(OSError):  # it is not empty
             for one in missing:
                 one.rmdir()
+
+
+@contextmanager
+def recorded_folder(out: Path | None, name: str, record: str) -> Iterator[Path | None]:
+    """Make the folder of a run as ``run_folder`` does, or yield None if nothing is recorded.
+
+    Args:
+        out: The folder; None for a new one in ``RUNS``.
+        name: Name of a new folder, without its number.
+        record: ``full``, ``summary`` or ``none``.
+
+    Raises:
+        UsageError: The folder cannot be written, there is no such record, or a folder is named for none.
+    """
+    if record not in (FULL, SUMMARY, NOTHING):
+        raise UsageError(f"--record {record}: there is {choices((FULL, SUMMARY, NOTHING))}")
+    if record != NOTHING:
+        with run_folder(out, name) as folder:
+            yield folder
+    elif out is not None:
+        raise UsageError(f"--record none writes no run folder; leave out --out {out}")
+    else:
+        yield None
 
 
 def read_log_options(file: Path | None, level: str) -> LogOptions | None:

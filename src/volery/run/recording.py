@@ -1,8 +1,9 @@
 """Recording of a run: the event stream with its taps, and the run folder.
 
-A run without a folder keeps accounts and verdicts only. With a folder it writes ``trace.mcap`` and
-``timeline.json`` while it runs, and ``run.json`` and the reports at its end; see ``docs/run-folder.md``. Wall
-time and versions differ between executions of the same run, so they go to ``run.json`` only.
+A run without a folder keeps accounts and verdicts only, one that is not traced writes ``run.json``. Any other
+writes ``trace.mcap`` and ``timeline.json`` while it runs, and ``run.json`` and the reports at its end; see
+``docs/run-folder.md``. Wall time and versions differ between executions of the same run, so they go to
+``run.json`` only.
 """
 
 from __future__ import annotations
@@ -72,7 +73,14 @@ class Recording:
     ``problems`` lists files that could not be written, ``notes`` documents that need a missing extra.
     """
 
-    def __init__(self, setup: RunSetup, out: Path | None, attachments: Iterable[Attachment] = ()) -> None:
+    def __init__(
+        self,
+        setup: RunSetup,
+        out: Path | None,
+        attachments: Iterable[Attachment] = (),
+        *,
+        traced: bool = True,
+    ) -> None:
         self.stream = Stream()
         self.accounts = Accounts(setup)
         self.folder = make_folder(out) if out is not None else None
@@ -85,6 +93,7 @@ class Recording:
         self.stream.tap(self.accounts)
         if self.folder is not None:
             _forget_earlier_run(self.folder)
+        if self.folder is not None and traced:
             self._trace = McapWriter(self.folder / TRACE_FILE, setup, attachments, _definition)
             self._timeline = TimelineWriter(self.folder / TIMELINE_FILE)
             self.stream.tap(self._trace)
@@ -115,7 +124,7 @@ class Recording:
     def _write_documents(self, record: RunRecord, folder: Path) -> None:
         try:
             write_record(record, folder)
-            for name in reporters.names():
+            for name in reporters.names() if self._trace is not None else ():
                 try:
                     reporters.load(name)(folder)
                 except MissingExtraError as error:
@@ -133,5 +142,5 @@ def _definition(message_type: str) -> str:
 
 def _forget_earlier_run(folder: Path) -> None:
     """Remove the results of an earlier run, which would look like those of this one if it is killed."""
-    for name in (RUN_FILE, REPORT_FILE):
+    for name in (RUN_FILE, REPORT_FILE, TRACE_FILE, TIMELINE_FILE):
         (folder / name).unlink(missing_ok=True)

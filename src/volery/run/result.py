@@ -152,8 +152,8 @@ class Options:
         seed: Seed of every random stream.
         pace: Simulated seconds per wall second, or None for as fast as possible.
         out: Run folder, or None to keep nothing.
-        record: What the run folder gets: ``full`` is everything, ``summary`` is ``run.json`` alone, without trace
-            and report. The figures of ``run.json`` are the same.
+        record: What the run folder gets: ``full`` is everything, ``summary`` is ``run.json`` alone, without
+            trace and report. The figures of ``run.json`` are the same.
         show: Receives the progress about once a simulated second.
         tell: Receives single lines that the user should read at once.
         graph: ``ros1`` or ``ros2`` to run the components as processes on that graph, at a pace of 1 unless
@@ -163,7 +163,7 @@ class Options:
         traces: Folder in which C++ components record the basic blocks that they enter, without being charged.
     """
 
-    fidelity: str = "times"
+    fidelity: str = "code"
     seed: int = 1
     pace: float | None = None
     out: Path | None = None

@@ -142,7 +142,7 @@ class _Simulation:
         return setup_of(self._system, platform, self._options.seed, self._options.fidelity)
 
     def _build(self, platform: Platform) -> BuiltComponents:
-        records = record_none if self._options.out is None else record_all
+        records = record_all if self._options.traced else record_none
         builder = Builder(self._system, self._kernel, platform, self._fleet, self._ending, records=records)
         return builder.build(self._options.fidelity, self._options.seed, self._options.traces)
 
@@ -161,7 +161,7 @@ class _Simulation:
             through_bytes=with_faulty_links(environment),
         )
         self._built = self._build(platform)
-        self._recording = Recording(setup, options.out, attachments_of(system))
+        self._recording = Recording(setup, options.out, attachments_of(system), traced=options.traced)
         kernel.record = self._recording.stream
         self._observers = Observers(system.requirements, setup)
         self._recording.stream.tap(self._observers)

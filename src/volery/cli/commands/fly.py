@@ -12,7 +12,7 @@ from volery.base.errors import UsageError
 from volery.base.installed import require_extra
 from volery.cli.command import OK, Commands
 from volery.cli.console import Output
-from volery.cli.options import LogFile, LogLevel, Out, Seed, Speed, parse_speed
+from volery.cli.options import LogFile, LogLevel, Out, Record, Seed, Speed, parse_speed
 
 if TYPE_CHECKING:
     from volery.run.serve import VehicleNodeServer, VehicleServer
@@ -50,15 +50,16 @@ def fly(
         ),
     ] = None,
     out: Out = None,
+    record: Record = "full",
     log_file: LogFile = None,
     log_level: LogLevel = "info",
 ) -> int:
     """Fly a mission on a simulated or a real vehicle; the mission file is the same for both."""
-    from volery.cli.run_display import read_log_options, run_folder, run_progress, show_outcome
+    from volery.cli.run_display import read_log_options, recorded_folder, run_progress, show_outcome
     from volery.run.assembly.fences import read_fence
     from volery.run.fly import Restrictions
     from volery.run.fly import fly as run_flight
-    from volery.run.result import Options
+    from volery.run.result import FULL, SUMMARY, Options
 
     if not mission.is_file():
         expected = "a Python file with `def mission(drone: Drone)` is expected"
@@ -70,7 +71,7 @@ def fly(
         battery_reserve=_share(reserve) if reserve is not None else None,
     )
     with (
-        run_folder(out, mission.stem) as folder,
+        recorded_folder(out, mission.stem, record) as folder,
         run_progress(output, f"{mission.name} on {', '.join(on)}") as show,
     ):
         options = Options(
@@ -78,6 +79,7 @@ def fly(
             seed=seed,
             pace=pace,
             out=folder,
+            record=SUMMARY if record == SUMMARY else FULL,
             show=show,
             tell=output.note,
             log=read_log_options(log_file, log_level),

@@ -25,13 +25,14 @@ from volery.cli.options import (
     Model,
     Out,
     Overrides,
+    Record,
     Scenario,
     Seed,
     Speed,
     parse_speed,
 )
 
-model_commands = Commands("Simulate", group="model", summary="Check and draw a model without running it.")
+model_commands = Commands("Simulate", group="model", summary="Check, draw, analyse and convert models.")
 
 
 @model_commands.add("debug")
@@ -185,6 +186,7 @@ def simulate(
         typer.Option(help="With --graph: others start the components, from packages of `volery deploy`."),
     ] = False,
     out: Out = None,
+    record: Record = "full",
     log_file: LogFile = None,
     log_level: LogLevel = "info",
 ) -> int:
@@ -193,10 +195,10 @@ def simulate(
     Exit status: 0 if the run completed and met every requirement, 2 for bad input, 1 otherwise.
     """
     require_extra("simulation", "simulated runs")
-    from volery.cli.run_display import read_log_options, run_folder, run_progress, show_outcome
+    from volery.cli.run_display import read_log_options, recorded_folder, run_progress, show_outcome
     from volery.model.system_loader import load
     from volery.run.assembly.model_checks import vocabulary
-    from volery.run.result import Options
+    from volery.run.result import FULL, SUMMARY, Options
     from volery.run.simulate import simulate as run_simulation
 
     pace = parse_speed(speed)
@@ -204,12 +206,13 @@ def simulate(
         raise UsageError("--deployed: name the graph of the components, too: --graph ros1 or --graph ros2")
     system = load(model, vocabulary(), scenario, allocation, overrides or ())
     title = " · ".join(filter(None, (system.name, system.allocation, system.scenario)))
-    with run_folder(out, system.name) as folder, run_progress(output, title) as show:
+    with recorded_folder(out, system.name, record) as folder, run_progress(output, title) as show:
         options = Options(
             fidelity=fidelity,
             seed=seed,
             pace=pace,
             out=folder,
+            record=SUMMARY if record == SUMMARY else FULL,
             show=show,
             tell=output.note,
             graph=graph,
