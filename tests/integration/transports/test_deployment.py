@@ -28,10 +28,10 @@ from volery.run.distributed.call_types import call_types
 
 from .conftest import python_of, surroundings
 
-pytestmark = [pytest.mark.integration, pytest.mark.timeout(390)]
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(600)]
 
 DELIVERY = Path(__file__).parents[3] / "examples" / "delivery"
-LIMIT_S = 280
+LIMIT_S = 400
 SETTINGS = ("--seed", "7", "--speed", "2.5", "--set", "run.duration=300s")
 
 
