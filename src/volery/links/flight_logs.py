@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,8 @@ STATION = "station."
 DATAFLASH, ULOG, TLOG = "DataFlash", "ULog", "tlog"
 _ULOG_MAGIC = b"ULog\x01\x12\x35"
 _DATAFLASH_HEAD = b"\xa3\x95"
+_FORMAT, _FORMAT_SIZE, _HEAD_SIZE = 0x80, 89, 3
+"""Type and length of the message that defines others in a DataFlash log; length of a message's head."""
 _NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
 
 
@@ -132,11 +135,31 @@ def _tlog(path: Path, wanted: set[str]) -> Tables:
     return rows.tables()
 
 
+def _check_formats(path: Path) -> None:
+    """Refuse a binary log that defines a message shorter than its head: pymavlink would read it for ever."""
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data:
+        lengths, at, size = {_FORMAT: _FORMAT_SIZE}, 0, len(data)
+        while 0 <= at <= size - 5:
+            if data[at : at + 2] != _DATAFLASH_HEAD:
+                at = data.find(_DATAFLASH_HEAD, at + 1)
+                continue
+            kind = data[at + 2]
+            if kind == _FORMAT:
+                lengths[data[at + 3]] = data[at + 4]
+                if data[at + 4] < _HEAD_SIZE:
+                    what = f"it defines a message of {data[at + 4]} bytes"
+                    raise UsageError(f"{path} is a damaged DataFlash log: at byte {at} {what}")
+            at += lengths.get(kind, 1)
+
+
 def _dataflash(path: Path, wanted: set[str]) -> Tables:
+    with path.open("rb") as file:
+        binary = file.read(2) == _DATAFLASH_HEAD
+    if binary:
+        _check_formats(path)
     rows = _Rows()  # times are those since boot
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # it prints what is damaged
         try:
-            binary = path.open("rb").read(2) == _DATAFLASH_HEAD
             kind = DFReader.DFReader_binary if binary else DFReader.DFReader_text
             reader = kind(str(path))
             names = list(wanted) or None

@@ -79,6 +79,18 @@ def test_damage_inside_a_log_does_not_end_it(copter: Path) -> None:
     assert len(read_flight_log(copter)["ATT"]["time"]) >= 15
 
 
+@pytest.mark.parametrize("length", [0, 2])
+def test_a_definition_of_a_message_without_length_is_refused_and_not_read_for_ever(
+    copter: Path, length: int
+) -> None:
+    data = bytearray(copter.read_bytes())
+    second = data.index(b"\xa3\x95\x80", 5)
+    data[second + 4] = length
+    copter.write_bytes(data)
+    with pytest.raises(UsageError, match=f"at byte {second} it defines a message of {length} bytes"):
+        read_flight_log(copter)
+
+
 def test_a_format_that_does_not_exist_ends_the_log_there(copter: Path) -> None:
     data = copter.read_bytes()
     copter.write_bytes(
