@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from volery.testing.driver_conformance import conformance
-from volery.testing.fault_trials import FAULTS, PHASES, try_fault
+from volery.testing.fault_trials import FAULTS, PHASES, TouchDown, try_fault
 
 AUTOPILOTS = ("ardupilot", "px4", "paparazzi", "dji")
 KEPT = Path(__file__).parent.parent / "docs" / "reference" / "trials.json"
@@ -50,10 +51,16 @@ def trials(autopilot: str) -> list[dict[str, Any]]:
                     "caller": one.caller,
                     "aircraft": list(one.aircraft),
                     "ended": one.ended,
+                    "landing": _rounded(one.landing),
                     "broken": one.broken,
                 }
             )
     return found
+
+
+def _rounded(landing: TouchDown | None) -> dict[str, float] | None:
+    """The touch-down to two decimals: a diff shows what matters."""
+    return None if landing is None else {name: round(value, 2) for name, value in asdict(landing).items()}
 
 
 def main() -> int:

@@ -4,7 +4,8 @@ Each phase is a small program, which calls ``strike`` at the time of the fault a
 during a call, ``strike`` is scheduled a moment later. A trial demands of every driver and autopilot: no call
 hangs; it succeeds or raises an error of this project that names the vehicle; success agrees with the
 vehicle's true state; nothing is done twice; modes of other commanders are not overridden; and the vehicle
-lands in the end.
+lands in the end: motors never off in the air, upright, slower than it breaks. The judge is the simulation's
+truth, not the autopilot's estimate. The energy that is left at touch-down is reported.
 
 The faults are kinds of the catalogue (``volery.model.faults``), with the effects that they have in a model.
 Only here are the two kinds that a model cannot state: another station that takes over, and the death of the
@@ -13,10 +14,11 @@ program.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
+from math import acos, degrees, dist, hypot
 from typing import Any, TypeVar
 
 from volery.base.errors import VoleryError
@@ -29,6 +31,7 @@ from volery.model.faults import (
     GpsLost,
     LinkCut,
     LinkDegraded,
+    MotorDead,
     OtherStation,
     ProgramKilled,
     VehicleFault,
@@ -63,12 +66,13 @@ FAULTS: Mapping[str, Fault | None] = {
     "truncated": _trial(LinkDegraded, truncate=0.2),
     "other-station": _trial(OtherStation),
     "killed": _trial(ProgramKilled),
-    "battery-low": _trial(BatteryLow, charge=0.08),
+    "battery-low": _trial(BatteryLow, charge=0.14),
     "gps-lost": _trial(GpsLost),
+    "motor-weak": _trial(MotorDead, thrust=0.7),
     "wind": _trial(WindChange, speed_m_s=12.0, direction_deg=270.0, gusts_m_s=1.5),
 }
-"""12 m/s is the strongest wind against which this airframe still makes way: at 30 degrees of tilt its drag
-holds 13 m/s.
+"""14 % is just below the default reserve: what is left must suffice to land. 12 m/s is the strongest wind
+against which this airframe still makes way: at 30 degrees of tilt its drag holds 13 m/s.
 """
 
 
@@ -145,11 +149,19 @@ def takeoff(stage: Stage, strike: Strike) -> None:
     stage.drone.takeoff(15)
 
 
+GOALS: Mapping[str, tuple[float, float, float]] = {
+    "goto": (40.0, 10.0, 12.0),
+    "hold": (15.0, 0.0, 10.0),
+    "sticks": (10.0, 0.0, 10.0),
+}
+"""Where the last goto() of a phase goes: north, east, up about home [m]."""
+
+
 def goto(stage: Stage, strike: Strike) -> None:
     """Strike on the way to a position."""
     stage.drone.takeoff(10)
     stage.later(DURING_S, strike)
-    stage.drone.goto(stage.at(40, 10, 12))
+    stage.drone.goto(stage.at(*GOALS["goto"]))
 
 
 def hold(stage: Stage, strike: Strike) -> None:
@@ -158,7 +170,7 @@ def hold(stage: Stage, strike: Strike) -> None:
     stage.drone.hold()
     strike()
     stage.sleep(12.0)
-    stage.drone.goto(stage.at(15, 0, 10))
+    stage.drone.goto(stage.at(*GOALS["hold"]))
 
 
 def return_home(stage: Stage, strike: Strike) -> None:
@@ -184,7 +196,7 @@ def sticks(stage: Stage, strike: Strike) -> None:
     fly_by_hand(stage, 2.0, 0.5)
     strike()
     fly_by_hand(stage, 12.0, 0.5)
-    stage.drone.goto(stage.at(10, 0, 10))
+    stage.drone.goto(stage.at(*GOALS["sticks"]))
 
 
 PHASES: Mapping[str, Program] = {
@@ -206,6 +218,62 @@ WATCHED: Ns = 100 * MS
 LOST_S = 30.0
 """Time between the death of a program and the start of the next one, s."""
 DOWN_WITHIN_S = 300.0
+
+NEAR_M = 5.0
+"""Largest distance from the goal, by truth, at which an operation may return."""
+CLOSE_M, STANDING_M = 1.2, 0.3
+"""Heights above ground: the last approach, and a vehicle that stands on its legs."""
+BREAKS_M_S, UPRIGHT_DEG = 3.0, 35.0
+"""Sink rate and lean at touch-down from which an airframe counts as damaged; the strongest wind of the trials
+is held at a lean of 27 degrees.
+"""
+
+
+def lean(state: VehicleState) -> float:
+    """Return the angle between a vehicle's vertical axis and the plumb line [deg]."""
+    cosine = 1.0 - 2.0 * (state.qx * state.qx + state.qy * state.qy)
+    return degrees(acos(max(-1.0, min(1.0, cosine))))
+
+
+@dataclass(frozen=True)
+class TouchDown:
+    """How a vehicle came to the ground, by truth.
+
+    Attributes:
+        sink_m_s: Largest sink rate on the last metre.
+        lean_deg: Largest lean on the last metre.
+        away_m: Distance from home.
+        battery: Share of the battery that is left.
+    """
+
+    sink_m_s: float
+    lean_deg: float
+    away_m: float
+    battery: float
+
+
+def touch_down(states: Sequence[VehicleState]) -> TouchDown | None:
+    """Return the last touch-down among samples of a flight; ``None`` if the vehicle has not flown."""
+    landed = next(
+        (
+            place
+            for place in range(len(states) - 1, 0, -1)
+            if states[place].z <= STANDING_M < states[place - 1].z
+        ),
+        None,
+    )
+    if landed is None:
+        return None
+    first = landed - 1
+    while first > 0 and STANDING_M < states[first - 1].z <= CLOSE_M:
+        first -= 1
+    last_metre, ground = states[first:landed], states[landed]
+    return TouchDown(
+        max(-state.vz for state in last_metre),
+        max(lean(state) for state in last_metre),
+        hypot(ground.x, ground.y),
+        ground.battery,
+    )
 
 
 @dataclass
@@ -238,6 +306,7 @@ class Trial:
         caller: ``done``, or the name of the error of the call.
         said: Text of that error.
         aircraft: Modes of the aircraft from the fault on.
+        landing: How it came to the ground; ``None`` if it has not flown.
         broken: The demand that was not met; empty if all were.
     """
 
@@ -248,6 +317,7 @@ class Trial:
     said: str
     aircraft: tuple[str, ...]
     ended: str
+    landing: TouchDown | None
     broken: str = ""
 
 
@@ -291,7 +361,9 @@ class _Trying:
             broken = str(error)
         finally:
             stage.close()
-        return Trial(*self._names, self._caller, self._said, tuple(self._after.modes), self._ended, broken)
+        landing = touch_down(self._seen.states)
+        modes = tuple(self._after.modes)
+        return Trial(*self._names, self._caller, self._said, modes, self._ended, landing, broken)
 
     def _look(self) -> None:
         state = self._stage.fleet.autopilots[self._name].state()
@@ -374,13 +446,20 @@ class _Trying:
         elif phase in {"return", "land"}:
             demand(not state.armed and state.z < 1.0, f"it returned at {state.z:.1f} m, armed: {state.armed}")
         else:
-            demand(state.armed and state.z > 5.0, f"goto() returned at {state.z:.1f} m, armed: {state.armed}")
+            demand(state.armed, f"goto() returned disarmed at {state.z:.1f} m")
+        north, east, up = GOALS.get(phase, (0.0, 0.0, state.z))
+        off = dist((state.x, state.y, state.z), (east, north, up))
+        demand(phase == "land" or off <= NEAR_M, f"{phase} returned {off:.1f} m off")
 
     def _judge_aircraft(self) -> None:
         demand(not self._seen.armed[-1], f"it is still armed in {self._seen.modes[-1]} ({self._ended})")
         demand(self._seen.armings <= 1 or self._taken_over, f"it was armed {self._seen.armings} times")
-        height = self._seen.states[-1].z
-        demand(height < 1.0, f"it is disarmed at {height:.1f} m")
+        off = next((state.z for state in self._seen.states if not state.armed and state.z > 1.0), 0.0)
+        demand(off == 0.0, f"its motors were off at {off:.1f} m")
+        landing = touch_down(self._seen.states)
+        if landing is not None:
+            demand(landing.sink_m_s < BREAKS_M_S, f"it touched down at {landing.sink_m_s:.1f} m/s")
+            demand(landing.lean_deg < UPRIGHT_DEG, f"it touched down leaning {landing.lean_deg:.0f} degrees")
         if self._taken_over:
             self._demand_not_fought()
 

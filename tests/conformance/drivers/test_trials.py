@@ -54,3 +54,10 @@ def test_faults(autopilot: str, reference: Any) -> None:
             expected = shown[fault, phase]
             found = trial.caller, list(trial.aircraft)
             assert found == (expected["caller"], expected["aircraft"]), (fault, phase)
+
+
+def test_a_landing_without_a_position_is_no_return_home() -> None:
+    trial = try_fault("dji", "gps-lost", "return")
+    assert (trial.caller, trial.broken) == ("PositionLost", "")
+    assert trial.landing is not None
+    assert trial.landing.away_m > 20.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from volery.base.errors import OutOfBounds, Refused
+from volery.base.errors import OutOfBounds, PositionLost, Refused
 from volery.base.time import Ns, S
 from volery.ros.messages.dji_constants import SETPOINT_HEIGHTS, DisplayMode
 from volery.vehicles.driver import Step
@@ -297,8 +297,19 @@ class DjiTasks:
         return seen.flying and seen.mode not in {mode.name for mode in TAKES_OFF}
 
     def return_home(self, within: Ns) -> Sequence[Step]:
-        """Return steps for task 1: climb, go home and land; near home it lands at once."""
-        return self._until_down(GO_HOME, DisplayMode.NAVI_GO_HOME, "return home and land", within)
+        """Return steps for task 1: climb, go home and land; near home it lands at once.
+
+        Without satellites the aircraft lands where it has drifted to, in the same mode.
+        """
+        steps = self._until_down(GO_HOME, DisplayMode.NAVI_GO_HOME, "return home and land", within)
+        return (*steps, immediate_step("land at home", self._check_located)) if steps else ()
+
+    def _check_located(self) -> None:
+        """Raise ``PositionLost`` if it landed without a position."""
+        seen = self._telemetry
+        if not seen.located:
+            what = f"it has landed without a position (its GPS reports {seen.fix}), perhaps far from home"
+            raise PositionLost(seen.name, "return home", what)
 
     def land(self, within: Ns) -> Sequence[Step]:
         """Return steps for task 6; done when the motors have stopped."""
