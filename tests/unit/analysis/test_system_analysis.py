@@ -226,7 +226,7 @@ def test_no_simulated_time_of_a_pipeline_exceeds_its_bound(system_of, tmp_path):
     found = analyse(system)
     bounds = {one.subject: one for each in found.responses.values() for one in each}
     assert all(one.bound is not None for one in bounds.values()), bounds
-    record = simulate(system, Options(out=tmp_path / "run")).record
+    record = simulate(system, Options("times", out=tmp_path / "run")).record
     assert record.outcome.status == "completed"
     seen = longest_times(tmp_path / "run")
     assert set(seen.responses) == {"camera", "finder", "control", "motor"}
