@@ -40,7 +40,8 @@ def main() -> None:
         kept = growth.late - growth.early
         print(
             f"{driver:10} {1e6 * each:5.1f} us a frame, {campaign.received / campaign.fed:4.0%} decoded, "
-            f"from {count // EARLY} to {count} frames {kept / 1e3:+.0f} kB ({growth.late / growth.early:.2f} x)"
+            f"from {count // EARLY} to {count} frames {kept / 1e3:+.0f} kB "
+            f"({growth.late / growth.early:.2f} x)"
         )
 
 
