@@ -88,9 +88,9 @@ def build(entry: NumericCode, linker: str) -> None:
 
 def main() -> None:
     """Compile all entry points."""
-    linker = shutil.which("cc")
+    linker = next(filter(None, map(shutil.which, ("cc", "gcc", "g++", "clang", "clang-19"))), None)
     if linker is None:
-        sys.exit("compile_numerics: there is no C compiler (cc) to link with; install gcc or clang")
+        sys.exit("compile_numerics: there is no C compiler to link with; install gcc or clang")
     for entry in ENTRY_POINTS:
         build(entry, linker)
 

@@ -25,7 +25,6 @@ def test_the_states_of_a_flight(tmp_path: Path) -> None:
     assert arrays["time_s"].dtype == np.float64
     assert {len(column) for column in arrays.values()} == {len(arrays["time_s"])}
     assert arrays["z"].max() - arrays["z"].min() == pytest.approx(4.0, abs=0.7)
-    pytest.importorskip("pandas")
     frame = run.to_pandas(name)
     assert frame.index.name == "time_s"
     assert bool(frame["armed"].any())
