@@ -86,11 +86,17 @@ def build(entry: NumericCode, linker: str) -> None:
     print(f"{entry.library.name}: {entry.library.stat().st_size} bytes")
 
 
+def find_linker() -> str:
+    """Return the C compiler that links; exit if there is none."""
+    for name in ("cc", "gcc", "g++", "clang", "clang-19"):
+        if path := shutil.which(name):
+            return path
+    sys.exit("compile_numerics: there is no C compiler to link with; install gcc or clang")
+
+
 def main() -> None:
     """Compile all entry points."""
-    linker = next(filter(None, map(shutil.which, ("cc", "gcc", "g++", "clang", "clang-19"))), None)
-    if linker is None:
-        sys.exit("compile_numerics: there is no C compiler to link with; install gcc or clang")
+    linker = find_linker()
     for entry in ENTRY_POINTS:
         build(entry, linker)
 

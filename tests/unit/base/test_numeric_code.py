@@ -67,7 +67,7 @@ def test_without_object_code_numba_executes_it(tmp_path, monkeypatch):
 def test_object_code_gives_the_bits_of_numba_and_reports_invalid_arithmetic(object_code):
     by_numba, counts = rows()
     entry().bind(by_numba, counts, 3.0)()
-    object_code.build(entry(), shutil.which("cc"))
+    object_code.build(entry(), object_code.find_linker())
     code = entry()
     assert code.shipped
     by_object_code, counts = rows()
@@ -82,7 +82,7 @@ def test_object_code_of_other_sources_is_not_used_and_is_removed(object_code, tm
     old = tmp_path / "scale_rows-x86_64-0123456789abcdef.so"
     old.write_bytes(b"")
     assert not entry().shipped
-    object_code.build(entry(), shutil.which("cc"))
+    object_code.build(entry(), object_code.find_linker())
     assert not old.exists()
 
 
