@@ -64,6 +64,12 @@ class Blocks:
     land: str = LAND_BLOCK
 
 
+def _unless_disarmed(step: Step) -> Step:
+    """Return *step*, which a disarmed aircraft needs no more."""
+    done = step.done
+    return replace(step, skippable=True, done=lambda seen: not seen.armed or done(seen))
+
+
 class TakeoffAndLanding:
     """Steps of take-off and landing. Raises ``UsageError`` if the flight plan does not have the blocks."""
 
@@ -112,7 +118,7 @@ class TakeoffAndLanding:
             raise Refused(telemetry.name, "arm", said)
         return (in_place[0], steps.change_mode(NAV), self._start_block())
 
-    def stop_on_ground(self) -> Sequence[Step]:
+    def stop_on_ground(self) -> tuple[Step, Step, Step]:
         """Return steps that stop the motors of an aircraft that a newer status still shows on the ground."""
         steps, telemetry = self._steps, self._telemetry
         asked_at: list[Ns] = []
@@ -207,14 +213,23 @@ class TakeoffAndLanding:
     # -- landing
 
     def land(self, within: Ns) -> Sequence[Step]:
-        """Return steps that land in place; without a fix in FAILSAFE, which needs no position."""
+        """Return steps that land in place; without a fix in FAILSAFE, which needs no position.
+
+        On the ground they stop the motors; an aircraft that lifts off meanwhile is landed.
+        """
         steps = self._steps
         steps.yaw = None
-        if not self._telemetry.flying:
-            return self.stop_on_ground()
-        if steps.decoder.good_fix:
-            return self.land_by_plan(within) if self._by_plan() else self._descend(within)
-        return self._land_without_fix(within)
+        if not steps.decoder.good_fix:
+            landing = self._land_without_fix(within)
+        elif self._by_plan():
+            landing = self.land_by_plan(within)
+        else:
+            landing = self._descend(within)
+        if self._telemetry.flying:
+            return landing
+        check, stop, release = self.stop_on_ground()
+        stop = replace(stop, done=lambda seen: not seen.armed or seen.flying, fails=lambda: "")
+        return (check, stop, release, *map(_unless_disarmed, landing))
 
     def _land_without_fix(self, within: Ns) -> Sequence[Step]:
         """Return steps that land in FAILSAFE or, where that keeps the height, by sticks over the datalink.

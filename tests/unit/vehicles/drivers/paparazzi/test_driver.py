@@ -735,11 +735,26 @@ def test_motors_are_not_stopped_because_of_an_old_status(bench: Make) -> None:
         sleep(at.kernel, 6 * S)
         at.craft.flying, at.craft.up = True, 2.0
         with pytest.raises(NotArrived, match=r"it has lifted off meanwhile; land\(\) again"):
-            drone.land()
+            drone.return_home()
 
     at.fly(mission)
     assert at.craft.armed
     assert at.autopilot.written("kill_throttle") == []
+
+
+def test_an_aircraft_that_lifts_off_while_its_motors_are_stopped_is_landed(bench: Make) -> None:
+    at = bench()
+    at.craft.mode, at.craft.armed = "GUIDED", True
+
+    def mission(drone: Any) -> None:
+        drone.wait_ready()
+        sleep(at.kernel, 6 * S)
+        at.craft.flying, at.craft.up = True, 2.0
+        drone.land()
+
+    at.fly(mission)
+    assert not at.craft.armed
+    assert at.autopilot.sent("BLOCK")
 
 
 def test_a_touch_down_far_from_home_stops_the_motors_though_it_seems_to_fly(bench: Make) -> None:
