@@ -555,9 +555,7 @@ def test_a_file_outside_the_folder_of_the_model_is_not_used(workshop, path):
     text = workshop.file.read_text()
     workshop.file.write_text(re.sub(r"path: \S+\.py", f"path: {path}", text, count=1))
     assert path in workshop.file.read_text()
-    with pytest.raises(
-        ModelError, match="is outside the folder of the model; list its folder under"
-    ):
+    with pytest.raises(ModelError, match="is outside the folder of the model; list its folder under"):
         workshop.load()
 
 
