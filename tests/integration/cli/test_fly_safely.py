@@ -187,9 +187,9 @@ def test_missions_that_state_nonsense(fly: Any, line: str, status: int, says: st
     ("call", "says"),
     [
         ("drone.goto(HOME)", "it is on the ground; takeoff(height) first"),
-        ("drone.takeoff(float('nan'))", "give metres above home, above 0"),
+        ("drone.takeoff(float('nan'))", "nan is not a finite number; write it as in takeoff(10)"),
         ("drone.manual_control(0, 0, 2, 0)", "throttle=2; it goes from 0 to 1"),
-        ("drone.manual_control(0, 0, 0.5, float('nan'))", "yaw=nan; it goes from -1 to 1"),
+        ("drone.manual_control(0, 0, 0.5, float('nan'))", "nan is not a finite number; write it as"),
         ("drone.stabilize()", "no manual control is newer than 1 s"),
         ("drone.kill(sure=False)", "if that is meant: sure=True"),
     ],

@@ -58,6 +58,7 @@ _SHARED = {
     "FS_THR_ENABLE": "action when the throttle channel falls below FS_THR_VALUE",
     "FS_THR_VALUE": "pulse width below which the transmitter is lost",
     "INITIAL_MODE": "mode after boot",
+    "RALLY_TOTAL": "number of rally points",
     "RC_OVERRIDE_TIME": "time after which overrides end; 0 refuses them, a negative value keeps them",
     "RNGFND1_TYPE": "any value but 0 sends RANGEFINDER and DISTANCE_SENSOR",
     "SIM_ENGINE_FAIL": "the motor that SIM_ENGINE_MUL weakens, from 0",
