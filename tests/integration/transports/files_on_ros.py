@@ -25,6 +25,7 @@ Said = dict[str, list[bytes]]
 MODEL = """
 volery: 1
 name: files
+files_from: {folder}
 components:
 {components}
 application:
@@ -71,7 +72,13 @@ def embedded(case: Case, language: str, folder: Path, out: Path) -> Said:
     places = ", ".join(f"{name}: pc" for name in case.files)
     model = out / "model.yaml"
     model.write_text(
-        MODEL.format(components=components, instances=instances, places=places, duration=case.seconds)
+        MODEL.format(
+            folder=folder,
+            components=components,
+            instances=instances,
+            places=places,
+            duration=case.seconds,
+        )
     )
     run = simulate(model, Options("code", out=out / "run"))
     assert run.completed, run.error
