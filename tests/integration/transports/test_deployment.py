@@ -32,7 +32,7 @@ pytestmark = [pytest.mark.integration, pytest.mark.timeout(600)]
 
 DELIVERY = Path(__file__).parents[3] / "examples" / "delivery"
 LIMIT_S = 400
-SETTINGS = ("--seed", "7", "--speed", "2.5", "--set", "run.duration=300s")
+SETTINGS = ("--seed", "7", "--speed", "1.5", "--set", "run.duration=300s")
 
 
 def deployed(folder: Path, ros: int) -> Deployment:
