@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -32,7 +33,9 @@ def ctrl_c_and_spin() -> None:
 @pytest.fixture(autouse=True)
 def pythons_own_handler() -> Iterator[None]:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    gc.disable()  # an interrupt in a collector's callback, as hypothesis installs one, would be lost
     yield
+    gc.enable()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     signal.signal(signal.SIGINT, before)
 
