@@ -12,10 +12,7 @@ from volery.deploy.texts import (
     host_script,
     model_expression,
     package_xml,
-    parameter_files,
-    systemd_unit,
-    udev_rules,
-    unit_name,
+    system_files,
     verification_script,
 )
 from volery.model.system import System
@@ -40,14 +37,8 @@ def computer_files(computer: Computer, system: System) -> Iterator[tuple[Path, s
         yield Path("scripts") / executable, _SHEBANG + text
     yield Path("CMakeLists.txt"), _cmake(name, scripts, ("launch", "config", MODEL_FOLDER))
     yield Path("launch") / f"{name}.launch", _launch(computer)
-    yield from parameter_files(computer)
     launch = f"roslaunch {name} {name}.launch"
-    yield (
-        Path("systemd") / unit_name(computer),
-        systemd_unit(computer, system, launch, "$WORKSPACE/devel/setup.bash"),
-    )
-    if computer.bridged:
-        yield Path("udev") / f"99-{name}.rules", udev_rules(computer)
+    yield from system_files(computer, system, launch, "$WORKSPACE/devel/setup.bash")
 
 
 def verification_files(system: System, computers: Sequence[Computer]) -> Iterator[tuple[Path, str]]:

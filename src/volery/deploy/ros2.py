@@ -12,10 +12,7 @@ from volery.deploy.texts import (
     host_script,
     model_expression,
     package_xml,
-    parameter_files,
-    systemd_unit,
-    udev_rules,
-    unit_name,
+    system_files,
     verification_script,
 )
 from volery.model.system import System
@@ -42,14 +39,8 @@ def computer_files(computer: Computer, system: System) -> Iterator[tuple[Path, s
     for each in computer.bridged:
         yield code / f"{each.executable}.py", bridge_script(each, GRAPH)
     yield Path("launch") / f"{name}.launch.py", _launch(computer)
-    yield from parameter_files(computer)
     launch = f"ros2 launch {name} {name}.launch.py"
-    yield (
-        Path("systemd") / unit_name(computer),
-        systemd_unit(computer, system, launch, "$WORKSPACE/install/setup.bash"),
-    )
-    if computer.bridged:
-        yield Path("udev") / f"99-{name}.rules", udev_rules(computer)
+    yield from system_files(computer, system, launch, "$WORKSPACE/install/setup.bash")
 
 
 def verification_files(system: System, computers: Sequence[Computer]) -> Iterator[tuple[Path, str]]:

@@ -103,6 +103,21 @@ def _yaml(value: object) -> str:
     return json.dumps(value, ensure_ascii=False, default=list)
 
 
+def system_files(computer: Computer, system: System, launch: str, setup: str) -> Iterator[tuple[Path, str]]:
+    """Yield what is the same for both versions of ROS: parameters, systemd unit and udev rules.
+
+    Args:
+        computer: the computer.
+        system: the system.
+        launch: command that starts the package.
+        setup: file of the workspace that is sourced first.
+    """
+    yield from parameter_files(computer)
+    yield Path("systemd") / unit_name(computer), systemd_unit(computer, system, launch, setup)
+    if computer.bridged:
+        yield Path("udev") / f"99-{computer.package}.rules", udev_rules(computer)
+
+
 def udev_rules(computer: Computer) -> str:
     """Return rules that give each autopilot a name that does not depend on the port."""
     lines = [
