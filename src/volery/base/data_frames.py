@@ -1,4 +1,4 @@
-"""Tables as pandas data frames: pandas is optional, and imported only when one is asked for."""
+"""Tables as pandas data frames: pandas is optional, and imported only when a data frame is made."""
 
 from __future__ import annotations
 

@@ -259,7 +259,7 @@ def failsafe_cause(telemetry: Telemetry, now: Ns) -> str:
     """Return why a failsafe of the autopilot acts, in words; empty if none does.
 
     An autopilot may act by itself without reporting the status of a failsafe: ArduPilot at its fence. Then
-    its text tells.
+    its status text is quoted.
 
     Args:
         telemetry: telemetry of the vehicle.

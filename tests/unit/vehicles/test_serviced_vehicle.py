@@ -274,6 +274,12 @@ def test_telemetry_over_time() -> None:
     assert frame["velocity_up"].max() > 0.5
 
 
+def test_the_checksum_of_a_published_message() -> None:
+    """The message 1005 that RTCM 10403 gives as its example."""
+    message = bytes.fromhex("D300133ED7D30202980EDEEF34B4BD62AC0941986F33360B98")
+    assert crc24q(message[:-3]) == 0x360B98
+
+
 def test_files_that_are_no_plan(tmp_path: Path) -> None:
     file = tmp_path / "some.plan"
 

@@ -69,7 +69,7 @@ ASSUMED: Mapping[str, str] = {
     "SETTING of 'kill_throttle'": "0 starts the motors in every mode but KILL, 1 stops them, in the air, too",
     "RC_UP": "counts as a transmitter if the aircraft takes its sticks from the datalink: roll, pitch "
     "(nose up +), yaw, throttle, mode switch (127 is AUTO2), kill switch (127 is off)",
-    "GUIDED_SETPOINT_NED": "about the origin that INS_REF tells; stands until the next one",
+    "GUIDED_SETPOINT_NED": "about the origin in INS_REF; stands until the next one",
     "ROTORCRAFT_FP": "in GUIDED its carrot is the set-point, of any sender",
     "block 'Start Engine'": "starts the motors, in NAV",
     "block 'Takeoff'": "climbs straight up to some 2 m",
