@@ -4,9 +4,10 @@ Battery: Thevenin's circuit without its RC branch (Tremblay and Dessaint, World 
 (2009), call it the static part).
 
 * V = OCV(s) - R I, P = V I, hence I = (OCV - sqrt(OCV^2 - 4 R P)) / (2 R).
-* OCV(s): piecewise linear through the usual rest voltages of a lithium-polymer cell at 25 degrees C, s =
-  fraction left. Valid from 0 to 40 degrees C, at currents up to about 20 C. Voltage recovers at once after a
-  load; ageing and self-discharge are not modelled.
+* OCV(s), s = fraction left: piecewise linear, within 0.1 V of the measured cell of Chen and Rincon-Mora, IEEE
+  Trans. Energy Conversion 21 (2006), eq. 2, from 5 % on; that cell was charged to 4.1 V, this one to 4.2 V.
+  Valid from 0 to 40 degrees C, at currents up to about 20 C. Voltage recovers at once after a load; ageing and
+  self-discharge are not modelled.
 * Beyond the battery's largest power (OCV^2 / 4R) the current stays at OCV / 2R: the battery browns out.
 
 Multirotor: a rigid body under four rotors, drag, gravity and the ground.
@@ -17,7 +18,8 @@ Multirotor: a rigid body under four rotors, drag, gravity and the ground.
   Helicopter Aerodynamics, 2.3). Shaft power k_Q w^3; electrical power is that over the efficiency of motor
   and controller. Valid in hover and slow flight; inflow of climb or fast flight, flapping, ground effect and
   the rotors' gyroscopic torque are not modelled.
-* Drag: F = -(c_1 + c_2 |v|) v, v relative to the air; valid to about 20 m/s. Rotation is damped by -c_w w.
+* Drag: F = -c_1 v - c_2 (|v_p| v_p + |v_a| v_a), v relative to the air, v_p its part in the plane of the rotors
+  and v_a along their axis, as in ArduPilot's simulator; valid to about 20 m/s. Rotation is damped by -c_w w.
 * Ground: a spring and damper under each of four feet, Coulomb friction smoothed below 5 cm/s. Upside down the
   body lies on four points as far above the centre.
 
@@ -110,9 +112,11 @@ def cell_voltage(left: float) -> float:
     if left >= 0.2:
         return 3.73 + (left - 0.2) * (11.0 / 30.0)
     if left >= 0.1:
-        return 3.61 + (left - 0.1) * 1.2
+        return 3.67 + (left - 0.1) * 0.6
+    if left >= 0.05:
+        return 3.52 + (left - 0.05) * 3.0
     if left >= 0.0:
-        return 3.0 + left * 6.1
+        return 3.0 + left * 10.4
     return max(0.0, 3.0 + left * 60.0)
 
 
@@ -267,10 +271,14 @@ def _add_rotor_and_air_loads(row: Array) -> None:
     ve = row[W_STATE + S_VELOCITY] - row[W_AIR_VELOCITY]
     vn = row[W_STATE + S_VELOCITY + 1] - row[W_AIR_VELOCITY + 1]
     vu = row[W_STATE + S_VELOCITY + 2] - row[W_AIR_VELOCITY + 2]
-    drag = row[P_DRAG_LINEAR] + row[P_DRAG_QUADRATIC] * sqrt(ve * ve + vn * vn + vu * vu)
-    row[W_FORCE] = row[W_ROTATION + 2] * lift - drag * ve
-    row[W_FORCE + 1] = row[W_ROTATION + 5] * lift - drag * vn
-    row[W_FORCE + 2] = row[W_ROTATION + 8] * lift - drag * vu
+    ae, an, au = row[W_ROTATION + 2], row[W_ROTATION + 5], row[W_ROTATION + 8]
+    along = ve * ae + vn * an + vu * au
+    plane = sqrt(max(0.0, ve * ve + vn * vn + vu * vu - along * along))
+    drag = row[P_DRAG_LINEAR] + row[P_DRAG_QUADRATIC] * plane
+    lift -= row[P_DRAG_QUADRATIC] * (abs(along) - plane) * along
+    row[W_FORCE] = ae * lift - drag * ve
+    row[W_FORCE + 1] = an * lift - drag * vn
+    row[W_FORCE + 2] = au * lift - drag * vu
     for axis in range(3):
         row[W_TORQUE + axis] -= row[P_SPIN_DAMPING] * row[W_STATE + S_RATES + axis]
 

@@ -317,6 +317,8 @@ class FlightController:
         home = vehicle.home
         if vehicle.landed:
             return TaskAck.NOT_IN_AIR
+        if by_sdk and self._is(DisplayMode.FORCE_AUTO_LANDING):
+            return TaskAck.ALREADY_RUNNING  # documented: a critical battery overrides the SDK; code assumed
         if home is None:
             return TaskAck.NO_HOME_POINT
         if not vehicle.has_position:
@@ -330,7 +332,8 @@ class FlightController:
         """Land at the present position."""
         if self.vehicle.landed:
             return TaskAck.NOT_IN_AIR
-        if self._is(DisplayMode.AUTO_LANDING) and self._requested_by_sdk:
+        forced = by_sdk and self._is(DisplayMode.FORCE_AUTO_LANDING)
+        if forced or (self._is(DisplayMode.AUTO_LANDING) and self._requested_by_sdk):
             return TaskAck.ALREADY_RUNNING
         self._enter(DisplayMode.AUTO_LANDING, by_sdk=by_sdk)
         return TaskAck.OK
