@@ -3,12 +3,16 @@
 On a link without a wire frames travel as values, not as bytes, and arrive after a delay. The values are
 quantised as on a wire (``Codec.quantised``): 32-bit floats, strings cut to length, all fields present, and a
 field that does not fit is refused. This costs a few microseconds per frame and keeps a simulation from
-depending on digits that no radio carries.
+depending on digits that no radio carries. Frames of one end that arrive at one instant are one event of the
+kernel.
 
 A link is shared by several vehicles when one radio, or one port, carries more than one autopilot.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
 
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
@@ -26,6 +30,10 @@ class InProcessLink:
         self._codec = codec
         self._receiver: Receiver | None = None
         self._closed = False
+        self._arrival: Ns = 0
+        self._under_way: list[Frame] = []
+        self.wanted: Callable[[str], bool] | None = None
+        """Which messages this end uses; ``None``: all."""
         self.peer: InProcessLink = self
 
     def send(self, frame: Frame) -> None:
@@ -33,17 +41,32 @@ class InProcessLink:
         if self._closed:
             return
         arriving = self._codec.quantised(frame)
-        peer = self.peer
-        self._kernel.call_at(self._kernel.now() + self._delay, lambda: peer.deliver(arriving))
+        arrival = self._kernel.now() + self._delay
+        if self._under_way and arrival == self._arrival:
+            self._under_way.append(arriving)
+            return
+        self._arrival, self._under_way = arrival, [arriving]
+        self._kernel.call_at(arrival, partial(self.peer.deliver, self._under_way))
 
     def receive(self, receiver: Receiver) -> None:
         """Call *receiver* with every frame that arrives from now on."""
         self._receiver = receiver
 
-    def deliver(self, frame: Frame) -> None:
-        """Hand a frame that has arrived to the receiver. Framework callback."""
-        if self._receiver is not None and not self._closed:
-            self._receiver(frame)
+    def select(self, wanted: Callable[[str], bool]) -> None:
+        """State which messages this end uses, by name."""
+        self.wanted = wanted
+
+    def is_wanted(self, name: str) -> bool:
+        """Return whether the other end uses the message called *name*."""
+        wanted = self.peer.wanted
+        return wanted is None or wanted(name)
+
+    def deliver(self, frames: list[Frame]) -> None:
+        """Hand frames that have arrived to the receiver, and empty the list. Framework callback."""
+        for frame in frames:
+            if self._receiver is not None and not self._closed:
+                self._receiver(frame)
+        frames.clear()
 
     def problem(self) -> str:
         """Return ``""``, or that the link was closed."""

@@ -57,6 +57,20 @@ class ByteLink(Protocol):
         """Send *data* as it is."""
 
 
+@runtime_checkable
+class SelectiveLink(Protocol):
+    """A link whose receiver states which messages it uses, so that the sender need not make the others.
+
+    It spares a simulation the telemetry that nobody reads. A sender may still send what is not wanted.
+    """
+
+    def select(self, wanted: Callable[[str], bool]) -> None:
+        """State which messages this end uses, by name; the function is called before each message."""
+
+    def is_wanted(self, name: str) -> bool:
+        """Return whether the other end uses the message called *name*."""
+
+
 # -- codecs
 
 

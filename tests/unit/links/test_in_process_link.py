@@ -41,3 +41,12 @@ def test_a_field_that_does_not_fit_is_refused_where_it_is_sent() -> None:
     ours, _ = in_process_pair(VirtualKernel(), name="radio")
     with pytest.raises(UsageError, match="no field 'altitude'"):
         ours.send(Frame("HEARTBEAT", {"altitude": 1}, 1, 1))
+
+
+def test_one_end_states_which_messages_it_uses() -> None:
+    ours, theirs = in_process_pair(VirtualKernel(), name="radio")
+    assert theirs.is_wanted("HEARTBEAT"), "all are, until the other end has stated them"
+    ours.select(lambda name: name == "STATUSTEXT")
+    assert theirs.is_wanted("STATUSTEXT")
+    assert not theirs.is_wanted("HEARTBEAT")
+    assert ours.is_wanted("HEARTBEAT"), "each end states its own"

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
-from volery.links.link import ByteLink, Frame, Link
+from volery.links.link import ByteLink, Frame, Link, SelectiveLink
 from volery.links.mavlink_messages import MessageStreams
 from volery.simulation.autopilots.state_groups import NEVER
 
@@ -116,6 +116,11 @@ class MavlinkChannel:
         self.texts: StatusTextQueue
         self.open = True
         self._system = system
+        self._selective = link if isinstance(link, SelectiveLink) else None
+
+    def is_wanted(self, name: str) -> bool:
+        """Return whether the other end uses the message called *name*, as far as it has stated that."""
+        return self._selective is None or self._selective.is_wanted(name)
 
     def send(self, name: str, fields: dict[str, Any]) -> None:
         """Send a message as the autopilot, while the channel is open."""

@@ -129,6 +129,8 @@ class MavlinkEndpoint:
     def _burst(self, channel: MavlinkChannel, names: Sequence[str]) -> None:
         messages, vehicle = self.firmware.telemetry.messages, self._vehicle
         for name in names:
+            if not channel.is_wanted(name):
+                continue
             fields = messages[name](vehicle)
             if fields is not None:
                 channel.send(name, fields)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.links.link import Frame, Link
+from volery.links.link import Frame, Link, SelectiveLink
 from volery.links.mavlink_messages import constant, entry_name, from_bytewise, message_type
 from volery.trace.events import LinkState
 from volery.vehicles.address import rate_option, records_texts, system_option
@@ -109,6 +109,9 @@ class StreamRequests:
     def add(self, message: str, period: Ns) -> None:
         """Request another message from now on."""
         self._periods[message] = period
+
+    def __contains__(self, message: str) -> bool:
+        return message in self._periods
 
     def note_received(self, message: str, now: Ns) -> None:
         """Note that a message has arrived."""
@@ -254,6 +257,8 @@ class MavlinkClient:
             home_first=self.firmware.home_first,
         )
         link.receive(self._receive)
+        if isinstance(link, SelectiveLink):
+            link.select(self._uses)
         self._heartbeat = kernel.every(HEARTBEAT_PERIOD, self._tick)
 
     @abstractmethod
@@ -273,6 +278,10 @@ class MavlinkClient:
     def parameters(self) -> Mapping[str, float] | None:
         """Parameters that were read; ``None`` until all answers have arrived."""
         return self._parameters if self._requests.settled else None
+
+    def _uses(self, name: str) -> bool:
+        """Return whether a periodic message changes anything here; a service in progress may use each."""
+        return self._decoder.handles(name) or name in self._streams or self.services.listening
 
     def _receive(self, frame: Frame) -> None:
         if not self._is_from_autopilot(frame):

@@ -84,6 +84,10 @@ class TelemetryDecoder(ABC):
             "MISSION_CURRENT": self._mission_current,
         }
 
+    def handles(self, name: str) -> bool:
+        """Return whether messages of that name are decoded."""
+        return name in self._handlers
+
     def handle_message(self, name: str, fields: Fields) -> bool:
         """Decode a message; return whether it was used. Positions off the globe are discarded."""
         self._telemetry.note_message(self._kernel.now())

@@ -76,6 +76,11 @@ class MavlinkServices:
         self._known: dict[str, Parameter] = {}
         self._correction = 0
 
+    @property
+    def listening(self) -> bool:
+        """Whether a request in progress looks at every message."""
+        return bool(self._listeners)
+
     def receive(self, frame: Frame) -> None:
         """Pass a frame of the autopilot to the requests in progress."""
         if self._listeners:

@@ -126,8 +126,8 @@ def test_texts_wait_for_a_station_keep_their_distance_and_the_newest_four() -> N
     assert [at - sent[0][0] for at, _ in sent] == [0, 50 * MS, 100 * MS, 150 * MS]
 
 
-def flown(kind: str, seed: int) -> list[tuple[Any, ...]]:
-    """All messages that one link receives during a short flight or drive."""
+def flown(kind: str, seed: int, wanted: frozenset[str] | None = None) -> list[tuple[Any, ...]]:
+    """All messages that one link receives during a short flight or drive; it may state which it uses."""
     kernel = VirtualKernel()
     spec = Multirotor() if kind == "multirotor" else Rover()
     _, flights = make_world(kernel.now, [spec], seed=seed, frame=LocalFrame(46.0, 7.0, 500.0))
@@ -135,6 +135,8 @@ def flown(kind: str, seed: int) -> list[tuple[Any, ...]]:
     ours, theirs = in_process_pair(kernel, MS, "station")
     received: list[tuple[Any, ...]] = []
     ours.receive(lambda frame: received.append((kernel.now(), frame.name, repr(frame.fields))))
+    if wanted is not None:
+        ours.select(wanted.__contains__)
     autopilot.connect(theirs)
 
     def setpoint() -> None:
@@ -162,3 +164,17 @@ def test_the_same_seed_is_the_same_flight(kind: str) -> None:
 
 def test_nan_is_not_asked() -> None:
     assert all(isnan(value) for value in OffboardTarget().position)
+
+
+def test_telemetry_that_the_other_end_does_not_use_is_not_sent() -> None:
+    everything = flown("multirotor", 5)
+    used = frozenset({"GLOBAL_POSITION_INT", "COMMAND_ACK"})
+    streamed = {"GLOBAL_POSITION_INT"}
+    received = flown("multirotor", 5, used)
+    kept = [one for one in received if one[1] in used]
+    assert kept == [one for one in everything if one[1] in used]
+    assert {name for _, name, _ in kept} == used
+    assert {"HIGHRES_IMU", "ATTITUDE_QUATERNION"} <= {name for _, name, _ in everything}
+    periodic = {"HIGHRES_IMU", "ATTITUDE_QUATERNION", "VFR_HUD", "ODOMETRY", *streamed}
+    assert {name for _, name, _ in received} & periodic == streamed
+    assert len(received) < len(everything) / 10
