@@ -169,12 +169,10 @@ def test_nan_is_not_asked() -> None:
 def test_telemetry_that_the_other_end_does_not_use_is_not_sent() -> None:
     everything = flown("multirotor", 5)
     used = frozenset({"GLOBAL_POSITION_INT", "COMMAND_ACK"})
-    streamed = {"GLOBAL_POSITION_INT"}
     received = flown("multirotor", 5, used)
     kept = [one for one in received if one[1] in used]
     assert kept == [one for one in everything if one[1] in used]
     assert {name for _, name, _ in kept} == used
-    assert {"HIGHRES_IMU", "ATTITUDE_QUATERNION"} <= {name for _, name, _ in everything}
-    periodic = {"HIGHRES_IMU", "ATTITUDE_QUATERNION", "VFR_HUD", "ODOMETRY", *streamed}
-    assert {name for _, name, _ in received} & periodic == streamed
-    assert len(received) < len(everything) / 10
+    others = {"HIGHRES_IMU", "ATTITUDE_QUATERNION", "VFR_HUD", "ODOMETRY"}
+    assert others <= {name for _, name, _ in everything}
+    assert not others & {name for _, name, _ in received}
