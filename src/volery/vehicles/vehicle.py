@@ -217,7 +217,12 @@ class Vehicle(ServicedVehicle):
 
     @property
     def attitude(self) -> Attitude:
-        """Roll, pitch and heading in degrees; NaN for values that the autopilot does not send."""
+        """Roll, pitch and heading in degrees; NaN for values that the autopilot does not send.
+
+        Over MAVROS the first call subscribes to ``imu/data`` and waits for it.
+        """
+        self._poll()
+        self._driver.request_attitude()
         return self._poll().attitude
 
     @property
