@@ -91,7 +91,9 @@ def mode_names(autopilot: AutopilotType) -> list[str]:
 
 INVALID_AUTOPILOT = 8
 """MAV_AUTOPILOT of ground stations and companion computers."""
-_KEPT_ALL = frozenset({"STATUSTEXT", "MISSION_ITEM_REACHED", "HEARTBEAT", "PARAM_VALUE"})
+_KEPT_ALL = frozenset(
+    {"STATUSTEXT", "MISSION_ITEM_REACHED", "HEARTBEAT", "PARAM_VALUE", "LOG_ENTRY", "LOG_DATA"}
+)
 """Messages that are published one by one; of all others only the latest is published."""
 
 
@@ -225,7 +227,7 @@ class AutopilotLink:
         system, component = self.target
         if name == "MANUAL_CONTROL":  # the only message that addresses a system but no component
             self.send(name, {"target": system, **fields})
-        elif name == "STATUSTEXT":  # has no addressee
+        elif name in ("STATUSTEXT", "GPS_RTCM_DATA"):  # have no addressee
             self.send(name, fields)
         else:
             self.send(name, {"target_system": system, "target_component": component, **fields})

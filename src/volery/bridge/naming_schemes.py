@@ -52,11 +52,19 @@ from volery.bridge.node_interface import (
     merge_translators,
     stamped,
 )
-from volery.bridge.protocol_services import (
-    MISSION_TOPICS,
-    PARAMETER_TOPICS,
+from volery.bridge.parameter_services import PARAMETER_TOPICS, ParameterServices
+from volery.bridge.payload_services import (
+    PAYLOAD_TOPICS,
+    LogServices,
+    mount_services,
+    payload_subscriptions,
+)
+from volery.bridge.plan_services import (
+    GEOFENCE,
+    PLAN_TOPICS,
+    RALLY_POINTS,
     MissionServices,
-    ParameterServices,
+    PlanServices,
 )
 from volery.bridge.status_publishers import (
     DIAGNOSTIC_TOPICS,
@@ -81,8 +89,9 @@ MAVROS_TOPICS = (
     *POSE_TOPICS,
     *IMU_TOPICS,
     *TARGET_TOPICS,
-    *MISSION_TOPICS,
+    *PLAN_TOPICS,
     *PARAMETER_TOPICS,
+    *PAYLOAD_TOPICS,
     *TRANSFORM_TOPICS,
     *DIAGNOSTIC_TOPICS,
 )
@@ -91,10 +100,11 @@ MAVROS_TOPICS = (
 def mavros_interface(context: InterfaceContext) -> NodeInterface:
     """Return the interface of a node under MAVROS's names."""
     status, commands = StatusPublisher(context), CommandServices(context)
-    missions, parameters = MissionServices(context), ParameterServices(context)
+    missions, parameters, logs = MissionServices(context), ParameterServices(context), LogServices(context)
+    lists = (missions, PlanServices(context, GEOFENCE), PlanServices(context, RALLY_POINTS))
     poses, diagnostics = PosePublisher(context), DiagnosticsPublisher(context)
     others = (ImuPublisher(context), TargetPublisher(context), TransformPublisher(context))
-    parts = (status, poses, *others, missions, parameters, diagnostics)
+    parts = (status, poses, *others, missions, parameters, logs, diagnostics)
 
     def disconnected(stamp: Ns) -> None:
         status.disconnected(stamp)
@@ -103,8 +113,14 @@ def mavros_interface(context: InterfaceContext) -> NodeInterface:
     return NodeInterface(
         topics=MAVROS_TOPICS,
         translators=merge_translators(*(part.translators() for part in parts)),
-        subscriptions=subscriptions(context.geoid),
-        services={**commands.services(), **missions.services(), **parameters.services()},
+        subscriptions=(*subscriptions(context.geoid), *payload_subscriptions()),
+        services={
+            **commands.services(),
+            **parameters.services(),
+            **logs.services(),
+            **mount_services(commands),
+            **{name: one for part in lists for name, one in part.services().items()},
+        },
         disconnected=disconnected,
     )
 

@@ -42,11 +42,11 @@ class Topic(NamedTuple):
 
 
 class Subscription(NamedTuple):
-    """A subscribed topic and the function that translates its messages to MAVLink."""
+    """A subscribed topic and the function that translates a message of it to those of MAVLink."""
 
     name: str
     type: str
-    translate: Callable[[Any, Ns], OutgoingMessage]
+    translate: Callable[[Any, Ns], OutgoingMessage | list[OutgoingMessage]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +76,7 @@ class InterfaceContext:
         geoid: Converts between ellipsoidal and AMSL altitudes.
         control: Whether roscopter's ``send_rc`` is offered.
         origin: Origin of the frame ``map``; None is the autopilot's own origin.
+        parameter_services: Whether parameters are offered by the services of ROS 2, as MAVROS 2 does.
     """
 
     node: Node
@@ -86,6 +87,7 @@ class InterfaceContext:
     geoid: Geoid = EGM96
     control: bool = False
     origin: LocalFrame | None = None
+    parameter_services: bool = False
 
 
 @dataclass(frozen=True)

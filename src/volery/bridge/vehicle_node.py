@@ -61,6 +61,7 @@ class VehicleNodeOptions:
         geoid: Converts between ellipsoidal and AMSL altitudes.
         control: Whether roscopter's ``send_rc`` is offered.
         origin: Origin of the frame ``map``; None is the autopilot's own origin.
+        parameter_services: Whether parameters are offered by the services of ROS 2, as MAVROS 2 does.
     """
 
     names: NamingScheme = MAVROS
@@ -73,6 +74,7 @@ class VehicleNodeOptions:
     geoid: Geoid = EGM96
     control: bool = False
     origin: LocalFrame | None = None
+    parameter_services: bool = False
 
 
 class VehicleNode:
@@ -129,6 +131,7 @@ class VehicleNode:
                 options.geoid,
                 options.control,
                 options.origin,
+                options.parameter_services,
             )
         )
         self.link.publish_only(interface.translators)
@@ -197,9 +200,11 @@ class VehicleNode:
     def _forward(self, node: Node, subscription: Subscription, message: Any) -> None:
         """Send a set-point to the autopilot; an invalid one is dropped with a warning."""
         try:
-            name, fields = subscription.translate(message, self._kernel.now())
+            translated = subscription.translate(message, self._kernel.now())
+            outgoing = translated if isinstance(translated, list) else [translated]
             with self._kernel:
-                self.link.send_to_autopilot(name, fields)
+                for name, fields in outgoing:
+                    self.link.send_to_autopilot(name, fields)
         except INVALID_VALUES as error:
             self._warn(f"{node.resolve(subscription.name)}: message dropped: {error}")
 

@@ -226,6 +226,9 @@ class Driver(Protocol):
     def poll(self) -> None:
         """Process received messages without waiting."""
 
+    def request_attitude(self) -> None:
+        """Receive roll and pitch from now on, where these are not received anyway; it may wait for them."""
+
     def ready(self, within: Ns) -> Sequence[Step]:
         """Wait until the vehicle could arm and go to a position."""
 

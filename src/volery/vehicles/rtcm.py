@@ -1,16 +1,19 @@
 """RTCM 3 messages in a stream of bytes, as an RTK base station or an NTRIP caster sends them.
 
-A message is 0xD3, ten bits of length, as many bytes, and a CRC-24Q (RTCM 10403).
+A message is 0xD3, ten bits of length, as many bytes, and a CRC-24Q (RTCM 10403). MAVLink carries it in parts.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 from volery.base.errors import UsageError
 
 PREAMBLE = 0xD3
 HEAD, CHECK = 3, 3
-LARGEST = 720
-"""Bytes of a message that fit into the four parts of GPS_RTCM_DATA."""
+CORRECTION_PART, CORRECTION_PARTS = 180, 4
+"""Bytes in one GPS_RTCM_DATA, and the greatest number of parts of one RTCM message."""
+LARGEST = CORRECTION_PART * CORRECTION_PARTS
 _POLYNOMIAL = 0x1864CFB
 
 
@@ -51,3 +54,29 @@ def crc24q(data: bytes) -> int:
             crc = crc << 1 ^ _POLYNOMIAL if crc & 0x800000 else crc << 1
             crc &= 0xFFFFFF
     return crc
+
+
+def correction_parts(message: bytes, sequence: int) -> list[dict[str, Any]]:
+    """Return one RTCM message as the fields of GPS_RTCM_DATA.
+
+    Bit 0 of the flags states that there are several parts, bits 1 and 2 number them, bits 3 to 7 number the
+    messages. A receiver knows the last part by its length: one that is full is followed by an empty one.
+
+    Args:
+        message: at most 720 bytes.
+        sequence: number of the message, 0 to 31.
+    """
+    if len(message) <= CORRECTION_PART:
+        whole = list(message.ljust(CORRECTION_PART, b"\0"))
+        return [{"flags": sequence << 3, "len": len(message), "data": whole}]
+    pieces = [message[at : at + CORRECTION_PART] for at in range(0, len(message), CORRECTION_PART)]
+    if len(pieces[-1]) == CORRECTION_PART and len(pieces) < CORRECTION_PARTS:
+        pieces.append(b"")
+    return [
+        {
+            "flags": 1 | number << 1 | sequence << 3,
+            "len": len(piece),
+            "data": list(piece.ljust(CORRECTION_PART, b"\0")),
+        }
+        for number, piece in enumerate(pieces)
+    ]

@@ -53,7 +53,8 @@ class ServicedVehicle(ABC):
         services = self._driver.services
         if services is None:
             raise CapabilityError(
-                f"{self.name}: {what}: not with this driver; an ArduPilot or PX4 on a MAVLink link offers it"
+                f"{self.name}: {what}: not with this driver; "
+                "an ArduPilot or PX4 offers it, over MAVLink or MAVROS"
             )
         return services
 
@@ -100,6 +101,7 @@ class ServicedVehicle(ABC):
             while self.kernel.now() - max(seen.last_message_ns, accepted) < DOWN_AFTER:
                 if self.kernel.now() - accepted > SILENT_WITHIN:
                     return  # it restarts faster than its heartbeats show
+                self._driver.poll()
                 sleep(self.kernel, 100 * MS)
             silent = seen.last_message_ns
             back = self._executor.wait(lambda: seen.last_message_ns > silent, from_seconds(within))
@@ -136,6 +138,8 @@ class ServicedVehicle(ABC):
             period: shortest time between two calls, s.
         """
         self._connect()
+        if quantity == "attitude":
+            self._driver.request_attitude()
         return subscribe(self.kernel, self._driver.telemetry, quantity, callback, _period(period))
 
     def record_telemetry(
@@ -154,6 +158,8 @@ class ServicedVehicle(ABC):
             raise UsageError(f"{self.name}: record_telemetry(): state a quantity, such as 'position'")
         for quantity in quantities:
             read_quantity(telemetry, quantity)
+            if quantity == "attitude":
+                self._driver.request_attitude()
         return TelemetryHistory(self.kernel, telemetry, quantities, _period(period), _period(keep))
 
 

@@ -121,6 +121,16 @@ def test_a_vehicle_behind_mavros(
         assert home.altitude.metres == pytest.approx(900.0, abs=2.0)  # there and back through the geoid
         drone.takeoff(3.0)
         assert drone.altitude.metres == pytest.approx(3.0, abs=0.5)
+        assert abs(drone.attitude.roll) < 10.0  # of imu/data
+        name = "WPNAV_SPEED" if autopilot == "ardupilot" else "MPC_XY_CRUISE"
+        value = drone.parameters.get(name)
+        drone.parameters.set(name, value + 0.5)
+        found = drone.parameters.all()
+        assert len(found) > 800
+        assert found[name] == value + 0.5
+        rally = volery.Plan(rally=(volery.Position(home.latitude, home.longitude, volery.AboveHome(20)),))
+        drone.plan.upload(rally, only=["rally"])
+        assert len(drone.plan.download().rally) == 1
         drone.land()
         assert not drone.armed
 

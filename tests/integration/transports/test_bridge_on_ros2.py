@@ -64,6 +64,10 @@ def test_a_vehicle_behind_mavros(beside: Beside) -> None:
     assert found["home"] == pytest.approx(900.0, abs=2.0)
     assert found["went"] == pytest.approx(0.00008, abs=1e-5)
     assert not found["armed"]
+    assert found["changed"] == 0.5
+    assert found["parameters"] > 800
+    assert found["rally"] == 1
+    assert abs(found["roll"]) < 10.0
 
 
 def test_the_graph_is_shown_to_whoever_has_just_come(beside: Beside) -> None:

@@ -60,6 +60,7 @@ from volery.vehicles.telemetry import StatusText
 Fields = dict[str, Any]
 Send = Callable[[str, Fields], None]
 
+MISSION_LIST = constant("MAV_MISSION_TYPE_MISSION")
 ERROR = constant("MAV_MISSION_ERROR")
 INVALID_SEQUENCE = constant("MAV_MISSION_INVALID_SEQUENCE")
 MISSION_RESULTS: Mapping[int, int] = {
@@ -271,7 +272,11 @@ class MavlinkAdapter:
     def _on_frame(self, frame: Frame) -> None:
         handler = self._handlers.get(frame.name)
         if handler is not None:
-            handler(frame.fields)
+            kind = frame.fields.get("mission_type", MISSION_LIST)
+            if kind == MISSION_LIST:
+                handler(frame.fields)
+            else:
+                self._send("MISSION_ACK", {"type": MISSION_RESULTS[UNSUPPORTED], "mission_type": kind})
 
     # -- sending
 

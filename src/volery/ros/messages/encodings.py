@@ -113,13 +113,23 @@ def _types_for(name: str, size: int) -> rosbags.Typestore:
     return bounded
 
 
-def from_cdr(name: str, data: bytes | memoryview) -> Any:
-    """Decode a message of type `name`; raise ``UsageError`` if the bytes are no such message."""
+def from_cdr(name: str, data: bytes | memoryview, *, surplus: bool = False) -> Any:
+    """Decode a message of type `name`; raise ``UsageError`` if the bytes are no such message.
+
+    Args:
+        name: Type of the message.
+        data: Its bytes with their header.
+        surplus: Accept bytes behind the message: rclpy's serialization leaves some where lists are empty.
+    """
     full = message_name(name)
-    _codec(full)
+    codec = _codec(full)
     try:
+        if surplus and bytes(data[:2]) == _CDR_HEADER[:2]:
+            body = memoryview(data)[4:]
+            message, _ = codec.deserialize_cdr_le(body, 0, codec.cls, _types_for(full, len(data)))
+            return message
         return _types_for(full, len(data)).deserialize_cdr(data, full)
-    except rosbags.SerdeError as error:
+    except (rosbags.SerdeError, struct.error, UnicodeDecodeError, ValueError) as error:
         raise UsageError(f"these {len(data)} bytes are no {full}: {error}") from error
 
 

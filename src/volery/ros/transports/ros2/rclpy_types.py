@@ -256,7 +256,7 @@ def from_rclpy(name: str, message: Any) -> Any:
     """Convert a message of rclpy to the message type `name`."""
     if isinstance(message, bytes):
         return from_cdr(name, HEADER + message)
-    return from_cdr(name, _serialization().serialize_message(message))
+    return from_cdr(name, _serialization().serialize_message(message), surplus=True)
 
 
 @cache

@@ -202,7 +202,7 @@ class ArduPilotMavlink(MavlinkClient):
 class ArduPilotMavros(MavrosBackend):
     """ArduPilot over MAVROS. See ``ArduPilotBackend``."""
 
-    firmware = FirmwareBehind("ArduPilot", RESTING)
+    firmware = FirmwareBehind("ArduPilot", RESTING, home_first=True)
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         super().__init__(kernel, node, name, namespace, geoid)

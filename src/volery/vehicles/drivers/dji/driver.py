@@ -92,6 +92,9 @@ class Dji:
     def poll(self) -> None:
         """Do nothing: messages are processed as they arrive."""
 
+    def request_attitude(self) -> None:
+        """Do nothing: the attitude arrives without a request."""
+
     def on_link_loss(self) -> str:
         """Return the assumed reaction: neither public definitions nor parameters state it."""
         return (

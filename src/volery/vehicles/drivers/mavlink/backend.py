@@ -163,6 +163,9 @@ class Backend(Protocol):
     def send_attitude(self, target: AttitudeTarget) -> None:
         """Send one attitude set-point. Not acknowledged."""
 
+    def request_attitude(self) -> None:
+        """See ``Driver``."""
+
     def request_arming_checks(self) -> None:
         """Request the texts of the arming checks that fail now."""
 

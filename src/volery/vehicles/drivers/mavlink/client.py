@@ -212,6 +212,7 @@ def stream_periods(firmware: Firmware, options: Mapping[str, str]) -> dict[str, 
         firmware.estimator: S,
         "GPS_RAW_INT": S,
         "HOME_POSITION": 2 * S,
+        "VFR_HUD": S,
     }
     if attitude:
         periods["ATTITUDE"] = round(S / attitude)
@@ -461,6 +462,9 @@ class MavlinkClient:
         if self._upload is None or not self._upload.alive(self._kernel.now()):
             self._upload = MissionUpload(items, self._send_to)
             self._upload.begin()
+
+    def request_attitude(self) -> None:
+        """Do nothing: ATTITUDE is requested from the beginning, at the rate of the address."""
 
     def request_target(self) -> None:
         """Request POSITION_TARGET_GLOBAL_INT, which reports the target."""

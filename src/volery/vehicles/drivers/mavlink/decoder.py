@@ -78,6 +78,7 @@ class TelemetryDecoder(ABC):
             "POSITION_TARGET_GLOBAL_INT": self._target,
             "GPS_RAW_INT": self._gps,
             "ATTITUDE": self._attitude,
+            "VFR_HUD": self._vfr_hud,
             "STATUSTEXT": self._texts.add,
             "RC_CHANNELS": self._rc_channels,
             "MISSION_ITEM_REACHED": self._reached,
@@ -172,6 +173,7 @@ class TelemetryDecoder(ABC):
     def _estimator(self, fields: Fields) -> None:
         flags: int = fields["flags"]
         self._estimates_position = bool(flags & HORIZONTAL_POSITION) and not flags & NO_POSITION
+        self._telemetry.note_estimate(self._estimates_position)
         self._update_ready()
 
     def _home_position(self, fields: Fields) -> None:
@@ -190,6 +192,9 @@ class TelemetryDecoder(ABC):
     def _attitude(self, fields: Fields) -> None:
         heading = degrees(fields["yaw"]) % 360.0
         self._telemetry.attitude = Attitude(degrees(fields["roll"]), degrees(fields["pitch"]), heading)
+
+    def _vfr_hud(self, fields: Fields) -> None:
+        self._telemetry.thrust = fields["throttle"] / 100.0
 
     def _rc_channels(self, fields: Fields) -> None:
         count = min(fields["chancount"], RC_CHANNELS)

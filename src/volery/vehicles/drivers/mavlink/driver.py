@@ -116,6 +116,7 @@ class MavlinkDriver:
         self.poll = backend.poll
         self.problem = backend.problem
         self.services = backend.services
+        self.request_attitude = backend.request_attitude
         self._kernel = kernel
         self._backend = backend
         self._takeover = Takeover(kernel, backend.telemetry, self.obeys)

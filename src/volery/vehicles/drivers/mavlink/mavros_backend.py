@@ -12,11 +12,17 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from math import degrees, nan, radians
+from math import degrees, isnan, nan, radians
 from typing import Any, NamedTuple
 
 from volery.base.errors import LinkError, LinkSilent
-from volery.base.frames import attitude_ned_to_enu, enu_to_ned, ned_to_enu
+from volery.base.frames import (
+    attitude_enu_to_ned,
+    attitude_ned_to_enu,
+    enu_to_ned,
+    ned_to_enu,
+    quaternion_to_euler,
+)
 from volery.base.geoid import EGM96, EGM96_NAME, Geoid, parse_geoid
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns, S
@@ -39,6 +45,7 @@ from volery.vehicles.drivers.mavlink.backend import (
     Ack,
     attitude_fields,
 )
+from volery.vehicles.drivers.mavlink.mavros_services import MavrosServices, to_waypoint
 from volery.vehicles.drivers.steps import ROVER_KIND
 from volery.vehicles.services import Item
 from volery.vehicles.telemetry import Answer, Battery, StatusText, Telemetry, Velocity
@@ -47,6 +54,9 @@ PERIOD: Ns = 100 * MS
 ANSWERED_WITHIN: Ns = 6 * S
 """A vehicle node waits up to 5 s for the autopilot's acknowledgement."""
 
+ATTITUDE_WITHIN: Ns = 2 * S
+"""MAVROS publishes the attitude several times a second."""
+
 MAVROS_OPTIONS = ("geoid", "namespace")
 NO_FIX = -1
 
@@ -54,10 +64,12 @@ Handler = Callable[[Any], None]
 
 
 class FirmwareBehind(NamedTuple):
-    """The firmware behind the vehicle node: its name, and the mode in which its rovers rest."""
+    """The firmware behind the vehicle node: its name, the mode in which its rovers rest, its missions."""
 
     autopilot: str
     resting: str
+    home_first: bool
+    """Whether item 0 of a mission is home."""
 
 
 class MavrosDecoder:
@@ -150,6 +162,13 @@ class MavrosDecoder:
     def _heading(self, message: Any) -> None:
         self._telemetry.attitude = self._telemetry.attitude._replace(heading=message.data)
 
+    def orientation(self, message: Any) -> None:
+        """Decode the orientation of ``imu/data``: the FLU body in ENU. The heading is that of the compass."""
+        turned = message.orientation
+        ned = attitude_enu_to_ned((turned.w, turned.x, turned.y, turned.z))
+        roll, pitch, _ = quaternion_to_euler(ned)
+        self._telemetry.attitude = self._telemetry.attitude._replace(roll=degrees(roll), pitch=degrees(pitch))
+
     def _velocity(self, message: Any) -> None:
         linear = message.twist.linear
         north, east, down = enu_to_ned((linear.x, linear.y, linear.z))
@@ -190,7 +209,6 @@ class MavrosBackend:
     """
 
     firmware: FirmwareBehind
-    services = None
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         self.telemetry = Telemetry(kernel, name)
@@ -212,7 +230,17 @@ class MavrosBackend:
         self._long = node.client(self._name("cmd/command"), "mavros_msgs/srv/CommandLong")
         self._push = node.client(self._name("mission/push"), "mavros_msgs/srv/WaypointPush")
         self._attitude: Publisher | None = None
+        self._inbox = inbox
+        self._receives_attitude = False
         self._rate = node.rate(PERIOD)
+        self.services = MavrosServices(
+            kernel,
+            node,
+            self.telemetry,
+            self._namespace,
+            self._spin,
+            home_first=self.firmware.home_first,
+        )
 
     def _name(self, name: str) -> str:
         return f"{self._namespace}/{name}"
@@ -222,6 +250,17 @@ class MavrosBackend:
     def _spin(self) -> None:
         self.poll()
         self._rate.sleep()
+
+    def request_attitude(self) -> None:
+        """Subscribe to ``imu/data``, at the first call, and wait for a message."""
+        if self._receives_attitude:
+            return
+        self._receives_attitude = True
+        name = self._name("imu/data")
+        self._node.subscribe(name, "sensor_msgs/msg/Imu", self._decoder.orientation, group=self._inbox)
+        until = self._kernel.now() + ATTITUDE_WITHIN
+        while isnan(self.telemetry.attitude.roll) and self._kernel.now() < until:
+            self._spin()
 
     def poll(self) -> None:
         """Process received messages; all of them are charged as one ``spinOnce``."""
@@ -308,7 +347,7 @@ class MavrosBackend:
 
     def upload(self, items: Sequence[Item]) -> None:
         """Call ``mission/push``."""
-        waypoints = [_waypoint(item, number == 0) for number, item in enumerate(items)]
+        waypoints = [to_waypoint(item, number == 0) for number, item in enumerate(items)]
         asked = request("mavros_msgs/srv/WaypointPush", start_index=0, waypoints=waypoints)
         response = self._call(self._push, asked)
         if response is not None:
@@ -363,24 +402,6 @@ class MavrosBackend:
 def to_ros_yaw_rate(degrees: float) -> float:
     """Convert a yaw rate from degrees/s clockwise to rad/s anticlockwise (REP 103)."""
     return -radians(degrees)
-
-
-def _waypoint(item: Item, current: bool) -> Any:
-    first, second, third, fourth = item.parameters
-    return new(
-        "mavros_msgs/msg/Waypoint",
-        frame=item.frame,
-        command=item.command,
-        is_current=current,
-        autocontinue=True,
-        param1=first,
-        param2=second,
-        param3=third,
-        param4=fourth,
-        x_lat=item.latitude,
-        y_long=item.longitude,
-        z_alt=item.z,
-    )
 
 
 def namespace_and_geoid(driver: str, name: str, options: Mapping[str, str]) -> tuple[str, Geoid]:

@@ -16,6 +16,7 @@ from volery.kernel.api import Action, Kernel
 from volery.kernel.waiting import Lock, Signal
 from volery.links.link import Frame
 from volery.links.mavlink_messages import constant, entry_name, from_bytewise, to_bytewise
+from volery.vehicles.rtcm import correction_parts
 from volery.vehicles.services import Item, LogEntry, Parameter
 from volery.vehicles.telemetry import Telemetry
 
@@ -28,8 +29,6 @@ STALLED: Ns = S
 MISSING_AT_ONCE = 20
 """Number of missing parameters that are requested together."""
 
-CORRECTION_PART, CORRECTION_PARTS = 180, 4
-"""Bytes in one GPS_RTCM_DATA, and the greatest number of parts of one RTCM message."""
 LOG_PART = 90
 """Bytes in one LOG_DATA."""
 
@@ -410,29 +409,3 @@ def item_fields(item: Item, number: int, kind: int) -> dict[str, Any]:
         "z": item.z,
         "mission_type": kind,
     }
-
-
-def correction_parts(message: bytes, sequence: int) -> list[dict[str, Any]]:
-    """Return one RTCM message as the fields of GPS_RTCM_DATA.
-
-    Bit 0 of the flags states that there are several parts, bits 1 and 2 number them, bits 3 to 7 number the
-    messages. A receiver knows the last part by its length: one that is full is followed by an empty one.
-
-    Args:
-        message: at most 720 bytes.
-        sequence: number of the message, 0 to 31.
-    """
-    if len(message) <= CORRECTION_PART:
-        whole = list(message.ljust(CORRECTION_PART, b"\0"))
-        return [{"flags": sequence << 3, "len": len(message), "data": whole}]
-    pieces = [message[at : at + CORRECTION_PART] for at in range(0, len(message), CORRECTION_PART)]
-    if len(pieces[-1]) == CORRECTION_PART and len(pieces) < CORRECTION_PARTS:
-        pieces.append(b"")
-    return [
-        {
-            "flags": 1 | number << 1 | sequence << 3,
-            "len": len(piece),
-            "data": list(piece.ljust(CORRECTION_PART, b"\0")),
-        }
-        for number, piece in enumerate(pieces)
-    ]

@@ -110,6 +110,9 @@ class Paparazzi:
 
     # -- on the ground
 
+    def request_attitude(self) -> None:
+        """Do nothing: the attitude arrives without a request."""
+
     def ready(self, within: Ns) -> Sequence[Step]:
         """Wait for a fix, an origin, an aligned attitude, and checked settings."""
         advice = (

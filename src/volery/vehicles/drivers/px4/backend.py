@@ -196,7 +196,7 @@ class PX4Mavlink(MavlinkClient):
 class PX4Mavros(MavrosBackend):
     """PX4 over MAVROS. See ``PX4Backend``."""
 
-    firmware = FirmwareBehind("PX4", HOLD)
+    firmware = FirmwareBehind("PX4", HOLD, home_first=False)
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         super().__init__(kernel, node, name, namespace, geoid)

@@ -1,0 +1,221 @@
+"""MAVROS's services for mission, geofence and rally points over MAVLink's mission protocol.
+
+Items are passed on unchanged; ArduPilot keeps its home position as the first item of a mission. ``push``
+replaces a whole list. MAVROS 1 and 2 name the lists of geofence and rally points differently: both names are
+published.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from volery.base.time import MS, Ns
+from volery.bridge.autopilot_link import FrameSubscription
+from volery.bridge.node_interface import (
+    LATCHED_STATE,
+    Fields,
+    InterfaceContext,
+    Service,
+    Topic,
+    Translator,
+    stamped,
+)
+from volery.links.link import Frame
+from volery.ros.messages import new, service
+
+ANSWERED_WITHIN: Ns = 1500 * MS
+ATTEMPTS = 3
+ACCEPTED = 0
+GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})
+"""MAV_FRAMEs with latitude and longitude."""
+_ITEM_PARAMETERS = ("param1", "param2", "param3", "param4")
+_LIST = "mavros_msgs/msg/WaypointList"
+
+
+class PlanList(NamedTuple):
+    """A list that an autopilot keeps: its MAV_MISSION_TYPE, the namespace of its services, and its topics."""
+
+    kind: int
+    name: str
+    topics: tuple[str, ...]
+
+
+MISSION = PlanList(0, "mission", ("mission/waypoints",))
+GEOFENCE = PlanList(1, "geofence", ("geofence/waypoints", "geofence/fences"))
+RALLY_POINTS = PlanList(2, "rallypoint", ("rallypoint/waypoints", "rallypoint/rallypoints"))
+
+PLAN_TOPICS = (
+    *(
+        Topic(topic, _LIST, LATCHED_STATE)
+        for plan in (MISSION, GEOFENCE, RALLY_POINTS)
+        for topic in plan.topics
+    ),
+    Topic("mission/reached", "mavros_msgs/msg/WaypointReached", LATCHED_STATE),
+)
+
+
+def _scale(frame: int) -> float:
+    """Return the units of x and y of a MISSION_ITEM_INT per degree or metre."""
+    return 1e7 if frame in GLOBAL_FRAMES else 1e4
+
+
+def to_item(waypoint: Any, sequence: int, kind: int = MISSION.kind) -> dict[str, Any]:
+    """Return a waypoint as the fields of a MISSION_ITEM_INT."""
+    scale = _scale(waypoint.frame)
+    return {
+        "seq": sequence,
+        "frame": waypoint.frame,
+        "command": waypoint.command,
+        "current": int(waypoint.is_current),
+        "autocontinue": int(waypoint.autocontinue),
+        **{name: getattr(waypoint, name) for name in _ITEM_PARAMETERS},
+        "x": round(waypoint.x_lat * scale),
+        "y": round(waypoint.y_long * scale),
+        "z": waypoint.z_alt,
+        "mission_type": kind,
+    }
+
+
+def to_waypoint(item: dict[str, Any]) -> Any:
+    """Return the fields of a MISSION_ITEM_INT as a waypoint."""
+    scale = _scale(item["frame"])
+    return new(
+        "mavros_msgs/msg/Waypoint",
+        frame=item["frame"],
+        command=item["command"],
+        is_current=bool(item["current"]),
+        autocontinue=bool(item["autocontinue"]),
+        **{name: item[name] for name in _ITEM_PARAMETERS},
+        x_lat=item["x"] / scale,
+        y_long=item["y"] / scale,
+        z_alt=item["z"],
+    )
+
+
+class PlanServices:
+    """Handlers of ``push``, ``pull`` and ``clear`` of one list.
+
+    The list is published after each ``pull`` and ``push``.
+
+    Args:
+        context: The interface.
+        plan: The list.
+    """
+
+    def __init__(self, context: InterfaceContext, plan: PlanList) -> None:
+        self._link, self._publish = context.link, context.publish
+        self._plan = plan
+        self._of = {"mission_type": plan.kind}
+        self.waypoints: list[Any] = []
+        self.current = 0
+
+    def services(self) -> Mapping[str, Service]:
+        """Return types and handlers by service name."""
+        return {
+            f"{self._plan.name}/push": ("mavros_msgs/srv/WaypointPush", self.push),
+            f"{self._plan.name}/pull": ("mavros_msgs/srv/WaypointPull", self.pull),
+            f"{self._plan.name}/clear": ("mavros_msgs/srv/WaypointClear", self.clear),
+        }
+
+    def publish_list(self, waypoints: list[Any]) -> None:
+        """Publish the list as it is on board."""
+        self.waypoints = waypoints
+        for topic in self._plan.topics:
+            self._publish(topic, new(_LIST, current_seq=self.current, waypoints=waypoints))
+
+    def _next(self, answers: FrameSubscription, within: Ns) -> Frame | None:
+        """Return the next frame about this list."""
+        answer = answers.next(within)
+        while answer is not None and answer.fields.get("mission_type", 0) != self._plan.kind:
+            answer = answers.next(within)
+        return answer
+
+    def _request(self, answers: FrameSubscription, message: str, fields: dict[str, Any]) -> Frame | None:
+        for _ in range(ATTEMPTS):
+            self._link.send_to_autopilot(message, fields)
+            answer = self._next(answers, ANSWERED_WITHIN)
+            if answer is not None:
+                return answer
+        return None
+
+    def push(self, request: Any) -> Any:
+        """Handle ``push``."""
+        response = service("mavros_msgs/srv/WaypointPush").response
+        waypoints = list(request.waypoints)
+        if request.start_index != 0 or not waypoints:
+            return response(False, 0)
+        sent = 0
+        with self._link.subscribe("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK") as answers:
+            answer = self._request(answers, "MISSION_COUNT", {"count": len(waypoints), **self._of})
+            while answer is not None and answer.name != "MISSION_ACK":
+                sequence = answer.fields["seq"]
+                if sequence >= len(waypoints):
+                    return response(False, sent)
+                sent = max(sent, sequence + 1)
+                item = to_item(waypoints[sequence], sequence, self._plan.kind)
+                self._link.send_to_autopilot("MISSION_ITEM_INT", item)
+                answer = self._next(answers, ATTEMPTS * ANSWERED_WITHIN)
+        accepted = answer is not None and answer.fields["type"] == ACCEPTED
+        if accepted:
+            self.publish_list(waypoints)
+        return response(accepted, sent if accepted else 0)
+
+    def pull(self, request: Any) -> Any:
+        """Handle ``pull``."""
+        response = service("mavros_msgs/srv/WaypointPull").response
+        with self._link.subscribe("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK") as answers:
+            count = self._request(answers, "MISSION_REQUEST_LIST", self._of)
+            if count is None or count.name != "MISSION_COUNT":
+                return response(False, 0)
+            waypoints: list[Any] = []
+            for sequence in range(count.fields["count"]):
+                item = self._request(answers, "MISSION_REQUEST_INT", {"seq": sequence, **self._of})
+                if item is None or item.fields.get("seq") != sequence:
+                    return response(False, len(waypoints))
+                waypoints.append(to_waypoint(item.fields))
+        self._link.send_to_autopilot("MISSION_ACK", {"type": ACCEPTED, **self._of})
+        self.publish_list(waypoints)
+        return response(True, len(waypoints))
+
+    def clear(self, request: Any) -> Any:
+        """Handle ``clear``."""
+        with self._link.subscribe("MISSION_ACK") as answers:
+            answer = self._request(answers, "MISSION_CLEAR_ALL", self._of)
+        accepted = answer is not None and answer.fields["type"] == ACCEPTED
+        return service("mavros_msgs/srv/WaypointClear").response(accepted)
+
+
+class MissionServices(PlanServices):
+    """The list that is flown: it has a current item, and items that were reached.
+
+    ``mission/waypoints`` is also published when the current item has changed.
+    """
+
+    def __init__(self, context: InterfaceContext) -> None:
+        super().__init__(context, MISSION)
+
+    def services(self) -> Mapping[str, Service]:
+        """Return types and handlers by service name."""
+        set_current = ("mavros_msgs/srv/WaypointSetCurrent", self.set_current)
+        return {**super().services(), "mission/set_current": set_current}
+
+    def translators(self) -> Mapping[str, Translator]:
+        """Return the translators by message name."""
+        return {"MISSION_ITEM_REACHED": self._publish_reached, "MISSION_CURRENT": self._update_current}
+
+    def _publish_reached(self, fields: Fields, at: Ns) -> None:
+        message = new("mavros_msgs/msg/WaypointReached", header=stamped(at), wp_seq=fields["seq"])
+        self._publish("mission/reached", message)
+
+    def _update_current(self, fields: Fields, at: Ns) -> None:
+        changed, self.current = fields["seq"] != self.current, fields["seq"]
+        if changed and self.waypoints:
+            self.publish_list(self.waypoints)
+
+    def set_current(self, request: Any) -> Any:
+        """Handle ``mission/set_current``."""
+        with self._link.subscribe("MISSION_CURRENT") as answers:
+            answer = self._request(answers, "MISSION_SET_CURRENT", {"seq": request.wp_seq})
+        succeeded = answer is not None and answer.fields["seq"] == request.wp_seq
+        return service("mavros_msgs/srv/WaypointSetCurrent").response(succeeded)
