@@ -1,7 +1,8 @@
 """Writer of the events of a run as an MCAP file with ROS 2 messages: ``trace.mcap``.
 
-The same run gives the same bytes: no wall time, no version, no compression. Chunks end with each simulated
-second and are written at once, so a killed process loses at most the last simulated second.
+The same run gives the same bytes: no wall time, no version. Chunks end with each simulated second and are
+written at once, so a killed process loses at most the last simulated second. They are compressed by zstd at a
+fixed level; zstd's bytes depend on its own version alone, and the events in them on nothing.
 Records other than messages are built by the ``mcap`` library; messages, of which there are millions, by
 precompiled encoders.
 
@@ -22,6 +23,7 @@ from typing import Any, NamedTuple
 from mcap import records
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
+from zstandard import ZstdCompressor
 
 from volery.base.files import Output
 from volery.base.time import Ns, S
@@ -40,6 +42,9 @@ MESSAGE_FRAME = "BQHIQQ"
 """The header of a message record: opcode, length, channel, sequence, log time, publish time."""
 MESSAGE_OVERHEAD = struct.calcsize(f"<{MESSAGE_FRAME}") - 9
 """Bytes that a message record's length counts beside its data: the header without opcode and length."""
+COMPRESSION = "zstd"
+"""The compression of chunks, in the words of the format."""
+_LEVEL = 3  # an eighth of the size; level 9 would save another quarter for six times the time
 _ROS2_PROFILE = "ros2"
 _MESSAGE = int(Opcode.MESSAGE)
 
@@ -100,6 +105,7 @@ class McapWriter:
         self._output = Output(path)
         self._definitions = definitions
         self._summary = _Summary()
+        self._compressor = ZstdCompressor(level=_LEVEL)
         self._body = bytearray()
         self._indexes = _empty_indexes()
         self._chunk_ends: Ns = S
@@ -157,7 +163,8 @@ class McapWriter:
         self._indexes = _empty_indexes()
         first = min(min(index[::2]) for index in indexes.values())
         last = max(max(index[::2]) for index in indexes.values())
-        chunk = _record(records.Chunk("", body, last, first, zlib.crc32(body), len(body)))
+        packed = self._compressor.compress(body)
+        chunk = _record(records.Chunk(COMPRESSION, packed, last, first, zlib.crc32(body), len(body)))
         listed = b""
         offsets = {}
         for channel, index in indexes.items():
@@ -166,8 +173,8 @@ class McapWriter:
         entry = records.ChunkIndex(
             chunk_length=len(chunk),
             chunk_start_offset=self._output.size,
-            compression="",
-            compressed_size=len(body),
+            compression=COMPRESSION,
+            compressed_size=len(packed),
             message_end_time=last,
             message_index_length=len(listed),
             message_index_offsets=offsets,

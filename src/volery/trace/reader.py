@@ -18,13 +18,14 @@ from mcap import records
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from zstandard import ZstdDecompressor, ZstdError
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, clock
 from volery.trace.attachments import SETUP_ATTACHMENT, RunSetup, setup_from_json
 from volery.trace.encoding import OWN_EVENTS, Codec, type_name
 from volery.trace.events import Event, Published
-from volery.trace.mcap_writer import MAGIC, MESSAGE_FRAME, TRACE_SCHEMA, Attachment
+from volery.trace.mcap_writer import COMPRESSION, MAGIC, MESSAGE_FRAME, TRACE_SCHEMA, Attachment
 
 _Decoder = Callable[[Ns, bytes], Event | None]
 _MESSAGE = int(Opcode.MESSAGE)
@@ -33,7 +34,8 @@ _FRAME = struct.Struct(f"<{MESSAGE_FRAME[2:]}")
 # start, end, uncompressed size, checksum, length of the name of the compression
 _CHUNK_HEAD = struct.Struct("<QQQII")
 _CHUNK_OVERHEAD = _CHUNK_HEAD.size + 8
-_DAMAGE = (McapError, struct.error, ValueError, LookupError, TypeError, OverflowError)
+_LARGEST_CHUNK = 1 << 30  # bytes; one of volery has a second of events
+_DAMAGE = (McapError, ZstdError, struct.error, ValueError, LookupError, TypeError, OverflowError)
 """What damaged records raise in ``mcap.records`` and here."""
 
 
@@ -179,10 +181,16 @@ class Reading:
     def _events_of_chunk(self, record: _Record) -> Iterator[Event]:
         if len(record.content) < _CHUNK_OVERHEAD:
             return
-        *_, checksum, name_length = _CHUNK_HEAD.unpack_from(record.content)
-        if name_length:
-            raise UsageError(f"{self.path} is compressed, which no trace of volery is")
-        body = record.content[_CHUNK_OVERHEAD:]
+        *_, size, checksum, name_length = _CHUNK_HEAD.unpack_from(record.content)
+        content = record.content[_CHUNK_HEAD.size :]
+        compression, content = content[:name_length].decode(), content[name_length + 8 :]
+        if compression == COMPRESSION:
+            body = _decompressed(content, size)
+        elif compression:
+            what = f"is compressed by {compression!r}; traces of volery are by {COMPRESSION} or not at all"
+            raise UsageError(f"{self.path} {what}")
+        else:
+            body = content
         if not record.missing and zlib.crc32(body) != checksum:
             self._lose(f"a part that follows {clock(self._last)} is damaged: its checksum is wrong")
             return
@@ -234,6 +242,12 @@ class Reading:
 
     def _unknown_channel(self, _: Ns, __: bytes) -> None:
         self._lose("what a channel carries stood in a damaged part: its events are missing")
+
+
+def _decompressed(content: bytes, size: int) -> bytes:
+    """Return the *size* bytes in *content*, fewer if it is cut."""
+    with ZstdDecompressor().stream_reader(content) as stream:
+        return stream.read(min(size, _LARGEST_CHUNK))
 
 
 def _stream(content: bytes) -> ReadDataStream:
