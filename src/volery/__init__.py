@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from volery.base.errors import CapabilityError as CapabilityError
     from volery.base.errors import ComponentError as ComponentError
     from volery.base.errors import ControlLost as ControlLost
+    from volery.base.errors import CriticalBattery as CriticalBattery
     from volery.base.errors import Deadlock as Deadlock
     from volery.base.errors import EstimateError as EstimateError
     from volery.base.errors import Failsafe as Failsafe
@@ -27,10 +28,12 @@ if TYPE_CHECKING:
     from volery.base.errors import LowBattery as LowBattery
     from volery.base.errors import ModelError as ModelError
     from volery.base.errors import NotArrived as NotArrived
+    from volery.base.errors import OffTrack as OffTrack
     from volery.base.errors import OutOfBounds as OutOfBounds
     from volery.base.errors import Overridden as Overridden
     from volery.base.errors import PositionLost as PositionLost
     from volery.base.errors import Refused as Refused
+    from volery.base.errors import ThrustSaturated as ThrustSaturated
     from volery.base.errors import UsageError as UsageError
     from volery.base.errors import VehicleError as VehicleError
     from volery.base.errors import VoleryError as VoleryError
@@ -54,9 +57,11 @@ if TYPE_CHECKING:
     from volery.run.result import Run as Run
     from volery.run.simulate import simulate as simulate
     from volery.vehicles import Drone as Drone
+    from volery.vehicles import Escalation as Escalation
     from volery.vehicles import Fence as Fence
     from volery.vehicles import Fleet as Fleet
     from volery.vehicles import Limits as Limits
+    from volery.vehicles import Reaction as Reaction
     from volery.vehicles import Rover as Rover
     from volery.vehicles import Zone as Zone
     from volery.vehicles.vehicle_plan import Plan as Plan

@@ -128,8 +128,20 @@ class ControlLost(VehicleError):
     """The vehicle falls or has turned over in the air, as with a motor lost."""
 
 
+class OffTrack(VehicleError):
+    """The autopilot does not keep the vehicle on its commanded path, or at its commanded place."""
+
+
+class ThrustSaturated(VehicleError):
+    """The vehicle is at full thrust and does not climb: it is overloaded, or a motor or the battery is weak."""
+
+
 class LowBattery(VehicleError):
     """The battery is below its reserve: only landing and returning home may be started."""
+
+
+class CriticalBattery(LowBattery):
+    """What is left of the battery suffices for a landing only, so the vehicle is landed where it is."""
 
 
 class FleetError(ExceptionGroup[Exception], VoleryError):

@@ -4,8 +4,8 @@ Each phase is a small program, which calls ``strike`` at the time of the fault a
 during a call, ``strike`` is scheduled a moment later. A trial demands of every driver and autopilot: no call
 hangs; it succeeds or raises an error of this project that names the vehicle; success agrees with the
 vehicle's true state; nothing is done twice; modes of other commanders are not overridden; and the vehicle
-lands in the end: motors never off in the air, upright, slower than it breaks. The judge is the simulation's
-truth, not the autopilot's estimate. The energy that is left at touch-down is reported.
+lands in the end: motors never off in the air, upright, slower than it breaks, before the battery is empty.
+The judge is the simulation's truth, not the autopilot's estimate.
 
 The faults are kinds of the catalogue (``volery.model.faults``), with the effects that they have in a model.
 Only here are the two kinds that a model cannot state: another station that takes over, and the death of the
@@ -18,7 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
-from math import acos, degrees, dist, hypot
+from math import acos, atan2, degrees, dist, hypot
 from typing import Any, TypeVar
 
 from volery.base.errors import VoleryError
@@ -38,6 +38,7 @@ from volery.model.faults import (
     WindChange,
 )
 from volery.run.assembly.fault_effects import NO_WIRE_FAULTS, Affected, apply_fault
+from volery.simulation.world.body_specs import STANDARD_GRAVITY, BodySpec, Multirotor
 from volery.testing.checks import CheckFailedError, demand
 from volery.testing.driver_checks.manual_control_checks import fly_by_hand
 from volery.testing.stage import SimulatedStage, Stage
@@ -66,13 +67,13 @@ FAULTS: Mapping[str, Fault | None] = {
     "truncated": _trial(LinkDegraded, truncate=0.2),
     "other-station": _trial(OtherStation),
     "killed": _trial(ProgramKilled),
-    "battery-low": _trial(BatteryLow, charge=0.14),
+    "battery-low": _trial(BatteryLow, charge=0.08),
     "gps-lost": _trial(GpsLost),
     "motor-weak": _trial(MotorDead, thrust=0.7),
     "wind": _trial(WindChange, speed_m_s=12.0, direction_deg=270.0, gusts_m_s=1.5),
 }
-"""14 % is just below the default reserve: what is left must suffice to land. 12 m/s is the strongest wind
-against which this airframe still makes way: at 30 degrees of tilt its drag holds 13 m/s.
+"""From 8 % this airframe hovers for 34 s. 12 m/s is the strongest wind against which it still makes way: at
+30 degrees of tilt its drag holds 13 m/s.
 """
 
 
@@ -218,15 +219,34 @@ WATCHED: Ns = 100 * MS
 LOST_S = 30.0
 """Time between the death of a program and the start of the next one, s."""
 DOWN_WITHIN_S = 300.0
+SETTLES_S = 2.0
+"""Time in which an airframe without thrust falls onto its legs, or over, s."""
 
 NEAR_M = 5.0
 """Largest distance from the goal, by truth, at which an operation may return."""
 CLOSE_M, STANDING_M = 1.2, 0.3
 """Heights above ground: the last approach, and a vehicle that stands on its legs."""
-BREAKS_M_S, UPRIGHT_DEG = 3.0, 35.0
-"""Sink rate and lean at touch-down from which an airframe counts as damaged; the strongest wind of the trials
-is held at a lean of 27 degrees.
-"""
+BREAKS_M_S, UPRIGHT_DEG = 3.0, 20.0
+"""Sink rate and lean at touch-down from which an airframe counts as damaged in still air."""
+GUSTS_COVERED = 2.0
+"""Standard deviations of the gusts that a vehicle may lean against."""
+
+
+def lean_in_wind(spec: Multirotor, speed_m_s: float) -> float:
+    """Return the lean at which the thrust balances a wind's drag and the weight, deg: atan(D / m g)."""
+    drag = (spec.drag_linear + spec.drag_quadratic * speed_m_s) * speed_m_s
+    return degrees(atan2(drag, spec.mass * STANDARD_GRAVITY))
+
+
+def most_lean(spec: BodySpec, fault: Fault | None) -> float:
+    """Return the lean at touch-down from which an airframe counts as damaged, deg.
+
+    A vehicle that stands still in wind must lean against its drag, down to the ground. Nothing is added to
+    that lean but the gusts of two standard deviations.
+    """
+    if not isinstance(fault, WindChange) or not isinstance(spec, Multirotor):
+        return UPRIGHT_DEG
+    return max(UPRIGHT_DEG, lean_in_wind(spec, fault.speed_m_s + GUSTS_COVERED * fault.gusts_m_s))
 
 
 def lean(state: VehicleState) -> float:
@@ -435,6 +455,7 @@ class _Trying:
         while self._seen.armed[-1] and waited < DOWN_WITHIN_S:
             stage.sleep(1.0)
             waited += 1.0
+        stage.sleep(SETTLES_S)
 
     def _demand_done(self) -> None:
         """Demand that a completed operation is complete by the vehicle's true state."""
@@ -459,7 +480,11 @@ class _Trying:
         landing = touch_down(self._seen.states)
         if landing is not None:
             demand(landing.sink_m_s < BREAKS_M_S, f"it touched down at {landing.sink_m_s:.1f} m/s")
-            demand(landing.lean_deg < UPRIGHT_DEG, f"it touched down leaning {landing.lean_deg:.0f} degrees")
+            most = most_lean(self._stage.flight.spec, self._fault)
+            demand(landing.lean_deg < most, f"it touched down leaning {landing.lean_deg:.0f} degrees")
+            demand(landing.battery > 0.0, "its battery was empty at touch-down")
+            stands = lean(self._seen.states[-1])
+            demand(stands < UPRIGHT_DEG, f"it lies on the ground, leaning {stands:.0f} degrees")
         if self._taken_over:
             self._demand_not_fought()
 

@@ -13,6 +13,7 @@ from volery.vehicles.driver import (
     drivers,
 )
 from volery.vehicles.drone import Drone
+from volery.vehicles.escalation import Escalation, Reaction
 from volery.vehicles.fleet import Fleet
 from volery.vehicles.limits import Fence, Limits, Zone
 from volery.vehicles.rover import Rover
@@ -27,11 +28,13 @@ __all__ = [
     "Driver",
     "DriverFactory",
     "Drone",
+    "Escalation",
     "Fence",
     "Fleet",
     "Land",
     "Limits",
     "MissionItem",
+    "Reaction",
     "ReturnHome",
     "Rover",
     "StatusText",

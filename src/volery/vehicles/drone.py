@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from math import isfinite, nan
+from math import nan
 
 from volery.base.errors import OutOfBounds, Refused, UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S, from_seconds
 from volery.vehicles.driver import Acceleration, AttitudeTarget, Capability, ManualControl
-from volery.vehicles.executor import NO_GOAL, RESTARTS, STREAM, TO_SAFETY, TRAVEL, TURN, Goal
+from volery.vehicles.executor import LANDING, NO_GOAL, RESTARTS, STREAM, TO_SAFETY, TRAVEL, TURN, Goal
 from volery.vehicles.limits import height_violation
 from volery.vehicles.telemetry import Velocity
 from volery.vehicles.vehicle import Vehicle, path_timeout, travel_timeout
@@ -312,7 +312,7 @@ class Drone(Vehicle):
             operation,
             "land",
             lambda: self._driver.land(within),
-            policy=TO_SAFETY,
+            policy=LANDING,
             goal=lambda: NO_GOAL if here is None else Goal(here.latitude, here.longitude, nan),
         )
 
@@ -366,7 +366,7 @@ class Drone(Vehicle):
         that the transmitter commands. Raises ``Refused`` if the autopilot receives no transmitter.
         """
         self._connect(Capability.MANUAL_CONTROL)
-        self._operate("hand_over", "hand over to the transmitter", self._driver.hand_over, policy=TO_SAFETY)
+        self._operate("hand_over", "hand over to the transmitter", self._driver.hand_over, policy=LANDING)
 
     # -- end of a program
 
@@ -449,7 +449,7 @@ class Drone(Vehicle):
             if self._monitor is None:
                 raise
             # the set-point before would go on over the bound
-            raise OutOfBounds(self.name, asked, f"{error.what}; {self._hold_back()}") from None
+            raise OutOfBounds(self.name, asked, f"{error.what}; {self._react(error)}") from None
 
     def _position_after(self, velocity: Velocity, seconds: float) -> Position:
         """Return the position after *seconds* at *velocity*; the ground stops a descent."""
@@ -459,9 +459,3 @@ class Drone(Vehicle):
         latitude, longitude, _ = frame.from_enu(moved)
         height = self._driver.telemetry.above_home + velocity.up * seconds
         return Position(latitude, longitude, AboveHome(max(height, self.limits.lowest)))
-
-    def _landing_timeout(self, climb: float) -> Ns:
-        """Return the time-out of a landing at 0.5 m/s, as of ArduPilot; an unknown height is the highest."""
-        height = self._driver.telemetry.above_home
-        height = max(height, 0.0) if isfinite(height) else self.limits.highest
-        return travel_timeout(0.0, 2.0 * (height + climb))

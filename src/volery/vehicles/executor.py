@@ -68,6 +68,9 @@ class OperationPolicy:
         travels: refuse the operation below the battery reserve.
         manual: keep the age of the last manual control.
         to_safety: brings the vehicle to safety, so it aborts the operation of another task.
+        on_track: the vehicle must stay near the straight path to its goal.
+        holds_place: the vehicle stays where it is.
+        unmonitored: nothing ends it: it lands, stops the motors or gives the vehicle to a pilot.
         ignored: bounds that are not monitored.
     """
 
@@ -78,18 +81,24 @@ class OperationPolicy:
     travels: bool = False
     manual: bool = False
     to_safety: bool = False
+    on_track: bool = False
+    holds_place: bool = False
+    unmonitored: bool = False
     ignored: frozenset[str] = frozenset()
 
 
 PLAIN = OperationPolicy(manual=True)
 UNGUARDED = OperationPolicy(manual=True, needs_control=False)
 TURN = OperationPolicy(bounded=True)
-TRAVEL = OperationPolicy(bounded=True, travels=True)
+TRAVEL = OperationPolicy(bounded=True, travels=True, on_track=True)
 FLY_MISSION = OperationPolicy(bounded=True, travels=True, ignored=frozenset({FLOOR}))
 STREAM = OperationPolicy(bounded=True, travels=True, goes_on=True, recorded=False)
 MANUAL = OperationPolicy(bounded=True, goes_on=True, manual=True)
+IN_PLACE = OperationPolicy(holds_place=True)
+"""Of a drone between two calls."""
 TO_SAFETY = OperationPolicy(to_safety=True)
-LAST_RESORT = OperationPolicy(to_safety=True, needs_control=False)
+LANDING = OperationPolicy(to_safety=True, unmonitored=True)
+LAST_RESORT = OperationPolicy(to_safety=True, needs_control=False, unmonitored=True)
 
 
 def distance_to(goal: Goal, position: Position | None) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 All checks use the local frame about home: metres east and north of home, and metres above home. ``Bounds``
 computes that frame and the areas of the fence once for one home, because every command and every position
 report is checked. A goal is checked along the straight path before anything is sent; while the vehicle
-travels, ``BoundsMonitor`` checks each reported position and the battery.
+travels, ``BoundsMonitor`` checks each reported position.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import NamedTuple, TypeGuard
 from shapely import LineString, Point, Polygon, get_parts, make_valid, prepare
 from shapely.geometry.base import BaseGeometry
 
-from volery.base.errors import LowBattery, OutOfBounds, PositionLost, UsageError, VehicleError
+from volery.base.errors import OutOfBounds, PositionLost, UsageError, VehicleError
 from volery.base.frames import LocalFrame, Vector
 from volery.base.position import AMSL, AboveHome, Altitude, Position
 from volery.base.time import Ns, S, to_seconds
@@ -32,10 +32,10 @@ TOLERANCE_M = 3.0
 """A vehicle in flight may exceed a bound by this: the error of a usual GPS receiver, and the overshoot of a
 multirotor when it stops.
 """
-LOW_BATTERY_FOR: Ns = 3 * S
-"""The battery must be below the reserve for this time: the voltage sags while the motors draw current."""
 DEFAULT_RESERVE = 0.15
 """Battery reserve where none is stated and the battery is measured: PX4's threshold for a low battery."""
+DEFAULT_LANDING_RESERVE = 0.02
+"""Share left at touch-down: two steps of a battery that is reported in whole percent."""
 POSITION_LOST_FOR: Ns = 10 * S
 """Autopilots with a failsafe for it act sooner: PX4 1.14 after 6.5 s, ArduCopter 4.5 after 8 s."""
 FLOOR = "floor"
@@ -53,13 +53,19 @@ class Limits:
         lowest: least height above home, m. The default leaves 2 m for the error of the estimate; state a
             lower value if a goal lies below home.
         battery_reserve: share of the battery, 0 to below 1, below which only landing, returning and holding
-            are allowed. 0 means no reserve; ``None`` means 15 %, if the autopilot reports the battery at all.
+            are allowed. 0 means no reserve; ``None`` means 15 %, if the autopilot reports the battery at all;
+            where it reports volts only, 3.6 V per lithium-polymer cell.
+        landing_reserve: share of the battery, 0 to below 1, that shall be left at touch-down: a drone is
+            landed where it is once the rest only suffices for the landing. 0 means never.
+        off_track: greatest distance from the commanded path or place that a drone may be blown or drift, m.
     """
 
     farthest: float = 10_000.0
     highest: float = 120.0
     lowest: float = -2.0
     battery_reserve: float | None = None
+    landing_reserve: float = DEFAULT_LANDING_RESERVE
+    off_track: float = 15.0
 
     def __post_init__(self) -> None:
         if not (self.farthest > 0 and self.highest > self.lowest):
@@ -68,6 +74,12 @@ class Limits:
             raise UsageError(
                 f"battery_reserve={self.battery_reserve:g}: give a share from 0 to below 1, as 0.2"
             )
+        if not 0.0 <= self.landing_reserve < 1.0:
+            raise UsageError(
+                f"landing_reserve={self.landing_reserve:g}: give a share from 0 to below 1, as 0.02"
+            )
+        if not self.off_track > 0.0:
+            raise UsageError(f"off_track={self.off_track:g}: give metres, above 0")
 
     @property
     def reserve(self) -> float:
@@ -374,7 +386,7 @@ def _along(path: Path, share: float) -> Vector:
 
 
 class BoundsMonitor:
-    """Checks bounds and battery during one operation.
+    """Checks bounds and position during one operation.
 
     A bound that is violated at the start is ignored until it has been met once, so that a vehicle outside its
     bounds can come back.
@@ -382,7 +394,6 @@ class BoundsMonitor:
     Args:
         telemetry: telemetry of the vehicle.
         bounds: bounds about home, or ``None`` without a home.
-        reserve: battery reserve, 0..1.
         ignored: names of bounds that are never checked.
         needs_position: whether a lost position ends the operation.
     """
@@ -391,7 +402,6 @@ class BoundsMonitor:
         self,
         telemetry: Telemetry,
         bounds: Bounds | None,
-        reserve: float,
         ignored: frozenset[str] = frozenset(),
         *,
         needs_position: bool = False,
@@ -399,7 +409,6 @@ class BoundsMonitor:
         self._telemetry = telemetry
         self._needs_position = needs_position
         self._bounds = bounds
-        self._reserve = reserve
         self._ignored = ignored
         self._checked: Position | None = None
         self._low_since: Ns | None = None
@@ -415,11 +424,7 @@ class BoundsMonitor:
             operation: what the vehicle is doing, for the error message.
             now: the present time, ns.
         """
-        return (
-            self._check_bounds(operation)
-            or self._check_battery(operation, now)
-            or self._check_position(operation, now)
-        )
+        return self._check_bounds(operation) or self._check_position(operation, now)
 
     def _check_position(self, operation: str, now: Ns) -> PositionLost | None:
         seen = self._telemetry
@@ -429,6 +434,7 @@ class BoundsMonitor:
         if lost < POSITION_LOST_FOR:
             return None
         why = f"its GPS reports {seen.fix}" if seen.fix in UNFIXED else "none is reported"
+        why = why if seen.estimate_valid else "its estimator reports none"
         what = f"it has had no position for {to_seconds(lost):.0f} s ({why}); land() needs none"
         return PositionLost(seen.name, operation, what)
 
@@ -442,20 +448,3 @@ class BoundsMonitor:
         ignored = self._violated_at_start | self._ignored
         found = [text for name, text in violations.items() if name not in ignored]
         return OutOfBounds(self._telemetry.name, operation, " and ".join(found)) if found else None
-
-    def _check_battery(self, operation: str, now: Ns) -> LowBattery | None:
-        remaining = self._telemetry.battery.remaining
-        if not isfinite(remaining) or remaining >= self._reserve:
-            self._low_since = None
-            return None
-        if self._low_since is None:
-            self._low_since = now
-        if now - self._low_since < LOW_BATTERY_FOR:
-            return None
-        return low_battery(self._telemetry.name, operation, remaining, self._reserve)
-
-
-def low_battery(vehicle: str, operation: str, remaining: float, reserve: float) -> LowBattery:
-    """Return the error for a battery below its reserve; it names the operations that are still allowed."""
-    what = f"the battery is at {remaining:.0%}, below the reserve of {reserve:.0%} (Limits.battery_reserve)"
-    return LowBattery(vehicle, operation, f"{what}; return_home(), land() and hold() are still possible")

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from math import inf, nan
+from math import inf, isfinite, nan
 from typing import NamedTuple
 
-from volery.base.errors import ControlLost
 from volery.base.position import Position
-from volery.base.time import MS, Ns, S
+from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
 
@@ -85,11 +84,16 @@ _CAUSES: Mapping[str, tuple[str, ...]] = {
 """Words in an autopilot's texts that tell the cause of a failsafe."""
 _LOW_SHARE = 0.15
 
-FALLING_M_S = 8.0
-"""Sink rate that no autopilot commands by itself, m/s."""
-OVERTURNED_DEG = 70.0
-OVERTURNED_FOR: Ns = 300 * MS
-_UPSET_TEXTS = ("thrust loss", "crash: disarm", "motor failure", "attitude failure", "failure detected")
+
+MIDDLE_US, HALF_US = 1500, 500
+"""Middle and half of the range of an RC channel, µs."""
+PROGRAM_MAY_FLY, PILOT_FLIES = MIDDLE_US, MIDDLE_US - HALF_US
+"""Pulse widths that stand for the mode switch of an autopilot without pulse widths."""
+
+
+def pulse_of(share: float) -> int:
+    """Return the pulse width in µs of a stick or switch at *share*, -1 to 1; 0 for what is no number."""
+    return MIDDLE_US + round(HALF_US * min(1.0, max(-1.0, share))) if isfinite(share) else 0
 
 
 class Telemetry:
@@ -108,10 +112,13 @@ class Telemetry:
         above_home: height above home, m.
         amsl_known: altitudes AMSL are what they say; if not, only their differences to home's count.
         amsl_remedy: what the user can do if they are not.
+        thrust: collective thrust, 0..1 of the largest; NaN where it is not reported.
         mission_item: the mission item in progress.
         mission_reached: the mission item reached last.
         answers: last acknowledgement by key.
         rc: pulse widths of the RC channels as the autopilot reads them, µs; 0 or 65535 where there is none.
+            Where an autopilot reports positions instead, ``pulse_of`` converts them. Its mode switch, as
+            channel 5, is at 1500 where a program may fly, else at 1000.
         rc_ns: time of their last report; -1 before the first.
         boot_ns: last reported time of the autopilot since its boot; -1 where it sends none.
         home_ns: time since which the present home position is reported; -1 without one.
@@ -130,6 +137,8 @@ class Telemetry:
         self._fix = ""
         self._had_fix = False
         self._fix_lost_ns: Ns | None = None
+        self._had_estimate = False
+        self._estimate_lost_ns: Ns | None = None
         self.detects_silence = True
         self.stream_lost = ""
         self.kind = ""
@@ -154,6 +163,7 @@ class Telemetry:
         self.velocity = Velocity(nan, nan, nan)
         self.attitude = Attitude(nan, nan, nan)
         self.battery = Battery(nan, nan, nan)
+        self.thrust = nan
         self.satellites = 0
         self.mission_item = -1
         self.mission_reached = -1
@@ -203,16 +213,30 @@ class Telemetry:
         )
 
     def position_lost_for(self, now: Ns) -> Ns:
-        """Return for how long the position has not been reported, or estimated without satellites, ns.
+        """Return for how long the position has not been reported or not been a valid estimate, ns.
 
-        It is 0 before the first position, and for a vehicle that never had satellites.
+        An estimate is not valid without satellites, or where the autopilot reports so. It is 0 before the
+        first position, and for a vehicle that never had satellites or a valid estimate.
         """
         if self.position is None:
             return 0
         allowed = max(POSITION_STALE_AFTER, PERIODS_MISSED * self._position_period)
         age = now - self._position_ns
         lost = age if age > min(allowed, LONGEST_POSITION_AGE) else 0
-        return max(lost, now - self._fix_lost_ns if self._fix_lost_ns is not None else 0)
+        since = [one for one in (self._fix_lost_ns, self._estimate_lost_ns) if one is not None]
+        return max(lost, *(now - one for one in since)) if since else lost
+
+    @property
+    def estimate_valid(self) -> bool:
+        """Whether the autopilot has not reported that its estimate of the position has become invalid."""
+        return self._estimate_lost_ns is None
+
+    def note_estimate(self, valid: bool) -> None:
+        """Note whether the autopilot reports its estimate of the horizontal position as valid."""
+        if valid:
+            self._had_estimate, self._estimate_lost_ns = True, None
+        elif self._had_estimate and self._estimate_lost_ns is None:
+            self._estimate_lost_ns = self._kernel.now()
 
     @property
     def home(self) -> Position | None:
@@ -280,57 +304,6 @@ def failsafe_cause(telemetry: Telemetry, now: Ns) -> str:
     if telemetry.battery.remaining <= _LOW_SHARE:
         return "battery"
     return "not stated by the autopilot"
-
-
-class UpsetMonitor:
-    """Notices a multirotor that falls or has turned over, from its telemetry and recent texts.
-
-    With one of four motors lost it turns over within half a second and falls: 8 m/s after 0.8 s.
-
-    Args:
-        telemetry: telemetry of the vehicle.
-    """
-
-    def __init__(self, telemetry: Telemetry) -> None:
-        self._telemetry = telemetry
-        self._checked: Ns = -1
-        self._tilted_since: Ns | None = None
-
-    def check(self, operation: str, now: Ns) -> ControlLost | None:
-        """Return the error that must end the operation, or ``None``.
-
-        Args:
-            operation: what the vehicle is doing, for the error message.
-            now: the present time, ns.
-        """
-        seen, before = self._telemetry, self._checked
-        self._checked = now
-        if now - before > OVERTURNED_FOR:
-            self._tilted_since = None
-        if not (seen.flying and seen.armed) or seen.kind != "drone" or seen.stale:
-            self._tilted_since = None
-            return None
-        what = self._upset(now)
-        if not what:
-            return None
-        return ControlLost(seen.name, operation, f"{what}; {describe_state(seen)}; its motors may still turn")
-
-    def _upset(self, now: Ns) -> str:
-        """Return how the vehicle is upset; empty if it is not."""
-        seen = self._telemetry
-        for text in seen.texts_since(now - RECENT_CAUSE, severity=3):
-            if any(words in text.lower() for words in _UPSET_TEXTS):
-                return f"the autopilot said {text!r}"
-        sink = -seen.velocity.up
-        if sink > FALLING_M_S:
-            return f"it falls at {sink:.0f} m/s"
-        roll, pitch, _ = seen.attitude
-        if not (abs(roll) > OVERTURNED_DEG or abs(pitch) > OVERTURNED_DEG):
-            self._tilted_since = None
-            return ""
-        self._tilted_since = now if self._tilted_since is None else self._tilted_since
-        held = now - self._tilted_since >= OVERTURNED_FOR
-        return f"it has turned over (roll {roll:.0f}, pitch {pitch:.0f} degrees)" if held else ""
 
 
 def describe_state(telemetry: Telemetry) -> str:

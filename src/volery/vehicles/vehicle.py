@@ -7,21 +7,25 @@ operation runs at a time, only while no other station has control, within the bo
 | what ends an operation | the caller gets | the vehicle |
 |---|---|---|
 | limits or fence are violated | ``OutOfBounds`` | holds where it has stopped |
+| it is far off its commanded path or place for 3 s | ``OffTrack`` | holds where it has stopped |
 | the battery falls below the reserve | ``LowBattery`` | holds where it has stopped |
+| what is left suffices for a landing only | ``CriticalBattery`` | is landed where it is |
+| the thrust is at its limit and it does not climb | ``ThrustSaturated`` | is landed where it is |
 | the position is lost for 10 s in the air | ``PositionLost`` | is commanded to hold |
 | it falls or has turned over, as with a motor lost | ``ControlLost`` | is left to its autopilot |
 | a pilot or another station changes mode or target | ``Overridden``, ``Failsafe`` | gets no more messages |
 | another task of this program holds, returns, lands or kills | ``Overridden`` | does that |
 | the link times out | ``LinkLost`` | does what its parameters state: ``on_link_loss`` |
 
-Holding is skipped if another station has control; on the ground the vehicle is disarmed instead.
+A drone in the air is monitored between two calls as well; the next call then raises the error. A drone that
+does not hold is landed: see ``Escalation``. Nothing is commanded if another station has control; on the
+ground the vehicle is disarmed instead.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from math import hypot, isfinite
 
@@ -32,9 +36,11 @@ from volery.base.errors import (
     LinkSilent,
     LowBattery,
     NotArrived,
+    OffTrack,
     OutOfBounds,
     PositionLost,
     Refused,
+    ThrustSaturated,
     UsageError,
     VehicleError,
     VoleryError,
@@ -44,6 +50,8 @@ from volery.base.time import MINUTE, MS, Ns, S, from_seconds, to_seconds
 from volery.kernel.api import Handle, Kernel
 from volery.kernel.task import ExecutionContext, Task
 from volery.trace.events import Operation, Text
+from volery.vehicles.battery_monitor import BatteryMonitor, low_battery
+from volery.vehicles.control_monitors import ThrustMonitor, TrackMonitor, UpsetMonitor
 from volery.vehicles.driver import (
     Capability,
     Driver,
@@ -56,8 +64,11 @@ from volery.vehicles.driver import (
     Waypoint,
     item_problem,
 )
+from volery.vehicles.escalation import SINKING_M_S, Escalation, Reaction, escalate
 from volery.vehicles.executor import (
     FLY_MISSION,
+    IN_PLACE,
+    LANDING,
     LAST_RESORT,
     LINK_TIMEOUT,
     MANUAL,
@@ -78,7 +89,6 @@ from volery.vehicles.limits import (
     Limits,
     Path,
     is_number,
-    low_battery,
     states_amsl,
 )
 from volery.vehicles.serviced_vehicle import ServicedVehicle
@@ -88,7 +98,6 @@ from volery.vehicles.telemetry import (
     Battery,
     StatusText,
     Telemetry,
-    UpsetMonitor,
     Velocity,
     describe_state,
 )
@@ -119,6 +128,11 @@ SLOWEST_TRAVEL = 2.5
 SLOWEST_CLIMB = 0.5
 MARGIN_S = 30.0
 
+_MONITORED = (OutOfBounds, OffTrack, LowBattery, PositionLost, ThrustSaturated)
+"""Errors of monitors to which the vehicle reacts."""
+JUMPED = 4
+"""Severity of the text that reports a jump of the estimate: a warning, as in syslog."""
+
 Truth = Callable[[], Position]
 """The true position (AMSL) of a simulated vehicle: for recorded errors, never for the operations."""
 
@@ -147,7 +161,7 @@ class Vehicle(ServicedVehicle):
     Limits and fence are checked before anything is sent and at each position report while the vehicle
     travels. ``hold``, ``return_home``, ``land`` and ``kill`` are allowed outside the bounds and abort the
     operation of another task. A vehicle under the control of another station gets no messages; only ``kill``
-    is always sent.
+    is always sent. ``escalation`` states the reactions to what a monitor has found; it may be replaced.
 
     Args:
         kernel: clock and tasks.
@@ -179,7 +193,11 @@ class Vehicle(ServicedVehicle):
         self._driver = driver
         driver.telemetry.detects_silence = driver.cycle is None
         self._executor = StepExecutor(kernel, driver, link_timeout)
+        self.escalation = Escalation()
         self._upset = UpsetMonitor(driver.telemetry)
+        self._battery_monitor = BatteryMonitor(driver.telemetry)
+        self._thrust = ThrustMonitor(driver.telemetry)
+        self._track = TrackMonitor(driver.telemetry)
         self._truth = truth
         self._supported: frozenset[Capability] = frozenset()  # as known once the vehicle was connected
         self._bounds: Bounds | None = None
@@ -541,6 +559,13 @@ class Vehicle(ServicedVehicle):
             raise UsageError(f"{self.name}: the fence excludes home: {bounds.home_violation}")
         return bounds
 
+    def _usable_bounds(self) -> Bounds | None:
+        """Return the bounds about the present home; ``None`` without a home, or if they exclude it."""
+        try:
+            return self._home_bounds()
+        except UsageError:
+            return None
+
     def _check_path(self, asked: str, start: Position | None, goal: Position) -> Path:
         """Return the straight path; raise ``OutOfBounds`` if it violates limits or fence. *start* is AMSL."""
         if start is None:
@@ -560,6 +585,12 @@ class Vehicle(ServicedVehicle):
         if here is None or bounds is None:
             return from_seconds(MARGIN_S)
         return path_timeout(bounds.path(here, goal), speed)
+
+    def _landing_timeout(self, climb: float) -> Ns:
+        """Return the time-out of a landing at 0.5 m/s, as of ArduPilot; an unknown height is the highest."""
+        height = self._driver.telemetry.above_home
+        height = max(height, 0.0) if isfinite(height) else self.limits.highest
+        return travel_timeout(0.0, 2.0 * (height + climb))
 
     def _check_leg(self, asked: str, place: Position) -> None:
         self._check_path(asked, self._amsl(place), place)
@@ -621,22 +652,20 @@ class Vehicle(ServicedVehicle):
         here, bounds = self._driver.telemetry.position, self._home_bounds()
         return here is not None and bounds is not None and bool(bounds.violations(here))
 
-    def _check_reserve(self, asked: str) -> float:
-        """Return the battery reserve, 0..1; raise ``LowBattery`` if the battery is below it."""
-        reserve, telemetry = self.limits.reserve, self._driver.telemetry
-        measured = isfinite(telemetry.battery.remaining)
-        if reserve == 0.0 or (self.limits.battery_reserve is None and not measured):
-            return reserve
-        if not measured and not self._executor.wait(
+    def _check_reserve(self, asked: str) -> None:
+        """Raise ``LowBattery`` if the battery is below its reserve."""
+        telemetry = self._driver.telemetry
+        if self.limits.battery_reserve and not self._executor.wait(
             lambda: isfinite(telemetry.battery.remaining), from_seconds(BATTERY_MEASURED_WITHIN_S)
         ):
             raise CapabilityError(
                 f"{self.name}: {asked}: its autopilot does not report how full the battery is, so a reserve "
-                f"of {reserve:.0%} cannot be kept; set its battery monitor up, or state no reserve"
+                f"of {self.limits.reserve:.0%} cannot be kept; set its monitor up, or state no reserve"
             )
-        if telemetry.battery.remaining < reserve:
-            raise low_battery(self.name, asked, telemetry.battery.remaining, reserve)
-        return reserve
+        self._battery_monitor.note(self.kernel.now())
+        shortage = self._battery_monitor.shortage(self.limits)
+        if shortage:
+            raise low_battery(self.name, asked, shortage)
 
     def _amsl(self, position: Position) -> Position:
         """Return the same place with an AMSL altitude; above ground is taken as above home."""
@@ -698,8 +727,9 @@ class Vehicle(ServicedVehicle):
             self._executor.check_link(asked, policy.to_safety)
             if policy.needs_control and not (policy.to_safety and self._executor.take_back()):
                 self._executor.check_ours(asked)
-            reserve = self._check_reserve(asked) if policy.travels else 0.0
-            self._execute(asked, plan, policy, reserve, restarts)
+            if policy.travels:
+                self._check_reserve(asked)
+            self._execute(asked, plan, policy, goal, restarts)
         except BaseException as error:
             outcome, said = type(error).__name__, str(error)
             raise
@@ -709,6 +739,8 @@ class Vehicle(ServicedVehicle):
                     self._in_progress = None
                 if policy.recorded or outcome != "ok":
                     self._record(start, operation, asked, (outcome, said), goal())
+                if self._monitor is None and not policy.unmonitored:
+                    self._monitor_in_place(asked)
 
     def _abort_other(
         self, holder: Task | None, running: str, task: Task | None, operation: str, policy: OperationPolicy
@@ -729,7 +761,7 @@ class Vehicle(ServicedVehicle):
         asked: str,
         plan: Callable[[], Sequence[Step]],
         policy: OperationPolicy,
-        reserve: float,
+        goal: Callable[[], Goal],
         restarts: int,
     ) -> None:
         if not policy.manual:
@@ -737,27 +769,60 @@ class Vehicle(ServicedVehicle):
         if self._monitor is not None:
             self._monitor.cancel()
             self._monitor = None
-        if policy.to_safety:
+        if policy.unmonitored:
             self._executor.execute(asked, plan, restarts=restarts)
             return
-        upset = self._upset.check(asked, self.kernel.now())
+        check = self._monitors(policy, goal)
+        upset = None if policy.to_safety else self._upset.check(asked, self.kernel.now())
         if upset is not None:
             raise upset
-        if not policy.bounded:
-            self._executor.execute(asked, plan, restarts=restarts, check=self._upset.check)
-            return
-        seen, bounds = self._driver.telemetry, self._home_bounds()
-        monitor = BoundsMonitor(seen, bounds, reserve, policy.ignored, needs_position=policy.travels)
-
-        def check(operation: str, now: Ns) -> VehicleError | None:
-            return self._upset.check(operation, now) or monitor.check(operation, now)
-
         try:
             self._executor.execute(asked, plan, restarts=restarts, check=check)
-        except (OutOfBounds, LowBattery, PositionLost) as error:
-            raise type(error)(self.name, asked, f"{error.what}; {self._hold_back()}") from None
-        if policy.goes_on and self._driver.cycle is None:
+        except _MONITORED as error:
+            raise type(error)(self.name, asked, f"{error.what}; {self._react(error)}") from None
+        if policy.goes_on:
             self._keep_monitoring(asked, check)
+
+    def _monitors(self, policy: OperationPolicy, goal: Callable[[], Goal] = lambda: NO_GOAL) -> Check:
+        """Return the check of an operation under *policy*, for each telemetry message."""
+        seen, limits = self._driver.telemetry, self.limits
+        bounds = self._home_bounds() if policy.bounded else self._usable_bounds()
+        watched = bounds if policy.bounded else None
+        monitor = BoundsMonitor(seen, watched, policy.ignored, needs_position=policy.travels)
+        if not policy.holds_place:
+            self._track.follow(None)
+        is_drone = seen.kind == "drone"
+        began = not (policy.on_track and is_drone)
+
+        def check(operation: str, now: Ns) -> VehicleError | None:
+            nonlocal began
+            if not began and seen.flying and bounds is not None and seen.located:
+                began = True
+                self._track.follow(self._path_to(bounds, goal()))
+            battery = self._battery_monitor.check(operation, now, limits, travels=policy.travels)
+            if policy.to_safety:  # one that sinks lands already
+                return battery if not seen.velocity.up < -SINKING_M_S else None
+            off_track = self._track.check(operation, now, bounds)
+            if self._track.jumped_m:
+                said = f"its estimate of the position has jumped by {self._track.jumped_m:.0f} m"
+                self.kernel.record(Text(now, self.name, JUMPED, said))
+            thrust = self._thrust.check(operation, now) if seen.flying or policy.travels else None
+            return (
+                self._upset.check(operation, now)
+                or battery
+                or thrust
+                or off_track
+                or monitor.check(operation, now)
+            )
+
+        return check
+
+    def _path_to(self, bounds: Bounds, goal: Goal) -> Path | None:
+        """Return the straight path from here to *goal*; ``None`` if either is unknown."""
+        here = self._driver.telemetry.position
+        if here is None or not (isfinite(goal.latitude) and isfinite(goal.amsl)):
+            return None
+        return bounds.path(here, Position(goal.latitude, goal.longitude, AMSL(goal.amsl)))
 
     def _record(self, start: Ns, operation: str, asked: str, end: tuple[str, str], goal: Goal) -> None:
         estimate = distance_to(goal, self._driver.telemetry.position)
@@ -766,47 +831,83 @@ class Vehicle(ServicedVehicle):
             Operation(start, self.kernel.now(), self.name, operation, asked, *end, *estimate, *truth)
         )
 
-    def _hold_back(self) -> str:
-        """Stop the vehicle if no other station has control; return what was done."""
+    def _react(self, error: VehicleError) -> str:
+        """React to what a monitor has found, if no other station has control; return what was done."""
         telemetry = self._driver.telemetry
         if not self._executor.is_ours():
             return f"it is left to the station or pilot who has it in {telemetry.mode}"
-        stays = telemetry.flying or Capability.LAND not in self._driver.capabilities
-        try:
-            if stays:
-                self._executor.execute("hold", self._driver.hold)
-            elif telemetry.armed:
-                self._executor.execute("land", lambda: self._driver.land(from_seconds(LINK_RETURN_S)))
-        except VoleryError as error:
-            return f"it could not be held: {error}"
-        return "it holds there" if stays else "it is on the ground"
+        capabilities = self._driver.capabilities
+        if not telemetry.flying and Capability.LAND in capabilities:
+            try:
+                if telemetry.armed:
+                    self._executor.execute("land", lambda: self._driver.land(from_seconds(LINK_RETURN_S)))
+            except VoleryError as problem:
+                return f"it could not be disarmed: {problem}"
+            return "it is on the ground"
 
-    # -- monitoring after the call has returned: velocities and manual flight
+        def perform(reaction: Reaction) -> None:
+            self._executor.execute(reaction.value, lambda: self._reaction_steps(reaction))
+
+        return escalate(self.escalation, error, capabilities, perform)
+
+    def _reaction_steps(self, reaction: Reaction) -> Sequence[Step]:
+        return self.escalation.steps(reaction, self._driver, self._landing_timeout(0.0))
+
+    # -- monitoring after the call has returned: in place, velocities and manual flight
+
+    def _monitor_in_place(self, asked: str) -> None:
+        """Monitor a drone that flies between two calls."""
+        seen = self._driver.telemetry
+        if not (seen.flying and seen.armed) or seen.kind != "drone":
+            return
+        check = self._monitors(IN_PLACE)
+        self._track.stay(self._usable_bounds())
+        self._keep_monitoring(f"after {asked}", check)
 
     def _keep_monitoring(self, asked: str, check: Check) -> None:
+        """Check each 200 ms; a node's loop that is not run receives nothing that could be checked."""
+        if self._driver.cycle is not None:
+            return
+
         def look() -> None:
+            if self._in_progress is not None:
+                return
             error = check(asked, self.kernel.now())
-            if error is None or self._in_progress is not None:
+            if error is None:
                 return
             handle.cancel()
+            if not self._executor.is_ours():
+                return
             if isinstance(error, ControlLost):
                 self._bounds_error = error
                 return
-            self._bounds_error = type(error)(self.name, asked, f"{error.what}; it was commanded to hold")
+            first = self.escalation.after(error, self._driver.capabilities)[0]
+            what = f"{error.what}; it was commanded to {first.value}"
+            found = self._bounds_error = type(error)(self.name, asked, what)
             name = f"safety of {self.name}"
-            self.kernel.spawn(self._hold_out_of_bounds, name, ExecutionContext(name))
+            self.kernel.spawn(lambda: self._react_in_place(found), name, ExecutionContext(name))
 
         with self.kernel.guard:
             self._monitor = handle = self.kernel.every(BOUNDS_PERIOD, look)
 
-    def _hold_out_of_bounds(self) -> None:
-        error = self._straying = self._bounds_error
+    def _react_in_place(self, error: VehicleError) -> None:
+        self._straying = error
+
+        def perform(reaction: Reaction) -> None:
+            self._operate(
+                reaction.name.lower(),
+                f"{reaction.value}: it has strayed" if reaction is Reaction.HOLD else reaction.value,
+                lambda: self._reaction_steps(reaction),
+                policy=TO_SAFETY if reaction is Reaction.HOLD else LANDING,
+            )
+
+        unread = self._bounds_error is not None  # else a call has raised it meanwhile
         try:
-            with suppress(VoleryError):  # recorded, and the next call raises *error*
-                self._operate("hold", "hold: it has strayed", self._driver.hold, policy=TO_SAFETY)
+            escalate(self.escalation, error, self._driver.capabilities, perform)  # each is recorded
         finally:
             self._straying = None
-            self._bounds_error = error
+            if unread:
+                self._bounds_error = error
 
     def _raise_bounds_error(self) -> None:
         error, self._bounds_error = self._bounds_error, None

@@ -6,12 +6,11 @@ from typing import Any
 
 import pytest
 
-from volery.base.errors import LowBattery, OutOfBounds, UsageError
+from volery.base.errors import OutOfBounds, UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.base.position import AMSL, AboveHome, Position
-from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
-from volery.vehicles import Battery, Fence, Limits, Zone
+from volery.vehicles import Fence, Limits, Zone
 from volery.vehicles.limits import FLOOR, Bounds, BoundsMonitor
 from volery.vehicles.telemetry import Telemetry
 
@@ -58,15 +57,15 @@ def test_a_small_zone_is_not_overlooked() -> None:
     assert list(Bounds(HOME, Limits(), fence).violations(place(0, 0))) == ["zone post"]
 
 
-def telemetry(where: Position, remaining: float = 1.0) -> Telemetry:
+def telemetry(where: Position) -> Telemetry:
     seen = Telemetry(VirtualKernel(), "craft_1")
-    seen.position, seen.battery = where, Battery(remaining, 12.0, 10.0)
+    seen.position = where
     return seen
 
 
 def test_who_is_outside_may_come_back_but_not_leave_again() -> None:
     seen = telemetry(place(0, 80))
-    watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED), 0.0)
+    watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED))
     for north in (70, 60, 10):
         seen.update_position(place(0, north))
         assert watch.check("go", 0) is None
@@ -79,32 +78,12 @@ def test_who_is_outside_may_come_back_but_not_leave_again() -> None:
 def test_the_floor_is_crossed_on_the_way_up_and_may_be_excused() -> None:
     for excused, expected in ((frozenset[str](), True), (frozenset({FLOOR}), False)):
         seen = telemetry(place(0, 0, 0))
-        watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED), 0.0, excused)
+        watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED), excused)
         for up in (0.5, 20.0):
             seen.update_position(place(0, 0, up))
             assert watch.check("up", 0) is None
         seen.update_position(place(0, 0, 1.0))
         assert (watch.check("down", 0) is not None) is expected
-
-
-def test_a_battery_that_sags_for_a_moment_is_not_empty() -> None:
-    seen = telemetry(place(0, 0), 0.19)
-    watch = BoundsMonitor(seen, None, 0.2)
-    assert watch.check("go", 0) is None
-    assert watch.check("go", 2 * S) is None
-    seen.battery = Battery(0.21, 12.0, 10.0)
-    assert watch.check("go", 3 * S) is None
-    seen.battery = Battery(0.18, 12.0, 10.0)
-    assert watch.check("go", 4 * S) is None
-    error = watch.check("go", 7 * S)
-    assert isinstance(error, LowBattery)
-    assert "at 18%, below the reserve of 20%" in str(error)
-
-
-def test_a_battery_that_is_not_measured_ends_nothing() -> None:
-    watch = BoundsMonitor(telemetry(place(0, 0), float("nan")), None, 0.2)
-    assert watch.check("go", 0) is None
-    assert watch.check("go", 10 * S) is None
 
 
 @pytest.mark.parametrize(

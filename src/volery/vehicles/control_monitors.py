@@ -1,0 +1,226 @@
+"""Monitors of control in flight: upset, thrust at its limit, and the distance from the commanded path.
+
+They need only what autopilots report. They return the error that ends an operation; what the vehicle does
+then is in ``escalation``. Each has its counterpart in the safety tests of the MRS UAV System (Baca et al.,
+J. Intell. Robot. Syst. 102 (2021)), whose controllers run on the companion computer; here a control error is
+what the autopilot leaves of a command.
+"""
+
+from __future__ import annotations
+
+from math import dist, hypot, isfinite
+
+from volery.base.errors import ControlLost, OffTrack, ThrustSaturated
+from volery.base.frames import Vector
+from volery.base.position import Position
+from volery.base.time import MS, Ns, S, to_seconds
+from volery.vehicles.limits import Bounds, Path
+from volery.vehicles.telemetry import RECENT_CAUSE, STALE_AFTER, Telemetry, describe_state
+
+FALLING_M_S = 8.0
+"""Sink rate that no autopilot commands by itself, m/s."""
+OVERTURNED_DEG = 70.0
+OVERTURNED_FOR: Ns = 300 * MS
+_UPSET_TEXTS = ("thrust loss", "crash: disarm", "motor failure", "attitude failure", "failure detected")
+
+
+SATURATED = 0.95
+"""Share of the largest thrust from which no thrust is left for control."""
+SATURATED_FOR: Ns = 3 * S
+CLIMBING_M_S = 0.5
+OFF_TRACK_FOR: Ns = 3 * S
+JUMP_M = 5.0
+"""A position that moves by this more than its velocity explains has jumped: the estimator was reset."""
+BRAKING_M_S2 = 2.0
+"""Deceleration with which a vehicle ends the motion that it has when the monitoring begins."""
+
+
+class UpsetMonitor:
+    """Notices a multirotor that falls or has turned over, from its telemetry and recent texts.
+
+    With one of four motors lost it turns over within half a second and falls: 8 m/s after 0.8 s.
+
+    Args:
+        telemetry: telemetry of the vehicle.
+    """
+
+    def __init__(self, telemetry: Telemetry) -> None:
+        self._telemetry = telemetry
+        self._checked: Ns = -1
+        self._tilted_since: Ns | None = None
+
+    def check(self, operation: str, now: Ns) -> ControlLost | None:
+        """Return the error that must end the operation, or ``None``.
+
+        Args:
+            operation: what the vehicle is doing, for the error message.
+            now: the present time, ns.
+        """
+        seen, before = self._telemetry, self._checked
+        self._checked = now
+        if now - before > OVERTURNED_FOR:
+            self._tilted_since = None
+        if not (seen.flying and seen.armed) or seen.kind != "drone" or seen.stale:
+            self._tilted_since = None
+            return None
+        what = self._upset(now)
+        if not what:
+            return None
+        return ControlLost(seen.name, operation, f"{what}; {describe_state(seen)}; its motors may still turn")
+
+    def _upset(self, now: Ns) -> str:
+        """Return how the vehicle is upset; empty if it is not."""
+        seen = self._telemetry
+        for text in seen.texts_since(now - RECENT_CAUSE, severity=3):
+            if any(words in text.lower() for words in _UPSET_TEXTS):
+                return f"the autopilot said {text!r}"
+        sink = -seen.velocity.up
+        if sink > FALLING_M_S:
+            return f"it falls at {sink:.0f} m/s"
+        roll, pitch, _ = seen.attitude
+        if not (abs(roll) > OVERTURNED_DEG or abs(pitch) > OVERTURNED_DEG):
+            self._tilted_since = None
+            return ""
+        self._tilted_since = now if self._tilted_since is None else self._tilted_since
+        held = now - self._tilted_since >= OVERTURNED_FOR
+        return f"it has turned over (roll {roll:.0f}, pitch {pitch:.0f} degrees)" if held else ""
+
+
+class ThrustMonitor:
+    """Notices a multirotor at full thrust that does not climb: overloaded, or a weak motor or battery.
+
+    Full thrust in a climb is usual. On the ground it means that the vehicle does not lift off. Reported by
+    ArduPilot and PX4 (VFR_HUD) and by Paparazzi; not by DJI.
+
+    Args:
+        telemetry: telemetry of the vehicle.
+    """
+
+    def __init__(self, telemetry: Telemetry) -> None:
+        self._telemetry = telemetry
+        self._saturated_since: Ns | None = None
+
+    def check(self, operation: str, now: Ns) -> ThrustSaturated | None:
+        """Return the error that must end the operation, or ``None``; as ``UpsetMonitor.check``."""
+        seen = self._telemetry
+        climbs = seen.velocity.up >= CLIMBING_M_S
+        if seen.kind != "drone" or not seen.armed or seen.stale or climbs or not seen.thrust >= SATURATED:
+            self._saturated_since = None
+            return None
+        self._saturated_since = now if self._saturated_since is None else self._saturated_since
+        lasts = now - self._saturated_since
+        if lasts < SATURATED_FOR:
+            return None
+        does = "does not climb" if seen.flying else "does not lift off"
+        what = f"it has been at {seen.thrust:.0%} thrust for {to_seconds(lasts):.0f} s and {does}"
+        return ThrustSaturated(
+            seen.name, operation, f"{what}: overloaded, a weak motor or battery; {describe_state(seen)}"
+        )
+
+
+class TrackMonitor:
+    """Measures the distance of a multirotor from the straight path, or from the place, that was commanded.
+
+    On a path the horizontal distance counts, because autopilots climb along it in different ways; at a place
+    the distance in space. A jump of the estimate restarts the path where the vehicle is then, as autopilots
+    do: it is a change of the reference and not a control error. A target that another station has set in the
+    same mode ends the monitoring.
+
+    Args:
+        telemetry: telemetry of the vehicle.
+    """
+
+    def __init__(self, telemetry: Telemetry) -> None:
+        self._telemetry = telemetry
+        self._path: Path | None = None
+        self._at_place = False
+        self._stopping_m = 0.0  # what the motion at the start may add
+        self._seen: tuple[Position, Vector, Ns] | None = None  # the last position and its time
+        self._off_since: Ns | None = None
+        self.jumped_m = 0.0
+        """Length of a jump of the estimate found by the last check, m; else 0."""
+
+    def follow(self, path: Path | None) -> None:
+        """Measure the horizontal distance from *path*; ``None`` measures nothing.
+
+        The motion that the vehicle has now may lead it off the path until it has stopped.
+        """
+        self._path, self._at_place, self._off_since = path, False, None
+        speed = hypot(*self._telemetry.velocity)
+        self._stopping_m = speed * speed / (2.0 * BRAKING_M_S2) if isfinite(speed) else 0.0
+
+    def stay(self, bounds: Bounds | None) -> None:
+        """Measure the distance from the present place, as far as it is known."""
+        seen = self._telemetry
+        here = None
+        if bounds is not None and seen.located and seen.position is not None:
+            here = bounds.local(seen.position)
+        self.follow((here, here) if here is not None else None)
+        self._at_place = here is not None
+
+    def check(self, operation: str, now: Ns, bounds: Bounds | None) -> OffTrack | None:
+        """Return the error that must end the operation, or ``None``.
+
+        Args:
+            operation: what the vehicle is doing, for the error message.
+            now: the present time, ns.
+            bounds: bounds about home, with the greatest distance; ``None`` without a home.
+        """
+        seen = self._telemetry
+        self.jumped_m = 0.0
+        if bounds is None or seen.position is None or not (seen.flying and seen.located):
+            self._off_since = self._seen = None
+            return None
+        here = self._note_position(bounds, seen.position, now)
+        if self._path is None or self._sent_elsewhere(bounds):
+            return None
+        off = dist(here, self._path[0]) if self._at_place else _distance(here, self._path)
+        allowed = bounds.limits.off_track + self._stopping_m
+        if off <= allowed:
+            self._off_since = None
+            return None
+        self._off_since = now if self._off_since is None else self._off_since
+        if now - self._off_since < OFF_TRACK_FOR:
+            return None
+        of = "place" if self._at_place else "path"
+        limit = f"{allowed:.0f} m (Limits.off_track)"
+        return OffTrack(seen.name, operation, f"it is {off:.0f} m off its commanded {of}, beyond {limit}")
+
+    def _note_position(self, bounds: Bounds, position: Position, now: Ns) -> Vector:
+        """Return the position in the local frame; note a jump since the last one."""
+        here, before = bounds.local(position), self._seen
+        if before is not None and before[0] is position:
+            return before[1]
+        self._seen = position, here, now
+        if before is None or now - before[2] > STALE_AFTER:
+            return here
+        speed = hypot(*self._telemetry.velocity)
+        moved = dist(here, before[1])
+        explained = (speed if isfinite(speed) else 0.0) * to_seconds(now - before[2]) + JUMP_M
+        if moved > explained:
+            self.jumped_m = moved
+            if self._path is not None:
+                self._path = here, here if self._at_place else self._path[1]
+        return here
+
+    def _sent_elsewhere(self, bounds: Bounds) -> bool:
+        """Return whether the autopilot reports a target away from where it was sent; then measure no more."""
+        target = self._telemetry.target
+        if not self._at_place or self._path is None or target is None:
+            return False
+        east, north, _ = bounds.local(target)
+        away = hypot(east - self._path[0][0], north - self._path[0][1])
+        if away > bounds.limits.off_track / 2.0:
+            self.follow(None)
+            return True
+        return False
+
+
+def _distance(here: Vector, path: Path) -> float:
+    """Return the horizontal distance of a point from a straight path, m."""
+    (x0, y0, _), (x1, y1, _) = path
+    dx, dy = x1 - x0, y1 - y0
+    length = dx * dx + dy * dy
+    share = ((here[0] - x0) * dx + (here[1] - y0) * dy) / length if length > 0.0 else 0.0
+    share = min(1.0, max(0.0, share))
+    return hypot(here[0] - x0 - share * dx, here[1] - y0 - share * dy)
