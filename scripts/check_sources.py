@@ -1,4 +1,4 @@
-"""Check import circles, upward includes, file names, glossary words and the mirror of tests.
+"""Check import circles, upward includes, names, words, the mirror of tests, and what cannot be compiled.
 
     python scripts/check_sources.py
 
@@ -8,6 +8,7 @@ pyproject.toml, so that Python imports and C++ includes obey the same order. `ma
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
@@ -158,6 +159,50 @@ def mirror() -> Iterator[str]:
                 yield f"{path.relative_to(ROOT)}: src/volery/{folder} has no module that it is named after"
 
 
+CALLABLE_ALIAS = re.compile(r"^(\w+) = Callable\[", re.MULTILINE)
+"""The name of a type of functions."""
+
+
+def uncompilable(source: str, callables: frozenset[str] = frozenset()) -> Iterator[tuple[int, str]]:
+    """Yield line and reason of each construct that mypyc compiles to something else, without an error.
+
+    Args:
+        source: Text of a module that is compiled.
+        callables: Names of types of functions.
+    """
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef):
+            marks = {ast.unparse(one) for one in node.decorator_list}
+            returned = ast.unparse(node.returns) if node.returns else ""
+            if marks & {"cached_property", "functools.cached_property"}:
+                yield node.lineno, "a cached_property is computed at every access; compute it in __init__"
+            elif "property" in marks and (returned.startswith("Callable[") or returned in callables):
+                yield node.lineno, "a call of what the property returns does nothing; make it a method"
+        elif isinstance(node, ast.Call):
+            called = ast.unparse(node.func)
+            if called in ("eval", "exec") and len(node.args) < 2:
+                yield node.lineno, f"{called} without names has no frame to take them from; give it some"
+            elif called == "sys._getframe" and node.args:
+                yield node.lineno, "compiled functions have no frame, so their number differs; walk them"
+            elif called.endswith("dataclass") and any(
+                one.arg == "slots" and ast.unparse(one.value) == "True" for one in node.keywords
+            ):
+                yield node.lineno, "slots=True makes a second, uncompiled class; leave it out"
+
+
+def compiled_modules() -> Iterator[str]:
+    """Yield what mypyc would break in the modules that it compiles."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    texts = [path.read_text() for path in tracked("src/volery") if path.suffix == ".py"]
+    callables = frozenset(name for text in texts for name in CALLABLE_ALIAS.findall(text))
+    for name in settings["tool"]["volery-wheel"]["compiled"]:
+        if not (PACKAGE / name).is_file():
+            yield f"pyproject.toml: there is no src/volery/{name} to compile"
+            continue
+        for line, reason in uncompilable((PACKAGE / name).read_text(), callables):
+            yield f"src/volery/{name}:{line}: mypyc: {reason}"
+
+
 def main() -> int:
     """Print all offenders; return 1 if there are any."""
     offenders = [line for check in CHECKS for line in check()]
@@ -165,7 +210,7 @@ def main() -> int:
     return 1 if offenders else 0
 
 
-CHECKS = (circles, upward_includes, file_names, words, mirror)
+CHECKS = (circles, upward_includes, file_names, words, mirror, compiled_modules)
 
 if __name__ == "__main__":
     sys.exit(main())

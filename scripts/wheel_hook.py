@@ -1,7 +1,8 @@
-"""Hook of the wheel build: carries the object code of ``compile_numerics.py``, compiled now on demand.
+"""Hook of the wheel build: carries the machine code of ``compile_numerics.py`` and ``compile_modules.py``.
 
-``pip install -e .`` and a plain ``pip install .`` need no compiler: without object code a wheel is pure
-Python and numba compiles at the first use. With ``VOLERY_COMPILE=1`` the wheel is one for this architecture.
+``pip install -e .`` and a plain ``pip install .`` need no compiler: without machine code a wheel is pure
+Python and numba compiles at the first use. With ``VOLERY_COMPILE=1`` the wheel is one for this architecture
+and this version of Python.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import sysconfig
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -22,24 +23,41 @@ def _wanted() -> bool:
     return os.environ.get("VOLERY_COMPILE", "") not in ("", "0")
 
 
-class ObjectCodeHook(BuildHookInterface):  # type: ignore[type-arg]
-    """Adds the object code and the architecture to a wheel."""
+class MachineCodeHook(BuildHookInterface):  # type: ignore[type-arg]
+    """Adds the machine code and the architecture to a wheel."""
+
+    _modules: tempfile.TemporaryDirectory[str] | None = None
 
     def dependencies(self) -> list[str]:
         """Return what the compilation imports."""
         if not _wanted():
             return []
         core = self.metadata.core
-        return [*core.dependencies, *core.optional_dependencies["model"], "numba>=0.60"]
+        return [
+            *core.dependencies,
+            *core.optional_dependencies["model"],
+            "numba>=0.60",
+            "mypy>=1.18",
+            "setuptools",
+        ]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Compile if wanted; state the architecture if there is object code."""
+        """Compile if wanted; state the architecture and the version of Python then."""
         if version == "editable" or not _wanted():
             return
         root = Path(self.root)
-        subprocess.run([sys.executable, str(root / "scripts/compile_numerics.py")], check=True)
-        machine = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+        self._modules = tempfile.TemporaryDirectory()
+        compiled = Path(self._modules.name)
+        for script, *options in (("compile_numerics.py",), ("compile_modules.py", "--into", str(compiled))):
+            subprocess.run([sys.executable, str(root / "scripts" / script), *options], check=True)
         build_data["pure_python"] = False
-        build_data["tag"] = f"py3-none-{machine}"
+        build_data["infer_tag"] = True
         for file in (root / OBJECT_CODE).glob("*.so"):
             build_data["force_include"][str(file)] = f"volery/base/object_code/{file.name}"
+        for file in compiled.rglob("*.so"):
+            build_data["force_include"][str(file)] = str(file.relative_to(compiled))
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Remove what was compiled for the wheel."""
+        if self._modules is not None:
+            self._modules.cleanup()

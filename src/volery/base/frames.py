@@ -13,8 +13,7 @@ costs up to about 1 m of height and, N / 6371 km, 0.16 m of distance where the g
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from math import atan2, cos, degrees, hypot, pi, radians, remainder, sin, sqrt
 
 Vector = tuple[float, float, float]
@@ -168,19 +167,18 @@ class LocalFrame:
     latitude: float
     longitude: float
     amsl: float = 0.0
+    _origin: Vector = field(init=False, repr=False, compare=False)
+    _axes: tuple[Vector, Vector, Vector] = field(init=False, repr=False, compare=False)
 
-    @cached_property
-    def _origin(self) -> Vector:
-        return geodetic_to_ecef(self.latitude, self.longitude, self.amsl)
-
-    @cached_property
-    def _axes(self) -> tuple[Vector, Vector, Vector]:
+    def __post_init__(self) -> None:
         lat, lon = radians(self.latitude), radians(self.longitude)
-        return (
+        axes = (
             (-sin(lon), cos(lon), 0.0),
             (-sin(lat) * cos(lon), -sin(lat) * sin(lon), cos(lat)),
             (cos(lat) * cos(lon), cos(lat) * sin(lon), sin(lat)),
         )
+        object.__setattr__(self, "_origin", geodetic_to_ecef(self.latitude, self.longitude, self.amsl))
+        object.__setattr__(self, "_axes", axes)
 
     def to_enu(self, latitude: float, longitude: float, amsl: float) -> Vector:
         """Convert degrees and metres AMSL to east, north, up metres from the origin."""

@@ -6,8 +6,6 @@ component has computed so far is served first.
 
 from __future__ import annotations
 
-from weakref import ReferenceType, ref
-
 from volery.base.errors import UsageError
 from volery.base.time import from_seconds, to_seconds
 from volery.components.instance import ComponentContext, Instance
@@ -19,13 +17,13 @@ from volery.trace.events import Charge, Milestone, Text
 SEVERITIES = {"error": 3, "warning": 4, "info": 6, "debug": 7}
 """Syslog severities that a component may use."""
 
-_kernels: list[ReferenceType[Kernel]] = []
+_kernels: list[Kernel] = []
 
 
 def register_kernel(kernel: Kernel) -> None:
-    """Make ``kernel`` known to the calls of its tasks. It is not kept alive."""
-    _kernels[:] = [known for known in _kernels if known() is not None and known() is not kernel]
-    _kernels.append(ref(kernel))
+    """Make ``kernel`` known to the calls of its tasks; kernels of runs that have ended are forgotten."""
+    _kernels[:] = [known for known in _kernels if not known.root.cancelled and known is not kernel]
+    _kernels.append(kernel)
 
 
 def caller(what: str) -> tuple[Kernel, Task]:
@@ -34,10 +32,9 @@ def caller(what: str) -> tuple[Kernel, Task]:
     Raises:
         UsageError: The caller is not a task of a run; the error names the call ``what``.
     """
-    for known in reversed(_kernels):
-        kernel = known()
-        task = kernel.current() if kernel is not None else None
-        if kernel is not None and task is not None:
+    for kernel in reversed(_kernels):
+        task = kernel.current()
+        if task is not None:
             return kernel, task
     raise UsageError(f"{what} works in a component or a mission of a run only")
 

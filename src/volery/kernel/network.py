@@ -11,7 +11,6 @@ The law, for `size` bytes:
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -25,15 +24,15 @@ if TYPE_CHECKING:
     from volery.kernel.api import Action, Handle, Kernel
 
 
-@dataclass(eq=False, slots=True)
 class Transfer:
-    """A reliable transfer in progress."""
+    """A reliable transfer in progress; those of one `queue` must arrive in order."""
 
-    size: int
-    deliver: Action
-    queue: deque[Transfer]  # transfers that must arrive in order
-    next: Handle | None = None
-    arrived: bool = False
+    __slots__ = ("arrived", "deliver", "next", "queue", "size")
+
+    def __init__(self, size: int, deliver: Action, queue: deque[Transfer]) -> None:
+        self.size, self.deliver, self.queue = size, deliver, queue
+        self.next: Handle | None = None
+        self.arrived = False
 
 
 class Network:

@@ -17,7 +17,6 @@ slices of the job contain. Prices are the caller's: a processor does not know wh
 from __future__ import annotations
 
 from bisect import insort
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -38,22 +37,41 @@ QUANTUM: Ns = 10 * MS
 """Default time slice of round-robin."""
 
 
-@dataclass(eq=False, slots=True)
 class Job:
-    """An amount of computing that needs a core."""
+    """An amount of computing that needs a core.
 
-    owner: Task | ExecutionContext  # a context: computing in the background, for which no task waits
-    name: str
-    component: str
-    priority: int
-    arrival: int
-    remaining: Ns
-    core: int = NO_CORE
-    deadline: Ns = NO_DEADLINE  # absolute
-    started: Ns = 0
-    turn_ends: Ns = 0
-    timer: Handle | None = None
-    done: bool = False
+    Args:
+        owner: Whose it is; a context for computing in the background, for which no task waits.
+        name: Name of the task, or of the background.
+        component: Component that executes.
+        priority: Higher is more urgent.
+        remaining: Time that it still needs a core, ns.
+        deadline: Absolute, ns.
+    """
+
+    __slots__ = (
+        "arrival", "component", "core", "deadline", "done", "name",
+        "owner", "priority", "remaining", "started", "timer", "turn_ends",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        owner: Task | ExecutionContext,
+        name: str,
+        component: str,
+        priority: int,
+        remaining: Ns,
+        deadline: Ns,
+    ) -> None:
+        self.owner, self.name, self.component = owner, name, component
+        self.priority, self.deadline = priority, deadline
+        self.remaining = remaining
+        self.arrival = 0
+        self.core = NO_CORE
+        self.started: Ns = 0
+        self.turn_ends: Ns = 0
+        self.timer: Handle | None = None
+        self.done = False
 
 
 Order = tuple[int, ...]
@@ -143,7 +161,7 @@ class Processor:
                 self._busy += total
                 self._kernel.record(Slice(start, start + total, self.name, 0, task.name, component))
                 return
-        job = Job(task, task.name, component, task.priority, 0, amount, deadline=task.deadline)
+        job = Job(task, task.name, component, task.priority, amount, task.deadline)
         self._admit(job)
         try:
             while not job.done:
@@ -161,7 +179,7 @@ class Processor:
             name = f"{context.component} (background)"
             relative = context.deadline
             due = NO_DEADLINE if relative is None else self._kernel.now() + relative
-            job = Job(context, name, context.component, context.priority or 0, 0, amount, deadline=due)
+            job = Job(context, name, context.component, context.priority or 0, amount, due)
             self._background[context] = job
             self._admit(job)
         else:

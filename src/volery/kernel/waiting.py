@@ -93,7 +93,10 @@ def _end_if_late(kernel: Kernel, task: Task, ended: Ns) -> None:
 
 def _place_of_caller() -> object:
     """Return where component code has called the framework: its innermost frame; in C++ the kind of call."""
-    caller = frame = sys._getframe(2)
+    frame = sys._getframe()
+    while frame.f_back is not None and frame.f_globals.get("__name__") == __name__:
+        frame = frame.f_back  # compiled, this module has no frames
+    caller = frame
     while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith(_FRAMEWORK):
         frame = frame.f_back
     found = caller if frame.f_back is None else frame

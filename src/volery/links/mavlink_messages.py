@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache, cached_property
+from functools import cache
 from typing import Any, NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
@@ -136,7 +136,7 @@ def _dict_maker(names: tuple[str, ...]) -> Callable[..., dict[str, Any]]:
     """
     arguments = [f"value_{number}" for number in range(len(names))]
     items = ", ".join(f"{name!r}: {value}" for name, value in zip(names, arguments, strict=True))
-    made: Callable[..., dict[str, Any]] = eval(f"lambda {', '.join(arguments)}: {{{items}}}")
+    made: Callable[..., dict[str, Any]] = eval(f"lambda {', '.join(arguments)}: {{{items}}}", {})
     return made
 
 
@@ -161,6 +161,7 @@ class MessageType:
         self._names = tuple(field.name for field in self._fields)
         self._known = frozenset(self._names)
         self._plain = all(field.length == 0 for field in self._fields)
+        self._make_dict: Callable[..., dict[str, Any]] | None = None  # made when the first one is decoded
 
     def pack(self, fields: Mapping[str, Any]) -> bytes:
         """Return the whole payload.
@@ -204,6 +205,8 @@ class MessageType:
             payload = payload[: self.size].ljust(self.size, b"\0")
         values = self._struct.unpack(payload)
         if self._plain:
+            if self._make_dict is None:
+                self._make_dict = _dict_maker(self._names)
             return self._make_dict(*values)
         fields: dict[str, Any] = {}
         at = 0
@@ -218,10 +221,6 @@ class MessageType:
                 fields[field.name] = values[at : at + field.length]
                 at += field.length
         return fields
-
-    @cached_property
-    def _make_dict(self) -> Callable[..., dict[str, Any]]:
-        return _dict_maker(self._names)
 
     def checksum(self, covered: bytes) -> int:
         """Return the CRC-16/MCRF4XX over *covered* (all after STX) and the extra byte of this message."""

@@ -12,6 +12,8 @@ from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from mypy_extensions import mypyc_attr
+
 from volery.base.errors import UsageError, did_you_mean
 from volery.base.time import MS, US, Ns, S
 from volery.kernel.api import Action, Kernel
@@ -19,7 +21,7 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
 from volery.ros.graph.interface import NodeId, QoS, Routing, Tariffs
 from volery.ros.messages import Message, from_cdr, to_cdr
-from volery.trace.events import Charge, Record, ignore
+from volery.trace.events import Charge, Event
 
 Records = Callable[[str], bool]
 """Whether the content of a topic's messages is recorded, by the topic's name."""
@@ -61,14 +63,15 @@ class ServiceEnd(Protocol):
         """Queue a request that has arrived. A framework callback."""
 
 
-@dataclass(eq=False, slots=True)
 class Topic:
     """A name at which publishers and subscriptions of one type meet."""
 
-    name: str
-    type: str
-    publishers: list[PublisherEnd] = field(default_factory=list)
-    subscriptions: list[SubscriptionEnd] = field(default_factory=list)
+    __slots__ = ("name", "publishers", "subscriptions", "type")
+
+    def __init__(self, name: str, kind: str) -> None:
+        self.name, self.type = name, kind
+        self.publishers: list[PublisherEnd] = []
+        self.subscriptions: list[SubscriptionEnd] = []
 
 
 class Parameters:
@@ -162,10 +165,10 @@ class GraphContext:
     unrecorded: bool = False
     as_bytes: bool = False
 
-    @property
-    def record(self) -> Record:
-        """Receiver of the graph's events."""
-        return ignore if self.unrecorded else self.kernel.record
+    def record(self, event: Event) -> None:
+        """Record an event of the graph."""
+        if not self.unrecorded:
+            self.kernel.record(event)
 
     def copy(self, message: Message) -> Any:
         """Return a copy of `message` as its receivers get it."""
@@ -196,6 +199,7 @@ _KINDS = {call: f"ros:{call}" for call in ("publish", "sleep", "spin_once")}
 """Texts of the most frequent charges, made once."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class NodeContext:
     """A node as its publishers, subscriptions and services use it: their owner, which is charged."""
 

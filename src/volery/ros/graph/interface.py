@@ -30,7 +30,7 @@ _RELIABILITY = (RELIABLE, BEST_EFFORT, BEST_AVAILABLE)
 _DURABILITY = (VOLATILE, TRANSIENT_LOCAL, BEST_AVAILABLE)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class QoS:
     """Quality of service in the terms of ROS 2, of which ROS 1 is a special case.
 

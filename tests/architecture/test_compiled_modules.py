@@ -1,0 +1,54 @@
+"""What mypyc compiles to something else without an error is kept out of the modules that it compiles."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+SCRIPT = Path(__file__).parents[2] / "scripts/check_sources.py"
+
+
+@pytest.fixture(scope="module")
+def script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("check_sources", SCRIPT)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize(
+    ("source", "reason"),
+    [
+        ("class A:\n    @cached_property\n    def x(self) -> int:\n        return 1\n", "at every access"),
+        ("class A:\n    @property\n    def x(self) -> Record:\n        return f\n", "make it a method"),
+        (
+            "class A:\n    @property\n    def x(self) -> Callable[[], int]:\n        return f\n",
+            "make it a method",
+        ),
+        ("@dataclass(frozen=True, slots=True)\nclass A:\n    x: int\n", "slots=True"),
+        ("x = eval('y')\n", "eval without names"),
+        ("x = sys._getframe(2)\n", "no frame"),
+    ],
+)
+def test_each_trap_is_named_with_its_line(script: ModuleType, source: str, reason: str) -> None:
+    [(line, found)] = script.uncompilable(source, frozenset({"Record"}))
+    assert reason in found
+    assert line == (3 if "def" in source else 1)
+
+
+def test_harmless_relatives_pass(script: ModuleType) -> None:
+    harmless = (
+        "class A:\n    @property\n    def x(self) -> int:\n        return eval('1', {})\n"
+        "@dataclass(frozen=True)\nclass B:\n    x: int\n"
+        "def outer() -> Record:\n    return sys._getframe().f_back\n"
+    )
+    assert list(script.uncompilable(harmless, frozenset({"Record"}))) == []
+
+
+def test_no_module_that_is_compiled_has_one(script: ModuleType) -> None:
+    assert list(script.compiled_modules()) == []

@@ -1,0 +1,45 @@
+"""The event path compiled by mypyc and as plain Python: the same bytes from the same runs."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(1200)]
+ROOT = Path(__file__).parents[2]
+RUNS = (
+    ("simulate", "examples/starter", "--seed", "3"),
+    ("fly", "examples/mission.py", "--on", "sim:ardupilot", "--seed", "3"),
+)
+COMMAND = "from volery.cli.main import main; main()"
+WHICH = "import volery.kernel.virtual as a, volery.requirements.ledgers as b; print(a.__file__, b.__file__)"
+
+
+def run(package: Path, *arguments: str) -> str:
+    """Run a Python of which *package* is the folder of volery."""
+    surroundings = {**os.environ, "PYTHONPATH": str(package)}
+    done = subprocess.run(
+        [sys.executable, *arguments], cwd=ROOT, env=surroundings, check=True, capture_output=True, text=True
+    )
+    return done.stdout
+
+
+def test_compiled_and_plain_modules_give_the_same_traces(tmp_path: Path) -> None:
+    plain, compiled = ROOT / "src", tmp_path / "compiled"
+    shutil.copytree(plain / "volery", compiled / "volery")
+    script = str(ROOT / "scripts/compile_modules.py")
+    run(plain, script, "--into", str(compiled), "--level", "0")
+    assert run(plain, "-c", WHICH).count("/virtual.py") == 1
+    assert all(one.endswith(".so") for one in run(compiled, "-c", WHICH).split())
+    for number, arguments in enumerate(RUNS):
+        files = []
+        for name, package in (("plain", plain), ("compiled", compiled)):
+            folder = tmp_path / f"{name}-{number}"
+            run(package, "-c", COMMAND, *arguments, "--quiet", "--out", str(folder))
+            files.append([(folder / file).read_bytes() for file in ("trace.mcap", "timeline.json")])
+        assert files[0] == files[1]
