@@ -139,6 +139,10 @@ class CommandedLimits:
     look_at: Vector | None = None
     """Region of interest that the nose follows, for firmwares that turn it: north, east, down [m]."""
 
+    def forget_speeds(self) -> None:
+        """Return to the firmware's own speeds."""
+        self.speed = self.speed_up = self.speed_down = None
+
 
 @dataclass
 class FailsafeState:

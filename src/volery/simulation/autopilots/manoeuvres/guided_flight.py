@@ -163,6 +163,8 @@ class Guided(Manoeuvre):
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self._doing: Manoeuvre = ToPoint(vehicle)
+        self._kind: type[Manoeuvre] | None = None
+        """Kind of command; another kind ends the speeds that DO_CHANGE_SPEED has set."""
         self._waiting: Manoeuvre | None = None
         """What is flown during a pause."""
 
@@ -180,8 +182,13 @@ class Guided(Manoeuvre):
     def enter(self) -> None:
         """Stop and hold the position until a command arrives."""
         self._begin(ToPoint(self.vehicle))
+        self._kind = None
 
     def _begin(self, doing: Manoeuvre) -> None:
+        kind = ToPoint if isinstance(doing, TurnAtPoint) else type(doing)
+        if kind is not self._kind:
+            self._kind = kind
+            self.vehicle.commanded.forget_speeds()
         self._doing = doing
         doing.enter()
         self.target = doing.target

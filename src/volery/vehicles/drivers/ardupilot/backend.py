@@ -28,7 +28,7 @@ from volery.vehicles.drivers.mavlink.backend import (
 )
 from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
 from volery.vehicles.drivers.mavlink.decoder import Fields, TelemetryDecoder
-from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend, to_ros_yaw_rate
+from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Telemetry, Velocity
 
@@ -237,7 +237,7 @@ class ArduPilotMavros(MavrosBackend):
 
     def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
         """Publish on ``setpoint_raw/local``."""
-        self._publish_velocity(velocity, VELOCITY_AND_YAW_RATE, yaw_rate=to_ros_yaw_rate(yaw_rate))
+        self._publish_velocity(velocity, yaw_rate)
 
     def send_acceleration(self, acceleration: Acceleration, yaw_rate: float) -> None:
         """Publish on ``setpoint_raw/local``."""

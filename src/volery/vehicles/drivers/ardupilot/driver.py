@@ -186,19 +186,30 @@ class ArduPilot(MavlinkDriver):
     # -- operations with a position
 
     def goto(self, goal: Position, speed: float | None, within: Ns) -> Sequence[Step]:
-        """Enter GUIDED and send a target until it is reported; a rover is armed first."""
+        """Enter GUIDED and send a target until it is reported; a rover is armed first.
+
+        The speed follows the target: the first target after a take-off or a velocity restores WPNAV_SPEED.
+        """
         rover = self.telemetry.kind != DRONE_KIND
         start = self._armed_in_guided() if rover else self._guided()
+        sent = 0
 
         def send() -> None:
+            nonlocal sent
             self._backend.send_target(goal)
             self._backend.request_target()
+            sent += 1
 
         monitor = TargetMonitor(self.telemetry, self._takeover)
         reach = monitor.step(goal, send, GUIDED, within, rover=rover, kernel=self._kernel)
         if speed is None:
             return (*start, reach)
-        return (*start, self._set_speed(speed, GUIDED), reach)
+        begin = replace(
+            reach,
+            done=lambda _: monitor.confirmed or sent >= TIMES_UNCONFIRMED,
+            again=CONFIRMED_WITHIN,
+        )
+        return (*start, begin, self._set_speed(speed, GUIDED), reach)
 
     def hold(self) -> Sequence[Step]:
         """Stop a rover in HOLD; stop a drone in GUIDED by a velocity of zero, then hold that position."""

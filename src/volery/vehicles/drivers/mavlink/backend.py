@@ -21,7 +21,6 @@ from volery.vehicles.telemetry import Telemetry
 
 POSITION_ONLY = 0x0DF8
 VELOCITY_AND_YAW_RATE = 0x05C7
-VELOCITY_AND_YAW = 0x09C7
 ACCELERATION_AND_YAW_RATE = 0x043F
 """Type masks of SET_POSITION_TARGET_*: a bit that is set means ignore that field."""
 

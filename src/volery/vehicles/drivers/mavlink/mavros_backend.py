@@ -42,6 +42,7 @@ from volery.vehicles.drivers.mavlink.backend import (
     ON_GROUND,
     UNCHANGED,
     UNDEFINED,
+    VELOCITY_AND_YAW_RATE,
     Ack,
     attitude_fields,
 )
@@ -111,6 +112,7 @@ class MavrosDecoder:
             "battery": ("sensor_msgs/msg/BatteryState", self._battery),
             "statustext/recv": ("mavros_msgs/msg/StatusText", self._text),
             "mission/reached": ("mavros_msgs/msg/WaypointReached", self._reached),
+            "rc/in": ("mavros_msgs/msg/RCIn", self._rc),
         }
 
     def update_flying(self) -> None:
@@ -192,6 +194,11 @@ class MavrosDecoder:
 
     def _text(self, message: Any) -> None:
         self._telemetry.texts.append(StatusText(self._kernel.now(), message.severity, message.text))
+
+    def _rc(self, message: Any) -> None:
+        self._telemetry.rc = tuple(int(pulse) for pulse in message.channels)
+        self._telemetry.rc_ns = self._kernel.now()
+        self._telemetry.changed.notify()
 
     def _reached(self, message: Any) -> None:
         self._telemetry.mission_reached = message.wp_seq
@@ -356,13 +363,13 @@ class MavrosBackend:
 
     # -- topics
 
-    def _publish_velocity(self, velocity: Velocity, mask: int, **yaw: float) -> None:
-        """Publish on ``setpoint_raw/local``: east, north, up; *yaw* as in the message, anticlockwise."""
+    def _publish_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
+        """Publish a velocity and yaw rate (degrees/s, clockwise) on ``setpoint_raw/local``."""
         message = new(
             "mavros_msgs/msg/PositionTarget",
             coordinate_frame=constant("MAV_FRAME_LOCAL_NED"),
-            type_mask=mask,
-            **yaw,
+            type_mask=VELOCITY_AND_YAW_RATE,
+            yaw_rate=to_ros_yaw_rate(yaw_rate),
         )
         vector = message_class("geometry_msgs/msg/Vector3")
         message.velocity = vector(*ned_to_enu((velocity.north, velocity.east, -velocity.up)))

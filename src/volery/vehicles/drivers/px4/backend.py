@@ -8,11 +8,10 @@ control. PX4's events do not pass MAVROS.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isnan, nan, radians
+from math import nan, radians
 from typing import Any, NamedTuple, Protocol
 
 from volery.base.errors import UsageError
-from volery.base.frames import heading_to_yaw
 from volery.base.geoid import EGM96, Geoid
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns
@@ -23,14 +22,13 @@ from volery.ros.messages import new, request
 from volery.vehicles.driver import Acceleration, AttitudeTarget, ManualControl
 from volery.vehicles.drivers.mavlink.backend import (
     INT_FRAMES,
-    VELOCITY_AND_YAW,
     VELOCITY_AND_YAW_RATE,
     Ack,
     Backend,
     acceleration_fields,
 )
 from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
-from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend, to_ros_yaw_rate
+from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend
 from volery.vehicles.drivers.px4.decoder import PX4Decoder
 from volery.vehicles.drivers.px4.modes import HOLD, LINK_LOSS_PARAMETERS, MODES
 from volery.vehicles.drivers.steps import DRONE_KIND
@@ -54,25 +52,27 @@ _NO_SPEED = -1.0
 
 
 class Setpoint(NamedTuple):
-    """A set-point of OFFBOARD: velocity, and heading in degrees or, where NaN, yaw rate in degrees/s.
+    """A set-point of OFFBOARD: velocity, and yaw rate in degrees/s.
 
     An acceleration, where given, takes the place of the velocity.
     """
 
     velocity: Velocity
     yaw_rate: float = 0.0
-    heading: float = nan
     acceleration: Acceleration | None = None
 
 
-def reposition_fields(goal: Position) -> dict[str, Any]:
-    """Return DO_REPOSITION as the fields of a COMMAND_INT; the altitude of *goal* is AMSL."""
+def reposition_fields(goal: Position, heading: float | None) -> dict[str, Any]:
+    """Return DO_REPOSITION as the fields of a COMMAND_INT; the altitude of *goal* is AMSL.
+
+    Without a heading, in degrees, PX4 turns as its parameters say.
+    """
     return {
         "frame": INT_FRAMES[AMSL],
         "command": constant("MAV_CMD_DO_REPOSITION"),
         "param1": _NO_SPEED,
         "param2": _CHANGE_MODE,
-        "param4": nan,
+        "param4": nan if heading is None else radians(heading),
         "x": round(goal.latitude * 1e7),
         "y": round(goal.longitude * 1e7),
         "z": goal.altitude.metres,
@@ -100,8 +100,8 @@ class PX4Backend(Backend, Protocol):
     def takeoff(self, amsl: float) -> None:
         """Climb, armed on the ground, to an altitude in m AMSL; at least its MIS_TAKEOFF_ALT."""
 
-    def reposition(self, goal: Position) -> None:
-        """Enter AUTO.LOITER and go to *goal*, whose altitude is AMSL."""
+    def reposition(self, goal: Position, heading: float | None) -> None:
+        """Enter AUTO.LOITER and go to *goal*, whose altitude is AMSL; *heading* in degrees."""
 
     def send_setpoint(self, setpoint: Setpoint | AttitudeTarget) -> None:
         """Send one set-point of the stream that OFFBOARD needs."""
@@ -157,9 +157,9 @@ class PX4Mavlink(MavlinkClient):
         """Send NAV_TAKEOFF, whose altitude PX4 takes as AMSL."""
         self._command("MAV_CMD_NAV_TAKEOFF", _NO_PITCH, 0, 0, nan, nan, nan, amsl)
 
-    def reposition(self, goal: Position) -> None:
+    def reposition(self, goal: Position, heading: float | None) -> None:
         """Send DO_REPOSITION."""
-        self._send_to("COMMAND_INT", **reposition_fields(goal))
+        self._send_to("COMMAND_INT", **reposition_fields(goal, heading))
 
     def send_setpoint(self, setpoint: Setpoint | AttitudeTarget) -> None:
         """Send SET_ATTITUDE_TARGET, or SET_POSITION_TARGET_LOCAL_NED in frame 1; PX4 accepts only 1 and 8."""
@@ -170,16 +170,15 @@ class PX4Mavlink(MavlinkClient):
             fields = acceleration_fields(setpoint.acceleration, setpoint.yaw_rate)
             self._send_to("SET_POSITION_TARGET_LOCAL_NED", **fields)
             return
-        turning = isnan(setpoint.heading)
         north, east, up = setpoint.velocity
         self._send_to(
             "SET_POSITION_TARGET_LOCAL_NED",
             coordinate_frame=_LOCAL_NED,
-            type_mask=VELOCITY_AND_YAW_RATE if turning else VELOCITY_AND_YAW,
+            type_mask=VELOCITY_AND_YAW_RATE,
             vx=north,
             vy=east,
             vz=-up,
-            yaw=0.0 if turning else radians(setpoint.heading),
+            yaw=0.0,
             yaw_rate=radians(setpoint.yaw_rate),
         )
 
@@ -219,9 +218,9 @@ class PX4Mavros(MavrosBackend):
     def _takeoff_fields(self) -> Mapping[str, float]:
         return {"latitude": nan, "longitude": nan, "yaw": nan}
 
-    def reposition(self, goal: Position) -> None:
+    def reposition(self, goal: Position, heading: float | None) -> None:
         """Call ``cmd/command_int`` with DO_REPOSITION, which is not acknowledged."""
-        asked = request("mavros_msgs/srv/CommandInt", **reposition_fields(goal))
+        asked = request("mavros_msgs/srv/CommandInt", **reposition_fields(goal, heading))
         self._call(self._command_int, asked)
 
     def send_setpoint(self, setpoint: Setpoint | AttitudeTarget) -> None:
@@ -230,12 +229,8 @@ class PX4Mavros(MavrosBackend):
             self.send_attitude(setpoint)
         elif setpoint.acceleration is not None:
             self._publish_acceleration(setpoint.acceleration, setpoint.yaw_rate)
-        elif isnan(setpoint.heading):
-            yaw_rate = to_ros_yaw_rate(setpoint.yaw_rate)
-            self._publish_velocity(setpoint.velocity, VELOCITY_AND_YAW_RATE, yaw_rate=yaw_rate)
         else:
-            yaw = heading_to_yaw(radians(setpoint.heading))
-            self._publish_velocity(setpoint.velocity, VELOCITY_AND_YAW, yaw=yaw)
+            self._publish_velocity(setpoint.velocity, setpoint.yaw_rate)
 
     def send_manual_control(self, control: ManualControl) -> None:
         """Publish on ``manual_control/send``."""

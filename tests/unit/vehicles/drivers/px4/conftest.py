@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import isnan
+from math import degrees, isfinite, isnan
 from typing import Any
 
 import pytest
@@ -131,8 +131,6 @@ class FakePx4(Scripted):
         self.craft.velocity = (asked["vx"], asked["vy"], -asked["vz"])
         self.craft.north += asked["vx"] * 0.05
         self.craft.east += asked["vy"] * 0.05
-        if not asked["type_mask"] & 0x400:
-            self.craft.heading = asked["yaw"] * 57.29578 % 360.0
 
     # -- listening
 
@@ -230,6 +228,8 @@ class FakePx4(Scripted):
             return UNSUPPORTED
         self.enter(HOLD)
         goal = fields["x"], fields["y"], fields["z"]
+        if isfinite(fields["param4"]):
+            self.craft.heading = degrees(fields["param4"]) % 360.0
         self.kernel.call_at(self.kernel.now() + 2 * S, lambda: self._there(*goal))
         return ACCEPTED
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import pi
 from typing import Any
 
 import pytest
@@ -354,7 +355,7 @@ def test_a_short_silence_is_as_if_nothing_had_happened(bench: Make) -> None:
     at.fly(mission)
 
 
-def test_a_heading_is_turned_to_in_offboard_and_kept_in_hold(bench: Make) -> None:
+def test_a_turn_is_a_reposition_to_where_it_is(bench: Make) -> None:
     at = bench()
 
     def mission(drone: Any) -> None:
@@ -364,8 +365,11 @@ def test_a_heading_is_turned_to_in_offboard_and_kept_in_hold(bench: Make) -> Non
     at.fly(mission)
     assert at.craft.heading == pytest.approx(90, abs=0.1)
     assert at.craft.mode == HOLD
-    turned = at.autopilot.sent(SETPOINT)[-1]
-    assert (turned["type_mask"], turned["vx"]) == (0x09C7, 0.0)
+    turn = at.autopilot.sent("COMMAND_INT")[-1]
+    assert turn["command"] == 192
+    assert turn["param4"] == pytest.approx(pi / 2)
+    assert (at.craft.north, at.craft.east) == pytest.approx((0.0, 0.0), abs=0.1)
+    assert not at.autopilot.sent(SETPOINT)
 
 
 # -- sticks
