@@ -20,7 +20,7 @@ from enum import Enum
 from functools import partial
 from typing import Any
 
-from volery.base.errors import Refused, UsageError, VoleryError, choices, did_you_mean
+from volery.base.errors import LowBattery, Refused, UsageError, VoleryError, choices, did_you_mean
 from volery.base.time import to_seconds
 from volery.testing.checks import CHECKS, Check, CheckFailedError, NotPossibleError
 from volery.testing.driver_checks import GROUPS
@@ -254,6 +254,9 @@ def _judged(one: Check, stage: Stage, play: Callable[[], str | None]) -> Result:
         outcome, detail = Outcome.LACKING, f"cannot {lacking}"
     except NotPossibleError as error:
         outcome, detail = Outcome.IMPOSSIBLE, str(error)
+    except LowBattery as error:
+        outcome = Outcome.IMPOSSIBLE if isinstance(stage, RealStage) else Outcome.FAILED
+        detail = f"{error}; charge it and repeat with --only {one.name}"
     except CheckFailedError as error:
         detail = str(error)
     except Exception as error:

@@ -137,21 +137,14 @@ def _result_table(report: Report) -> Table:
     from volery.testing.driver_conformance import Outcome
 
     styles = {Outcome.PASSED: "green", Outcome.FAILED: "bold red"}
-    shown = make_table(
-        Column("group", style="dim"),
-        Column("check", no_wrap=True),
-        Column("result", no_wrap=True),
-        Column("detail", overflow="fold"),
-    )
+    shown = make_table(Column("check", no_wrap=True), Column("result", overflow="fold"))
     group = ""
     for one in report.results:
-        shown.add_row(
-            "" if one.group == group else one.group,
-            one.check,
-            Text(one.outcome.value, style=styles.get(one.outcome, "dim")),
-            Text(one.detail),
-        )
+        if one.group != group:
+            shown.add_row(Text(one.group, style="dim"))
         group = one.group
+        said = Text(one.outcome.value, style=styles.get(one.outcome, "dim"))
+        shown.add_row(f"  {one.check}", said.append(f": {one.detail}" if one.detail else "", style="default"))
     return shown
 
 
