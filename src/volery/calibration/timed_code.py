@@ -24,7 +24,7 @@ from time import thread_time_ns
 from types import ModuleType
 
 from volery.base.time import MS, Ns
-from volery.cost import OPERATIONS, STEPS_PER_NS, StepCounter
+from volery.cost import OPERATIONS, STEPS_PER_NS, LibraryTable, StepCounter
 
 PREAMBLE = """
 from math import sin, hypot, sqrt, atan2
@@ -258,9 +258,9 @@ class TimedCode:
         """
         return 1.57 * self.spread / math.sqrt(len(self.nanoseconds))
 
-    def counted_ns(self, costs: Mapping[str, float]) -> float:
-        """Return the time of one execution by ``costs`` of operations, ns."""
-        return self._counted(StepCounter(costs)) / STEPS_PER_NS / _TIMES
+    def counted_ns(self, costs: Mapping[str, float], libraries: LibraryTable | None = None) -> float:
+        """Return the time of one execution by ``costs`` of operations, and of library calls, ns."""
+        return self._counted(StepCounter(costs, libraries=libraries)) / STEPS_PER_NS / _TIMES
 
     def counts(self) -> list[float]:
         """Return the count of each operation in one execution, in the order of ``OPERATIONS``.

@@ -33,6 +33,7 @@ from volery.cost.pricing import (
     Pricing,
     ProcessorPrices,
     StatedCost,
+from volery.cost.library_calls import LibraryCall, LibraryTable, call_size, library_table
     StatedPricing,
 )
 from volery.cost.python_operations import OPERATIONS, STEPS_PER_NS, OperationTable, operation_table
@@ -61,7 +62,10 @@ __all__ = [
     "PowerLaw",
     "Price",
     "Pricing",
+    "IssueQueue",
+    "LibraryCall",
     "ProcessorEntry",
+    "LibraryTable",
     "ProcessorPrices",
     "RosLaw",
     "StatedCost",
@@ -77,3 +81,5 @@ __all__ = [
     "scale_energy",
     "scale_time",
 ]
+    "call_size",
+    "library_table",

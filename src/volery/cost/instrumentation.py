@@ -8,9 +8,9 @@ are evaluated or not.
 
 A step is a tenth of a nanosecond on the machine of ``operation_table``; ``CodeLaw`` converts steps to the
 time of a processor. Counting is deterministic, does not read the host's clock, and covers the files of a
-component. What a library computes inside a call (numpy, networkx) is not counted and has to be stated with
-``volery.add_time``. ``sys.settrace`` and ``sys.monitoring`` were rejected: they slow code down several times
-and see lines or bytecode, not operations.
+component. What a library computes inside a call is priced by ``library_calls`` where the library is in its
+table (numpy, json, re); for others it has to be stated with ``volery.add_time``. ``sys.settrace`` and
+``sys.monitoring`` were rejected: they slow code down several times and see lines or bytecode, not operations.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from itertools import repeat
 from operator import length_hint
 from typing import Any
 
+from volery.cost.library_calls import OPERATORS, LibraryCalls, LibraryTable
 from volery.cost.python_operations import (
     CATCH,
     ENTER,
@@ -41,8 +42,15 @@ from volery.cost.python_operations import (
 CELL = "__volery_steps__"
 TICK = "__volery_tick_"
 ITERATED = "__volery_iterated_by_"
+LIBRARY_CALL = "__volery_call__"
+LIBRARY_OPERATOR = "__volery_operator_"
+SLICE = "__volery_slice__"
 """Names (or their beginnings) in the namespace of instrumented code: the cell that statements add to, the
-counters inside expressions by weight, and the functions that count the items of an argument."""
+counters inside expressions by weight, the functions that count the items of an argument, and those that
+execute calls and operators in files that use libraries."""
+
+_SEES_ITS_CALLER = frozenset({"super", "locals", "globals", "vars", "dir", "eval", "exec"})
+"""Builtins that look at the frame that calls them, so that nothing may stand between."""
 
 UNIFORM_COSTS: Mapping[str, float] = dict.fromkeys(OPERATIONS, 1.0 / STEPS_PER_NS)
 """One step for each operation, to count how often operations are executed."""
@@ -139,23 +147,50 @@ def _needs_counter(operand: ast.expr) -> bool:
     return any(isinstance(part, _NEEDS_COUNTER) for part in ast.walk(operand))
 
 
-def with_counters(tree: ast.Module, weights: Weights) -> tuple[ast.Module, set[int]]:
+def with_counters(
+    tree: ast.Module, weights: Weights, libraries: Iterable[str] = ()
+) -> tuple[ast.Module, set[int]]:
     """Insert counters into ``tree``; line numbers stay as they are.
+
+    Args:
+        tree: The file.
+        weights: Weights of the counters.
+        libraries: Libraries whose calls pass through ``LibraryCalls``.
 
     Returns:
         The tree, and the weights of the counters inside expressions.
     """
     weights.enter_module(tree)
-    inserter = _CounterInserter(weights)
+    inserter = _CounterInserter(weights, uses_libraries(tree, libraries))
     counted: ast.Module = inserter.visit(tree)
     return ast.fix_missing_locations(counted), inserter.ticks
 
 
-class _CounterInserter(ast.NodeTransformer):
-    """Inserts counters; ``ticks`` are the weights of those inside expressions."""
+def uses_libraries(tree: ast.Module, libraries: Iterable[str]) -> bool:
+    """Return whether a file imports one of these libraries."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names = [node.module]
+        else:
+            continue
+        if any(name.partition(".")[0] in libraries for name in names):
+            return True
+    return False
 
-    def __init__(self, weights: Weights) -> None:
+
+class _CounterInserter(ast.NodeTransformer):
+    """Inserts counters; ``ticks`` are the weights of those inside expressions.
+
+    Args:
+        weights: Weights of the counters.
+        libraries: Let calls and operators pass through ``LibraryCalls``.
+    """
+
+    def __init__(self, weights: Weights, libraries: bool) -> None:
         self._weights = weights
+        self._libraries = libraries
         self.ticks: set[int] = set()
 
     # -- statements
@@ -250,7 +285,37 @@ class _CounterInserter(ast.NodeTransformer):
             argument = node.args[0]
             counting = ast.Call(ast.Name(f"{ITERATED}{iterating}__", ast.Load()), [argument], [])
             node.args = [ast.copy_location(counting, argument)]
+        if not self._libraries or (isinstance(node.func, ast.Name) and node.func.id in _SEES_ITS_CALLER):
+            return node
+        return ast.copy_location(_call(LIBRARY_CALL, node.func, *node.args, keywords=node.keywords), node)
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        self.generic_visit(node)
+        return self._operated(node, type(node.op).__name__, node.left, node.right)
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        self.generic_visit(node)
+        if len(node.ops) > 1:
+            return node
+        return self._operated(node, type(node.ops[0]).__name__, node.left, node.comparators[0])
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        self.generic_visit(node)
+        if not isinstance(node.ctx, ast.Load) or not self._libraries:
+            return node
+        return self._operated(node, "Subscript", node.value, _index(node.slice))
+
+    def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
+        """Leave the annotation as it is."""
+        if node.value is not None:
+            node.value = self.visit(node.value)
         return node
+
+    def _operated(self, node: ast.expr, name: str, left: ast.expr, right: ast.expr) -> ast.expr:
+        """Let an operator pass through ``LibraryCalls``."""
+        if not self._libraries or name not in OPERATORS or isinstance(left, ast.Constant):
+            return node
+        return ast.copy_location(_call(f"{LIBRARY_OPERATOR}{name}__", left, right), node)
 
     def _visit_comprehension(self, node: Any) -> ast.AST:
         weights = self._weights
@@ -285,6 +350,20 @@ class _CounterInserter(ast.NodeTransformer):
         self.ticks.add(weight)
         tick = ast.Call(ast.Name(f"{TICK}{weight}__", ast.Load()), [], [])
         return ast.copy_location(ast.BoolOp(ast.Or(), [tick, expression]), expression)
+
+
+def _call(name: str, *arguments: ast.expr, keywords: list[ast.keyword] | None = None) -> ast.Call:
+    return ast.Call(ast.Name(name, ast.Load()), list(arguments), keywords or [])
+
+
+def _index(index: ast.expr) -> ast.expr:
+    """Return an index as an expression of its own: slices are calls of ``slice``."""
+    if isinstance(index, ast.Slice):
+        parts = (part or ast.Constant(None) for part in (index.lower, index.upper, index.step))
+        return ast.copy_location(_call(SLICE, *parts), index)
+    if isinstance(index, ast.Tuple):
+        return ast.copy_location(ast.Tuple([_index(part) for part in index.elts], ast.Load()), index)
+    return index
 
 
 def _iterating_call(node: ast.Call) -> str:
@@ -338,15 +417,27 @@ class StepCounter:
     advanced, one for each weight: that is cheap, its value is false, and its length hint tells how often it
     was advanced.
 
+    Attributes:
+        taken: Steps of the whole run.
+        libraries: Library calls, whose steps are among them; None if they are left out.
+
     Args:
         costs: Times of all ``OPERATIONS``, ns; by default those that come with volery.
         exact: Do not round the weights of counters inside expressions.
+        libraries: Times of library calls; None to leave them out.
     """
 
-    def __init__(self, costs: Mapping[str, float] | None = None, exact: bool = False) -> None:
+    def __init__(
+        self,
+        costs: Mapping[str, float] | None = None,
+        exact: bool = False,
+        libraries: LibraryTable | None = None,
+    ) -> None:
         costs = operation_table().nanoseconds if costs is None else costs
         self._weights = Weights({name: STEPS_PER_NS * costs[name] for name in OPERATIONS}, exact)
         self._cell = [0]
+        self.taken = 0
+        self.libraries = LibraryCalls(self._cell, libraries) if libraries else None
         self._ticks: dict[int, tuple[repeat[None], int]] = {}
 
     def take(self) -> int:
@@ -357,11 +448,14 @@ class StepCounter:
             if now_left != left:
                 steps += weight * (left - now_left)
                 self._ticks[weight] = tick, now_left
+        self.taken += steps
         return steps
 
     def instrument(self, tree: ast.Module) -> ast.Module:
         """Insert counters into ``tree``; line numbers stay as they are."""
-        counted, ticks = with_counters(tree, self._weights)
+        counted, ticks = with_counters(
+            tree, self._weights, self.libraries.libraries if self.libraries else ()
+        )
         for weight in sorted(ticks):
             self._ticks.setdefault(weight, (repeat(None, _MANY), _MANY))
         return counted
@@ -370,12 +464,20 @@ class StepCounter:
         """Return the names that instrumented code needs in its namespace."""
         return {
             CELL: self._cell,
+            **self._library_names(),
             **{
                 f"{ITERATED}{name}__": self._item_counter(name)
                 for name in (*ITERATING_BUILTINS, *ITERATING_METHODS)
             },
             **{f"{TICK}{weight}__": tick.__next__ for weight, (tick, _) in self._ticks.items()},
         }
+
+    def _library_names(self) -> dict[str, Any]:
+        if self.libraries is None:
+            return {}
+        operators = self.libraries.operators()
+        named = {f"{LIBRARY_OPERATOR}{name}__": one for name, one in operators.items()}
+        return {LIBRARY_CALL: self.libraries.call, SLICE: slice, **named}
 
     def _item_counter(self, name: str) -> Callable[[Any], Any]:
         """Return the function that counts the items of an argument of ``name`` and passes it on."""

@@ -238,17 +238,53 @@ def _calibration_sentences(found: Calibration) -> tuple[str, str, str]:
 
 
 def _write_reference(file: Path, table: OperationTable) -> None:
+    head = "Cost of CPython's operations in nanoseconds: by `volery calibrate python --reference`."
+    _write_yaml(file, table.model_dump(exclude_defaults=True), head)
+
+
+def _write_yaml(file: Path, content: Mapping[str, object], head: str) -> None:
     from ruamel.yaml import YAML
 
     yaml = YAML()
     yaml.width = 110
     text = io.StringIO()
-    yaml.dump(table.model_dump(exclude_defaults=True), text)
-    head = "# Cost of CPython's operations in nanoseconds: by `volery calibrate python --reference`.\n"
+    yaml.dump(content, text)
     try:
-        file.write_text(head + text.getvalue(), encoding="utf-8")
+        file.write_text(f"# {head}\n{text.getvalue()}", encoding="utf-8")
     except OSError as error:
         raise UsageError(f"{file} cannot be written: {error.strerror}") from error
+
+
+@commands.add("quiet", "debug")
+def libraries(
+    output: Output,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Table to be written.")],
+) -> int:
+    """Measure the times of calls of compiled libraries (numpy, json, re, ...) and write them as a table.
+
+    The table that comes with volery is such a file; its times are scaled to other processors like those of
+    Python's operations.
+    """
+    from volery.calibration.host_machine import this_machine
+    from volery.calibration.library_times import measure_table
+    from volery.calibration.timed_code import DEFAULT_ROUNDS
+
+    machine = this_machine("")
+    with _progress_bar(output, "calibrating libraries", "timing programs") as update:
+        table = measure_table(
+            machine.description, DEFAULT_ROUNDS, lambda name, number: update(number, 800, name)
+        )
+    plain = table.model_dump(exclude={"calls"})
+    plain["calls"] = {
+        name: {"size": one.size, "points": dict(one.points)} for name, one in table.calls.items()
+    }
+    _write_yaml(
+        file, plain, "Times of calls of compiled libraries by size, ns: by `volery calibrate libraries`."
+    )
+    output.note(
+        f"{file}: {len(table.calls)} functions; in programs numpy takes {table.in_context:.2f} times as long"
+    )
+    return OK
 
 
 @commands.add("quiet", "json", "debug")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from volery.components.programs import (
     start,
 )
 from volery.components.virtual_stdlib import virtual_modules
-from volery.cost import StepCounter
+from volery.cost import StepCounter, library_table
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.model.components import VEHICLE_INTERFACES, Signature
@@ -118,11 +118,37 @@ class BuiltComponents:
 
     def warnings(self) -> list[str]:
         """Return what the counting of code has left out, and doubts about it."""
-        if self.loader.steps is None or not self.loader.libraries:
+        if self.loader.steps is None:
             return list(self.doubts)
-        names = ", ".join(sorted(self.loader.libraries))
-        what = f"what components computed inside libraries was not counted: {names}"
-        return [*self.doubts, f"{what}; state it with volery.add_time()"]
+        return [*self.doubts, *library_warnings(self.loader.steps, self.loader.libraries)]
+
+
+def library_warnings(steps: StepCounter, imported: Collection[str]) -> list[str]:
+    """Return what is known of the time that components spent in libraries.
+
+    Args:
+        steps: Counter of the run.
+        imported: Libraries that were imported.
+    """
+    found = []
+    calls = steps.libraries
+    priced = calls.libraries if calls is not None else frozenset()
+    unknown = sorted(set(imported) - priced)
+    if unknown:
+        what = f"what components computed inside libraries was not counted: {', '.join(unknown)}"
+        found.append(f"{what}; state it with volery.add_time()")
+    if calls is not None and calls.steps:
+        table = library_table()
+        shares = [f"{name} {spent / max(steps.taken, 1):.0%}" for name, spent in sorted(calls.steps.items())]
+        found.append(
+            f"share of library calls in the counted time: {', '.join(shares)}; by a table, error "
+            f"{table.mean_error:.0%} on average, {table.worst_error:.0%} at worst "
+            f"over {table.programs} programs"
+        )
+    if calls is not None and calls.unpriced:
+        names = [f"{name} ({count})" for name, count in sorted(calls.unpriced.items())]
+        found.append(f"calls without an entry of their own in that table: {', '.join(names)}")
+    return found
 
 
 Truth = Callable[[], Position]
@@ -184,7 +210,7 @@ class Builder:
 
     def build(self, fidelity: str, seed: int, traces: Path | None = None) -> BuiltComponents:
         """Load every file, create every instance, connect every port."""
-        steps = StepCounter() if fidelity == "code" else None
+        steps = StepCounter(libraries=library_table()) if fidelity == "code" else None
         for model in self._models:
             if model.component.path and model.component.language in PYTHON_ROS:
                 define_imported(self._system.file_of(model.component))

@@ -1,0 +1,227 @@
+"""Times of calls of compiled libraries (numpy, json, re, ...) in counted Python code.
+
+Law: time of a call = a function of its size, interpolated between measured points on logarithmic axes; each
+entry states what its size is. It depends on nothing else, so that the same run has the same times. Left out
+are types, strides and whether the data lie in a cache; that is its error. The points in ``libraries.yaml``
+are in nanoseconds of the machine of ``operation_table``; ``CodeLaw`` scales them to other processors.
+
+Calls are found when they happen: in a file that imports one of the libraries every call, operator and
+subscript passes through ``LibraryCalls``, which looks at the function and at its arguments.
+"""
+
+from __future__ import annotations
+
+import operator
+import sys
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib.resources import files
+from math import exp, log
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from volery.base.installed import require_extra
+from volery.cost.figures import WithProvenance
+from volery.cost.python_operations import STEPS_PER_NS
+
+OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
+    "Add": operator.add, "Sub": operator.sub, "Mult": operator.mul, "Div": operator.truediv,
+    "FloorDiv": operator.floordiv, "Mod": operator.mod, "Pow": operator.pow, "MatMult": operator.matmul,
+    "BitAnd": operator.and_, "BitOr": operator.or_, "BitXor": operator.xor,
+    "Eq": operator.eq, "NotEq": operator.ne, "Lt": operator.lt, "LtE": operator.le, "Gt": operator.gt,
+    "GtE": operator.ge, "Subscript": operator.getitem,
+}  # fmt: skip
+"""Functions of the operators that pass through, by the name of the syntax node."""
+
+SIZES = ("elements", "bytes", "products", "cube", "text")
+"""Meanings of a size: elements of the largest array among arguments and result; their bytes; multiplications
+of a matrix product; elements of a matrix to the power of 1.5; length of the argument or result as text."""
+
+
+class LibraryCall(BaseModel):
+    """Time of one function: ``points`` in ns by size."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    size: str
+    points: Mapping[int, float] = Field(min_length=1)
+
+    @field_validator("size")
+    @classmethod
+    def _known(cls, size: str) -> str:
+        if size not in SIZES:
+            raise ValueError(f"size {size!r}; there is {', '.join(SIZES)}")
+        return size
+
+    def nanoseconds(self, size: float) -> float:
+        """Return the time; beyond the last of several points it is proportional to the size."""
+        sizes = sorted(self.points)
+        if size <= sizes[0]:
+            return self.points[sizes[0]]
+        if size >= sizes[-1]:
+            return self.points[sizes[-1]] * (size / sizes[-1] if len(sizes) > 1 else 1.0)
+        place = bisect_right(sizes, size)
+        low, high = sizes[place - 1], sizes[place]
+        share = log(size / low) / log(high / low)
+        return exp((1.0 - share) * log(self.points[low]) + share * log(self.points[high]))
+
+
+class LibraryTable(WithProvenance):
+    """Times of calls by ``library.function``, ns, and the errors over programs that they were not fitted to.
+
+    ``numpy.*`` and its like is the entry of functions of the library that have none. ``in_context`` is the
+    factor between calls in programs and in loops, which is part of numpy's times.
+    """
+
+    machine: str
+    in_context: float = 1.0
+    programs: int
+    mean_error: float
+    worst_error: float
+    calls: Mapping[str, LibraryCall]
+
+    @property
+    def libraries(self) -> frozenset[str]:
+        """Libraries that have an entry."""
+        return frozenset(name.partition(".")[0] for name in self.calls)
+
+
+@cache
+def library_table() -> LibraryTable:
+    """Return the table that comes with volery."""
+    text = files("volery.cost").joinpath("libraries.yaml").read_text(encoding="utf-8")
+    require_extra("model", "the table of library calls")
+    from ruamel.yaml import YAML
+
+    return LibraryTable.model_validate(YAML(typ="safe").load(text))
+
+
+def _array_elements(value: Any) -> int:
+    size = getattr(value, "size", None)
+    return size if isinstance(size, int) else 0
+
+
+def _elements(value: Any) -> int:
+    """Return the elements of an array, or of a list of lists as their product."""
+    if isinstance(value, (list, tuple)) and value:
+        inner = value[0]
+        return len(value) * (len(inner) if isinstance(inner, (list, tuple)) else 1)
+    return max(_array_elements(value), 1)
+
+
+def _products(values: tuple[Any, ...]) -> float:
+    """Return the multiplications of a product of two arrays."""
+    if len(values) < 2:
+        return 1.0
+    shape = tuple(getattr(values[1], "shape", ()))
+    columns = float(shape[-1]) if len(shape) > 1 else 1.0
+    return max(_array_elements(values[0]) * columns, 1.0)
+
+
+def _text(values: tuple[Any, ...], result: Any) -> int:
+    return max((len(one) for one in (*values, result) if isinstance(one, (str, bytes, bytearray))), default=1)
+
+
+def call_size(kind: str, arguments: tuple[Any, ...], result: Any) -> float:
+    """Return the size of a call. See ``SIZES``."""
+    if kind == "products":
+        return _products(arguments)
+    if kind == "cube":
+        return float(max(map(_elements, arguments), default=1) ** 1.5)
+    if kind == "text":
+        return float(_text(arguments, result))
+    if kind == "bytes":
+        return float(max((getattr(one, "nbytes", 0) for one in (*arguments, result)), default=0) or 1)
+    return float(max(map(_elements, (*arguments, result))))
+
+
+class LibraryCalls:
+    """Adds the times of library calls to a cell of steps.
+
+    Attributes:
+        steps: Steps by library, over the whole run.
+        unpriced: Number of calls by ``library.function`` for which there is no entry.
+        libraries: Libraries that are in the table.
+
+    Args:
+        cell: Cell of the counter that the steps are added to.
+        table: The times.
+    """
+
+    def __init__(self, cell: list[int], table: LibraryTable) -> None:
+        self.steps: dict[str, int] = {}
+        self.unpriced: dict[str, int] = {}
+        self._cell = cell
+        self._calls = table.calls
+        self.libraries = table.libraries
+
+    def call(self, function: Any, /, *arguments: Any, **named: Any) -> Any:
+        """Call a function, and add its time if it belongs to a library."""
+        name = self._name(function)
+        if not name:
+            return function(*arguments, **named)
+        before = self._cell[0]
+        result = function(*arguments, **named)
+        of_callbacks = self._cell[0] - before
+        own = getattr(function, "__self__", None)
+        given = (own, *arguments) if own is not None and not isinstance(own, type(sys)) else arguments
+        self._add(name, given, result, of_callbacks)
+        return result
+
+    def _name(self, function: Any) -> str:
+        """Return ``library.function`` of a function of a library, else an empty text."""
+        owner = getattr(function, "__self__", None)
+        if owner is None or isinstance(owner, type(sys)):
+            kind = function if isinstance(function, type) or hasattr(function, "__name__") else type(function)
+            module = getattr(kind, "__module__", None) or type(function).__module__
+        else:
+            module = getattr(owner, "__module__", None) if isinstance(owner, type) else type(owner).__module__
+        top = (module or "").partition(".")[0].lstrip("_")
+        if top not in self.libraries:
+            return ""
+        return f"{top}.{getattr(function, '__name__', type(function).__name__)}"
+
+    def _add(self, name: str, arguments: tuple[Any, ...], result: Any, already: int = 0) -> None:
+        library = name.partition(".")[0]
+        entry = self._calls.get(name)
+        if entry is None:
+            self.unpriced[name] = self.unpriced.get(name, 0) + 1
+            entry = self._calls.get(f"{library}.*")
+            if entry is None:
+                return
+        size = call_size(entry.size, arguments, result)
+        steps = max(0, round(STEPS_PER_NS * entry.nanoseconds(size)) - already)
+        self._cell[0] += steps
+        self.steps[library] = self.steps.get(library, 0) + steps
+
+    def operators(self) -> dict[str, Callable[[Any, Any], Any]]:
+        """Return the functions that execute operators, by the name of the syntax node."""
+        return {name: self._operator(name, function) for name, function in OPERATORS.items()}
+
+    def _operator(self, name: str, function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+        key = {"MatMult": "numpy.matmul", "Subscript": "numpy.subscript", "Pow": "numpy.power"}.get(
+            name, "numpy.operator"
+        )
+
+        def operate(left: Any, right: Any) -> Any:
+            result = function(left, right)
+            if _is_numpy(left) or _is_numpy(right):
+                arguments = (result,) if name == "Subscript" else (left, right)
+                self._add(_entry(key, result), arguments, result)
+            return result
+
+        return operate
+
+
+def _entry(key: str, result: Any) -> str:
+    """Return the entry of an operator: scalars, and subscripts that copy, have entries of their own."""
+    single = getattr(result, "shape", ()) == ()
+    if key == "numpy.subscript":
+        return key if single or result.base is not None else "numpy.take"
+    return "numpy.scalar" if single and key != "numpy.matmul" else key
+
+
+def _is_numpy(value: Any) -> bool:
+    return type(value).__module__ == "numpy"
