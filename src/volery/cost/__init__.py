@@ -25,6 +25,7 @@ from volery.cost.figures import (
     scale_time,
 )
 from volery.cost.instrumentation import UNIFORM_COSTS, StepCounter
+from volery.cost.library_calls import LibraryCall, LibraryTable, call_size, library_table
 from volery.cost.pricing import (
     FREE,
     Basis,
@@ -33,7 +34,6 @@ from volery.cost.pricing import (
     Pricing,
     ProcessorPrices,
     StatedCost,
-from volery.cost.library_calls import LibraryCall, LibraryTable, call_size, library_table
     StatedPricing,
 )
 from volery.cost.python_operations import OPERATIONS, STEPS_PER_NS, OperationTable, operation_table
@@ -54,7 +54,9 @@ __all__ = [
     "Cost",
     "CountedPricing",
     "Figure",
+    "LibraryCall",
     "LibraryLaw",
+    "LibraryTable",
     "Line",
     "MemoryLaw",
     "OperationTable",
@@ -62,10 +64,7 @@ __all__ = [
     "PowerLaw",
     "Price",
     "Pricing",
-    "IssueQueue",
-    "LibraryCall",
     "ProcessorEntry",
-    "LibraryTable",
     "ProcessorPrices",
     "RosLaw",
     "StatedCost",
@@ -73,6 +72,8 @@ __all__ = [
     "StepCounter",
     "Tariff",
     "WithProvenance",
+    "call_size",
+    "library_table",
     "line_through",
     "load_catalogue",
     "operation_table",
@@ -81,5 +82,3 @@ __all__ = [
     "scale_energy",
     "scale_time",
 ]
-    "call_size",
-    "library_table",
