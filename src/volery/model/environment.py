@@ -50,7 +50,7 @@ from volery.model.reading import Reading
 from volery.model.text import Node, Path
 
 VEHICLE_KINDS = ("multirotor", "rover")
-SENSOR_SETS = ("consumer", "rtk")
+SENSOR_SETS = ("consumer", "rtk", "sih")
 STARTS = ("warm", "cold")
 
 CIRCLE_CORNERS = 32

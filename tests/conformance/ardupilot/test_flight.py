@@ -49,16 +49,17 @@ def test_a_leg_of_fifty_metres_takes_the_recorded_time(bench: Any, facts: Any) -
     rig, recorded = bench(), facts["guided"]
     rig.airborne()
     north, _, down = position(rig)
-    goal = north + 50.0
     rig.command(512, 242)
     home = rig.latest["HOME_POSITION"]
+    latitude = round((home["latitude"] / 1e7 + (north - home["x"] + 50.0) / 110_940.0) * 1e7)
+    goal = rig.vehicle.flight.to_ned(latitude / 1e7, home["longitude"] / 1e7, 0.0)[0]
     rig.send(
         "SET_POSITION_TARGET_GLOBAL_INT",
         target_system=1,
         target_component=1,
         coordinate_frame=6,
         type_mask=ONLY_POSITION,
-        lat_int=round(home["latitude"] + (north - home["x"] + 50.0) / 0.011132),
+        lat_int=latitude,
         lon_int=home["longitude"],
         alt=10.0,
     )
@@ -70,7 +71,7 @@ def test_a_leg_of_fifty_metres_takes_the_recorded_time(bench: Any, facts: Any) -
             outside = rig.now
     assert outside - start == pytest.approx(recorded["leg_settled"], rel=TOLERANCE)
     assert peak == pytest.approx(recorded["leg_peak_speed"], rel=TOLERANCE)
-    assert 0.0 <= farthest - goal <= 1.5 * recorded["leg_overshoot"]
+    assert farthest - goal == pytest.approx(recorded["leg_overshoot"], rel=TOLERANCE)
     assert position(rig)[2] == pytest.approx(down, abs=0.5)
     assert rig.vehicle.estimate.attitude[2] == pytest.approx(0.0, abs=0.02)  # it faces the way, as recorded
 
@@ -253,7 +254,8 @@ def test_yaw_turns_to_a_heading_and_by_an_angle(bench: Any) -> None:
     assert degrees(rig.vehicle.estimate.attitude[2]) == pytest.approx(90.0, abs=5.0)
 
 
-def test_brake_stops_at_once(bench: Any) -> None:
+def test_brake_stops_with_the_jerk_of_the_position_controller(bench: Any) -> None:
+    """Speed fades with BRAKE_MODE_DECEL_RATE / PSC_JERK_XY = 1.5 s: 15 m from 10 m/s, and the lag before it."""
     rig = bench()
     rig.airborne()
     fly_to(rig, coordinate_frame=LOCAL_OFFSET, type_mask=ONLY_POSITION, x=100.0)
@@ -263,7 +265,7 @@ def test_brake_stops_at_once(bench: Any) -> None:
     before = position(rig)
     rig.run(5.0)
     assert speed(rig) < 0.4
-    assert position(rig)[0] - before[0] < 20.0
+    assert 15.0 < position(rig)[0] - before[0] < 22.0
 
 
 def test_return_climbs_flies_waits_and_lands_at_home(bench: Any) -> None:
@@ -417,7 +419,9 @@ def test_a_point_below_is_approached_along_a_straight_line(bench: Any) -> None:
     rig.run(8.0)
     north, _, down = position(rig)
     assert (30.0 + down) / 20.0 == pytest.approx(north / 90.0, abs=0.1)
-    assert speed(rig) == pytest.approx(6.8, abs=0.5)
+    left = 90.0 - north, down + 10.0
+    assert speed(rig) == pytest.approx(1.5 * left[0] / abs(left[1]), rel=0.05)
+    assert 6.7 < speed(rig) < 7.6
 
 
 def test_a_target_far_away_is_flown_towards(bench: Any) -> None:

@@ -40,11 +40,14 @@ def test_a_leg_in_offboard_is_quick_and_ends_too_far(facts: dict[str, Any], benc
     assert farthest == pytest.approx(recorded["overshoot"], abs=0.5)
 
 
-@pytest.mark.parametrize(("north", "first", "settling"), [(50.0, 13.0, 6.0), (220.0, 46.5, 7.0)])
+@pytest.mark.parametrize(("north", "first", "past"), [(36.0, 10.8, 0.7), (220.0, 46.8, 0.95)])
 def test_a_leg_by_reposition_creeps_up_to_the_cruise_and_ends_too_far(
-    north: float, first: float, settling: float, bench: Any
+    north: float, first: float, past: float, bench: Any
 ) -> None:
-    """Observed on 220 m: 4.2 m/s first, 4.9 to 5.0 m/s after 20 s, 1.5 m too far, 7 to 11 s to come back."""
+    """Observed: 4.2 m/s first, 4.9 to 5.0 m/s after 20 s; a leg of 36 m ended 0.7 m too far.
+
+    The 1.5 m after 220 m contain half a metre by which the recorded estimate wanders.
+    """
     rig = bench()
     rig.airborne(30.0)
     rig.run(8.0)
@@ -58,16 +61,13 @@ def test_a_leg_by_reposition_creeps_up_to_the_cruise_and_ends_too_far(
     for tenth in range(1, round(10 * (first + 20.0))):
         rig.run(0.1)
         flown.append((tenth / 10.0, rig.ned[0] - start, rig.vehicle.estimate.velocity[0]))
-    reached = next(at for at, way, _ in flown if way > north - 1.0)
-    assert reached == pytest.approx(first, abs=1.2)
-    assert max(speed for _, _, speed in flown) == pytest.approx(5.0, abs=0.35)
-    assert max(way for _, way, _ in flown) - north == pytest.approx(1.5, abs=0.6)
-    settled = next(
-        at for at, way, speed in flown if at > reached and abs(way - north) < 0.6 and abs(speed) < 0.5
-    )
-    assert settled - reached == pytest.approx(settling, abs=4.0)
+    assert next(at for at, way, _ in flown if way > north - 1.0) == pytest.approx(first, rel=0.05)
+    assert max(speed for _, _, speed in flown) == pytest.approx(5.0 if north > 100.0 else 4.5, abs=0.2)
+    assert max(way for _, way, _ in flown) - north == pytest.approx(past, abs=0.25)
+    assert flown[-1][1] - north < 0.6
+    assert abs(flown[-1][2]) < 0.2
     if north > 100.0:
-        assert flown[60][2] < 4.7
+        assert flown[60][2] == pytest.approx(4.3, abs=0.2)
         assert flown[250][2] == pytest.approx(4.95, abs=0.15)
 
 

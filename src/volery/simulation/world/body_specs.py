@@ -195,8 +195,8 @@ class Multirotor:
     efficiency: float = 0.8
     top_speed: float = 760.0
     rotor_lag: float = 0.04
-    drag_linear: float = 0.5
-    drag_quadratic: float = 0.06
+    drag_linear: float = 0.73
+    drag_quadratic: float = 0.10
     spin_damping: float = 0.004
     feet: Vector = (0.15, 0.15, 0.12)
     friction: float = 0.6

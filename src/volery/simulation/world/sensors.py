@@ -41,6 +41,7 @@ from volery.simulation.world.state_layout import (
     M_GPS_COUNT,
     M_GPS_FIX,
     M_GPS_VELOCITY,
+    M_GPS_VELOCITY_BIAS,
     M_GYRO,
     M_GYRO_BIAS,
     M_MAG,
@@ -175,14 +176,14 @@ class GpsReceiver:
     Args:
         horizontal: Error of each horizontal axis [m].
         vertical: Error of the height [m].
-        velocity: Error of each axis of the velocity [m/s]; only its white part is simulated.
+        velocity: Error of each axis of the velocity [m/s].
         rate: Fixes per second [Hz].
         fix_type: MAVLink GPS_FIX_TYPE that it reaches; from ``RTK_FIX`` on the autopilot takes its height.
     """
 
     horizontal: ErrorModel = ErrorModel(0.15, 0.7, 300.0)
     vertical: ErrorModel = ErrorModel(0.3, 1.2, 300.0)
-    velocity: ErrorModel = ErrorModel(0.05, 0.02, 30.0)
+    velocity: ErrorModel = ErrorModel(0.054)
     rate: float = 5.0
     fix_type: int = 3
 
@@ -220,9 +221,19 @@ SENSOR_SUITES: dict[str, SensorSuite] = {
         gps=GpsReceiver(
             horizontal=ErrorModel(0.008, 0.01, 300.0),
             vertical=ErrorModel(0.015, 0.015, 300.0),
-            velocity=ErrorModel(0.02, 0.005, 30.0),
+            velocity=ErrorModel(0.0206),
             rate=10.0,
             fix_type=RTK_FIX,
+        ),
+    ),
+    "sih": SensorSuite(
+        "sih",
+        barometer=ErrorModel(0.1, 0.25, 5.0),
+        gps=GpsReceiver(
+            horizontal=ErrorModel(0.5, 0.1, 30.0),
+            vertical=ErrorModel(0.5, 0.3, 30.0),
+            velocity=ErrorModel(0.07, 0.4, 5.0),
+            rate=8.0,
         ),
     ),
     "perfect": SensorSuite(
@@ -425,6 +436,7 @@ def _advance_biases(row: Array, key: np.uint64, k: int) -> None:
         (P_BARO_ERROR, M_BARO_BIAS, 1),
         (P_GPS_HORIZONTAL_ERROR, M_GPS_BIAS, 2),
         (P_GPS_VERTICAL_ERROR, M_GPS_BIAS + 2, 1),
+        (P_GPS_VELOCITY_ERROR, M_GPS_VELOCITY_BIAS, 3),
     ):
         for axis in range(axes):
             gain = row[error + BIAS_GAIN] if k > 0 else row[error + BIAS_SIGMA]
@@ -495,7 +507,7 @@ def _sample_gps(row: Array, key: np.uint64, k: int) -> None:
         white = horizontal if axis < 2 else vertical
         error = row[M_GPS_BIAS + axis] + white * gaussian(key, _GPS_STREAM + axis, k)
         row[M_GPS + axis] = sign * row[S_POSITION + source] + error
-        noise = speed * gaussian(key, _GPS_VELOCITY_STREAM + axis, k)
+        noise = row[M_GPS_VELOCITY_BIAS + axis] + speed * gaussian(key, _GPS_VELOCITY_STREAM + axis, k)
         row[M_GPS_VELOCITY + axis] = sign * row[S_VELOCITY + source] + noise
     for axis in range(2):
         drift = row[U_GPS_DRIFT + axis]

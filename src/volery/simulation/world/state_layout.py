@@ -136,6 +136,7 @@ M_ACCEL_BIAS = _add("M_ACCEL_BIAS", "m/s^2", "true bias", 3, FRD)
 M_MAG_BIAS = _add("M_MAG_BIAS", "gauss", "true bias", 3, FRD)
 M_BARO_BIAS = _add("M_BARO_BIAS", "m", "true bias, up")
 M_GPS_BIAS = _add("M_GPS_BIAS", "m", "true bias", 3, NED)
+M_GPS_VELOCITY_BIAS = _add("M_GPS_VELOCITY_BIAS", "m/s", "true bias", 3, NED)
 
 # --- parameters of all bodies ---
 MULTIROTOR = 0.0

@@ -189,7 +189,7 @@ def test_impossible_wind_and_empty_worlds_are_refused(clock, frame):
 
 def test_an_unknown_sensor_suite_is_refused_with_the_valid_names(clock, frame):
     with pytest.raises(
-        UsageError, match=r"'consumr' \(did you mean 'consumer'\?\); there is consumer, perfect or rtk"
+        UsageError, match=r"'consumr' \(did you mean 'consumer'\?\); there is consumer, perfect, rtk or sih"
     ):
         World(clock, [Multirotor(sensors="consumr")], frame=frame)
 

@@ -146,6 +146,9 @@ K_BARO_OFFSET = _add("K_BARO_OFFSET", "m", "barometer reading at height zero, up
 K_FILTERED_ACCEL = _add("K_FILTERED_ACCEL", "m/s^2", "low-pass of K_ACCEL at 1 Hz", 3, NED)
 K_SPEED_INTEGRAL = _add("K_SPEED_INTEGRAL", "1", "rover: integrator of the speed loop")
 K_AT_LOWER_LIMIT = _add("K_AT_LOWER_LIMIT", "1", "1 while the collective is at its lower limit")
+K_TILT_LIMITED = _add("K_TILT_LIMITED", "m/s^2", "wanted acceleration while the lean is at its limit", 2, NED)
+K_LAST_MISS = _add("K_LAST_MISS", "m/s", "filtered error of the horizontal velocity loop", 2, NED)
+K_MISS_DERIVATIVE = _add("K_MISS_DERIVATIVE", "m/s^2", "its filtered derivative", 2, NED)
 FLIGHT = FLIGHT_LAYOUT.end - FLIGHT_LAYOUT.start
 """Number of columns that the flight stack adds to a row."""
 

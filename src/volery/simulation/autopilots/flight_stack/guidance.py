@@ -1,13 +1,17 @@
 """Guidance of a multirotor, 100 times a second: from a set-point to a target attitude and a collective.
 
-A target moves with limited speed, acceleration and jerk. The vehicle follows it by position and velocity
-loops with the target's acceleration fed forward, and tilts its thrust towards the resulting acceleration.
-Gains are the documented defaults of ArduPilot 4.5's PSC_* parameters where one exists.
+The structure is that of ArduPilot 4.5's position controller. A target moves to the set-point with limited
+speed, acceleration and jerk; its gains follow from those limits, and a point is approached with half of the
+acceleration limit. The vehicle follows the target by a proportional position loop and a PID velocity loop
+with the target's acceleration fed forward, and tilts its thrust towards the resulting acceleration. While the
+lean is at its limit, target and integrator do not grow further in that direction. The integrator balances the
+drag of the cruise; at the end of a leg it unwinds, which is the recorded overshoot. Gains are the defaults of
+the PSC_* parameters.
 """
 
 from __future__ import annotations
 
-from math import sqrt
+from math import pi, sqrt
 
 from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
@@ -39,6 +43,8 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_EULER,
     K_HOVER_THROTTLE,
     K_LANDED,
+    K_LAST_MISS,
+    K_MISS_DERIVATIVE,
     K_ORIGIN,
     K_POSITION,
     K_SPOOL,
@@ -48,6 +54,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_TARGET_QUATERNION,
     K_TARGET_VELOCITY,
     K_THROTTLE,
+    K_TILT_LIMITED,
     K_VELOCITY,
     K_VELOCITY_INTEGRAL,
     K_YAW_SPEED,
@@ -68,12 +75,14 @@ _GRAVITY = 9.80665
 _POSITION_GAIN = 1.0  # PSC_POSXY_P, PSC_POSZ_P
 _VELOCITY_GAIN = 2.0  # PSC_VELXY_P
 _VELOCITY_INTEGRAL = 1.0  # PSC_VELXY_I
+_VELOCITY_DERIVATIVE = 0.5  # PSC_VELXY_D
+_MOST_INTEGRAL = 10.0  # [m/s^2] PSC_VELXY_IMAX
+_FILTER_SHARE = GUIDE_S / (GUIDE_S + 1.0 / (2.0 * pi * 5.0))  # PSC_VELXY_FLTE, PSC_VELXY_FLTD: 5 Hz
+_ERROR_BRAKE = 2.5  # [m/s^2] with which the position loop closes a large error
 _CLIMB_GAIN = 5.0  # PSC_VELZ_P
 _CLIMB_INTEGRAL = 1.5
-_SHAPING_GAIN = 2.5  # [1/s] of target speed
-_BRAKE_SHARE = 0.5  # share of the acceleration limit with which a height is approached
-_HORIZONTAL_BRAKE_SHARE = 0.39  # the same for a horizontal point
-_LEASH = 4.0  # [m] largest horizontal distance of target and vehicle: in wind the target waits
+_APPROACH_SHARE = 0.5  # share of the acceleration limit, and of jerk over acceleration, to approach a point
+_LEASH = 20.0  # [m] largest horizontal distance of target and vehicle, against run-away in strong wind
 _HEIGHT_LEASH = 2.0  # [m] the same in height: on the ground the target waits
 _SLEW = 1.05  # [rad/s] of yaw: ATC_SLEW_YAW
 _SLEW_BRAKE = 1.6  # [rad/s^2]
@@ -158,6 +167,11 @@ def _enter_control(row: Array, control: int, before: int) -> None:
     The integrators start with the acceleration that the thrust balances now.
     """
     grounded = before in (OFF, IDLE)
+    if not controls_horizontal(before):
+        for axis in range(2):
+            row[K_TILT_LIMITED + axis] = 0.0
+            row[K_MISS_DERIVATIVE + axis] = 0.0
+            row[K_LAST_MISS + axis] = 0.0
     for axis in range(3):
         known = controls_horizontal(before) or (axis == 2 and before == CLIMB)
         if not known:
@@ -193,6 +207,30 @@ def _move_target(row: Array, axis: int, accel: float, jerk: float) -> None:
 
 
 @numeric
+def _move_horizontally(row: Array, north: float, east: float) -> None:
+    """Integrate the horizontal target; while the lean is at its limit it waits in that direction."""
+    jerk = row[C_JERK] * GUIDE_S
+    dn, de = shorten(north - row[K_TARGET_ACCEL], east - row[K_TARGET_ACCEL + 1], jerk)
+    an, ae = row[K_TARGET_ACCEL] + dn, row[K_TARGET_ACCEL + 1] + de
+    row[K_TARGET_ACCEL], row[K_TARGET_ACCEL + 1] = an, ae
+    vn, ve = row[K_TARGET_VELOCITY], row[K_TARGET_VELOCITY + 1]
+    ln, le = row[K_TILT_LIMITED], row[K_TILT_LIMITED + 1]
+    behind_n, behind_e = row[K_TARGET] - row[K_POSITION], row[K_TARGET + 1] - row[K_POSITION + 1]
+    if not (vn * ln + ve * le > 0.0 and behind_n * ln + behind_e * le > 0.0):
+        row[K_TARGET] += (vn + 0.5 * an * GUIDE_S) * GUIDE_S
+        row[K_TARGET + 1] += (ve + 0.5 * ae * GUIDE_S) * GUIDE_S
+    slower = row[K_LAST_MISS] * ln + row[K_LAST_MISS + 1] * le > 0.0 and vn * ln + ve * le >= 0.0
+    if not (slower and an * ln + ae * le > 0.0):
+        row[K_TARGET_VELOCITY] = vn + an * GUIDE_S
+        row[K_TARGET_VELOCITY + 1] = ve + ae * GUIDE_S
+    ahead_n, ahead_e = shorten(
+        row[K_TARGET] - row[K_POSITION], row[K_TARGET + 1] - row[K_POSITION + 1], _LEASH
+    )
+    row[K_TARGET] = row[K_POSITION] + ahead_n
+    row[K_TARGET + 1] = row[K_POSITION + 1] + ahead_e
+
+
+@numeric
 def _speed_along(row: Array) -> tuple[float, float]:
     """Return the limits of horizontal and vertical speed towards the commanded point [m/s].
 
@@ -217,13 +255,13 @@ def _speed_along(row: Array) -> tuple[float, float]:
 @numeric
 def _shape_horizontal(row: Array, control: int) -> None:
     """Move the horizontal target by one guidance period."""
-    limit = row[C_ACCEL]
+    limit, stiffness = row[C_ACCEL], row[C_JERK] / row[C_ACCEL]
     if control in (POSITION, POSITION_CLIMB):
         north = row[C_POSITION] + row[K_ORIGIN] - row[K_TARGET]
         east = row[C_POSITION + 1] + row[K_ORIGIN + 1] - row[K_TARGET + 1]
         distance = sqrt(north * north + east * east)
         most = row[C_SPEED] if control == POSITION_CLIMB else _speed_along(row)[0]
-        speed = min(approach(distance, _POSITION_GAIN, _HORIZONTAL_BRAKE_SHARE * limit), most)
+        speed = min(approach(distance, _APPROACH_SHARE * stiffness, _APPROACH_SHARE * limit), most)
         scale = speed / distance if distance > 1e-9 else 0.0
         north, east = north * scale, east * scale
     else:
@@ -231,15 +269,9 @@ def _shape_horizontal(row: Array, control: int) -> None:
     dn = north - row[K_TARGET_VELOCITY]
     de = east - row[K_TARGET_VELOCITY + 1]
     gap = sqrt(dn * dn + de * de)
-    push = min(approach(gap, _SHAPING_GAIN, row[C_JERK]), limit)
+    push = min(approach(gap, stiffness, row[C_JERK]), limit)
     scale = push / gap if gap > 1e-9 else 0.0
-    _move_target(row, 0, dn * scale, row[C_JERK])
-    _move_target(row, 1, de * scale, row[C_JERK])
-    ahead_n, ahead_e = shorten(
-        row[K_TARGET] - row[K_POSITION], row[K_TARGET + 1] - row[K_POSITION + 1], _LEASH
-    )
-    row[K_TARGET] = row[K_POSITION] + ahead_n
-    row[K_TARGET + 1] = row[K_POSITION + 1] + ahead_e
+    _move_horizontally(row, dn * scale, de * scale)
 
 
 @numeric
@@ -264,28 +296,57 @@ def _shape_vertical(row: Array, control: int) -> None:
     most = _speed_along(row)[1] if control == POSITION else 1e9
     if control in (POSITION, VELOCITY_HEIGHT):
         left = row[C_POSITION + 2] + row[K_ORIGIN + 2] - row[K_TARGET + 2]
-        down = clip(approach(left, _POSITION_GAIN, _BRAKE_SHARE * row[C_ACCEL_Z]), -most, most)
+        gain = _APPROACH_SHARE * row[C_JERK] / row[C_ACCEL_Z]
+        down = clip(approach(left, gain, _APPROACH_SHARE * row[C_ACCEL_Z]), -most, most)
     elif control == VELOCITY:
         down = row[C_VELOCITY + 2]
     else:
         down = -row[C_CLIMB]
     down = clip(down, -row[C_SPEED_UP], row[C_SPEED_DOWN])
-    push = approach(down - row[K_TARGET_VELOCITY + 2], _SHAPING_GAIN, jerk)
+    push = approach(down - row[K_TARGET_VELOCITY + 2], jerk / limit, jerk)
     _move_target(row, 2, clip(push, -limit, limit), jerk)
     ahead = clip(row[K_TARGET + 2] - row[K_POSITION + 2], -_HEIGHT_LEASH, _HEIGHT_LEASH)
     row[K_TARGET + 2] = row[K_POSITION + 2] + ahead
 
 
 @numeric
-def _target_accel(row: Array, axis: int, gain: float, integral: float, hold: bool) -> float:
-    """Return the acceleration [m/s^2] that position and velocity loop of one axis request."""
+def _speed_miss(row: Array, axis: int) -> float:
+    """Return the error of the velocity loop of one axis: the position loop's velocity minus the flown one."""
     error = row[K_TARGET + axis] - row[K_POSITION + axis]
-    speed = row[K_TARGET_VELOCITY + axis] + approach(error, _POSITION_GAIN, 2.5)
-    miss = speed - row[K_VELOCITY + axis]
-    if not hold:
-        grown = row[K_VELOCITY_INTEGRAL + axis] + integral * miss * GUIDE_S
-        row[K_VELOCITY_INTEGRAL + axis] = clip(grown, -4.0, 4.0)
-    accel: float = row[K_TARGET_ACCEL + axis] + gain * miss + row[K_VELOCITY_INTEGRAL + axis]
+    speed = row[K_TARGET_VELOCITY + axis] + approach(error, _POSITION_GAIN, _ERROR_BRAKE)
+    miss: float = speed - row[K_VELOCITY + axis]
+    return miss
+
+
+@numeric
+def _horizontal_accel(row: Array) -> tuple[float, float]:
+    """Return the horizontal acceleration north, east [m/s^2] that the position and velocity loops request."""
+    last_n, last_e = row[K_LAST_MISS], row[K_LAST_MISS + 1]
+    mn = last_n + _FILTER_SHARE * (_speed_miss(row, 0) - last_n)
+    me = last_e + _FILTER_SHARE * (_speed_miss(row, 1) - last_e)
+    row[K_LAST_MISS], row[K_LAST_MISS + 1] = mn, me
+    gn, ge = row[K_VELOCITY_INTEGRAL], row[K_VELOCITY_INTEGRAL + 1]
+    if row[K_LANDED] < 0.5:
+        grows = mn * row[K_TILT_LIMITED] + me * row[K_TILT_LIMITED + 1] > 0.0
+        most = sqrt(gn * gn + ge * ge) if grows else _MOST_INTEGRAL
+        step = _VELOCITY_INTEGRAL * GUIDE_S
+        gn, ge = shorten(gn + step * mn, ge + step * me, most)
+        row[K_VELOCITY_INTEGRAL], row[K_VELOCITY_INTEGRAL + 1] = gn, ge
+    row[K_MISS_DERIVATIVE] += _FILTER_SHARE * ((mn - last_n) / GUIDE_S - row[K_MISS_DERIVATIVE])
+    row[K_MISS_DERIVATIVE + 1] += _FILTER_SHARE * ((me - last_e) / GUIDE_S - row[K_MISS_DERIVATIVE + 1])
+    north = _VELOCITY_GAIN * mn + gn + _VELOCITY_DERIVATIVE * row[K_MISS_DERIVATIVE]
+    east = _VELOCITY_GAIN * me + ge + _VELOCITY_DERIVATIVE * row[K_MISS_DERIVATIVE + 1]
+    return row[K_TARGET_ACCEL] + north, row[K_TARGET_ACCEL + 1] + east
+
+
+@numeric
+def _vertical_accel(row: Array) -> float:
+    """Return the acceleration down [m/s^2] that the position and climb loops request."""
+    miss = _speed_miss(row, 2)
+    if row[K_AT_LOWER_LIMIT] < 0.5:
+        grown = row[K_VELOCITY_INTEGRAL + 2] + _CLIMB_INTEGRAL * miss * GUIDE_S
+        row[K_VELOCITY_INTEGRAL + 2] = clip(grown, -4.0, 4.0)
+    accel: float = row[K_TARGET_ACCEL + 2] + _CLIMB_GAIN * miss + row[K_VELOCITY_INTEGRAL + 2]
     return accel
 
 
@@ -330,7 +391,11 @@ def _tilt_thrust(row: Array, north: float, east: float, lift: float) -> None:
     sy, cy = sine_cosine(row[K_YAW_TARGET])
     most = row[C_TILT]
     st, ct = sine_cosine(most)
+    wanted_n, wanted_e = north, east
     north, east = shorten(north, east, max(lift, 3.0) * st / ct)
+    limited = north != wanted_n or east != wanted_e
+    row[K_TILT_LIMITED] = wanted_n if limited else 0.0
+    row[K_TILT_LIMITED + 1] = wanted_e if limited else 0.0
     forward = north * cy + east * sy
     right = east * cy - north * sy
     pitch = arc_tangent2(-forward, max(lift, 3.0))
@@ -373,9 +438,7 @@ def _follow_angles(row: Array) -> None:
 def _follow_horizontal(row: Array, control: int) -> None:
     """Tilt so that the vehicle follows the horizontal target."""
     _shape_horizontal(row, control)
-    landed = row[K_LANDED] > 0.5
-    north = _target_accel(row, 0, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
-    east = _target_accel(row, 1, _VELOCITY_GAIN, _VELOCITY_INTEGRAL, landed)
+    north, east = _horizontal_accel(row)
     _tilt_thrust(row, north, east, _GRAVITY)
 
 
@@ -383,8 +446,7 @@ def _follow_horizontal(row: Array, control: int) -> None:
 def _follow_vertical(row: Array, control: int) -> None:
     """Set the collective so that the vehicle follows the vertical target."""
     _shape_vertical(row, control)
-    lower = row[K_AT_LOWER_LIMIT] > 0.5
-    down = _target_accel(row, 2, _CLIMB_GAIN, _CLIMB_INTEGRAL, lower)
+    down = _vertical_accel(row)
     lift = clip(_GRAVITY - down, 0.0, _MAX_LIFT * _GRAVITY)
     row[K_THROTTLE] = clip(row[K_HOVER_THROTTLE] * lift / _GRAVITY / _cos_tilt(row), 0.0, 1.0)
     _learn_hover_throttle(row)

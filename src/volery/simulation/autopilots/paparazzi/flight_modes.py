@@ -26,7 +26,7 @@ BELOW_M, SINKING_M_S = 0.2, 0.1
 OFFSET_AT_LIFT_OFF = 0.35
 """Height to which GUIDED lifts a standing aircraft when its motors run; observed 0.4 to 0.5 m [m]."""
 
-FOLLOW_GAIN, FOLLOW_LEAD = 0.4, 0.45
+FOLLOW_GAIN, FOLLOW_LEAD = 0.4, 0.25
 """How the flight stack follows the guidance loops: gain [1/s] and lead [s]."""
 
 FOLLOW_ACCEL, FOLLOW_JERK, FASTEST = 10.0, 80.0, 15.0

@@ -37,7 +37,7 @@ HEIGHT_OMEGA, HEIGHT_ZETA, HEIGHT_ACCEL = 1.5, 0.95, 5.25
 """Vertical reference, as for the plane."""
 HEIGHT_LAG = 0.15
 """Lag of the climb behind its reference [s]."""
-OFFSET_GROWS, OFFSET_MOST, OFFSET_FADES = 0.2, 0.5, 14.0
+OFFSET_GROWS, OFFSET_MOST, OFFSET_FADES = 0.2, 0.62, 14.0
 """Offset of a height: growth for each metre of vertical motion [1/m times m], limit [m], fading time [s]."""
 
 RESYNCHRONIZE = 8.0

@@ -6,19 +6,19 @@ Figures without a parameter name are fitted to the recordings.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import pairwise
 from math import atan2, cos, dist, hypot, pi, sin
 
-from volery.base.frames import Vector, wrap
+from volery.base.frames import Vector
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
 from volery.simulation.autopilots.manoeuvres.to_point import Land, ToPoint
+from volery.simulation.autopilots.px4.position_control import Cruise, PositionLoops
 from volery.simulation.autopilots.state_groups import NEVER, Home
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
-CLIMB_RAMP = ((0.0, 0.05), (1.0, 0.3), (1.33, 0.75), (3.0, 1.0))
+CLIMB_RAMP = ((0.0, 0.05), (0.6, 0.08), (0.75, 0.33), (1.5, 1.0))
 """Share of the climb rate over the time since lift-off in MPC_TKO_RAMP_T, as recorded."""
 
 
@@ -42,95 +42,30 @@ def climb_share(vehicle: Vehicle) -> float:
     return 1.0
 
 
-JERK_AUTO = 4.0
-"""MPC_JERK_AUTO [m/s^3]."""
-
-CRUISE_SHARE = 0.84
-"""Share of MPC_XY_CRUISE at which a leg begins: short legs commanded at 5 m/s were flown at 4.0 to 4.2 m/s.
-
-On longer ones the speed creeps up to 4.9 to 5.0 m/s within 20 s, while the integral of the velocity loop
-winds up against the drag of the recorded airframe.
-"""
-
-WINDS_UP, UNWINDS = 7.0, 6.0
-"""Time constants of that integral while the vehicle flies fast, and after it has slowed [s]."""
-
-WOUND_TOO_FAR = 2.1
-"""Distance by which the wound integral shifts the end of a leg [m]: 1.5 m too far are observed, and a drift
-back that lasts 7 to 11 s.
-"""
-
-ACCEL_SHARE = 0.67
-"""Share of MPC_ACC_HOR at the start and end of a leg, as recorded."""
-
-ALIGNED, SPEED_ASIDE = 0.35, 0.5
-"""Heading error [rad] below which a leg is flown at full speed; before that, the speed limit [m/s]."""
+CLIMB_SHARE = 0.95
+"""Share of MPC_Z_V_AUTO_UP at which the automatic modes climb."""
 
 
 class Hold(ToPoint):
     """AUTO.LOITER: stop and hold a point, which a reposition moves."""
 
-    def __init__(self, vehicle: Vehicle, point: Vector | None = None, yaw: float | None = None) -> None:
-        super().__init__(vehicle, point, yaw)
-        self._wound = (0.0, 0.0)
-        self._wound_at: Ns = NEVER
-
     def step(self) -> None:
-        """Give the set-point, shifted by the wound integral of the velocity loop."""
+        """Move the trajectory towards the point and follow it."""
         if self.point is None:
             return
-        self._wind()
-        north, east, down = self.point
-        shift = WOUND_TOO_FAR * self._cruise_wanted() / self.vehicle.parameters["MPC_XY_CRUISE"]
-        self.vehicle.drive(
-            self.towards((north + shift * self._wound[0], east + shift * self._wound[1], down))
+        control: PositionLoops = self.vehicle.firmware_state.control
+        commanded = self.vehicle.commanded.yaw
+        control.fly_to(self.point, self.cruise(), self.yaw if commanded is None else commanded)
+
+    def cruise(self) -> Cruise:
+        """Return the speeds of the trajectory."""
+        vehicle, p = self.vehicle, self.vehicle.parameters
+        speed = self.speed or vehicle.commanded.speed or p["MPC_XY_CRUISE"]
+        return Cruise(
+            min(max(0.1, speed), vehicle.tuning.speed),
+            min(CLIMB_SHARE * p["MPC_Z_V_AUTO_UP"], vehicle.tuning.speed_up),
+            min(p["MPC_Z_V_AUTO_DN"], vehicle.tuning.speed_down),
         )
-
-    def _wind(self) -> None:
-        """Move the integral towards the share of the cruise speed that is flown."""
-        now, last = self.vehicle.kernel.now(), self._wound_at
-        self._wound_at = now
-        if last == NEVER:
-            return
-        cruise = self._cruise_wanted()
-        flown = [speed / cruise for speed in self.vehicle.estimate.velocity[:2]]
-        slow = hypot(*flown) < hypot(*self._wound)
-        share = min(1.0, to_seconds(now - last) / (UNWINDS if slow else WINDS_UP))
-        north, east = (
-            wound + share * (speed - wound) for wound, speed in zip(self._wound, flown, strict=True)
-        )
-        size = max(1.0, hypot(north, east))
-        self._wound = north / size, east / size
-
-    def _cruise_wanted(self) -> float:
-        """Return the commanded horizontal speed [m/s]."""
-        wanted = self.speed or self.vehicle.commanded.speed or self.vehicle.parameters["MPC_XY_CRUISE"]
-        return max(0.1, wanted)
-
-    def towards(self, point: Vector) -> Setpoint:
-        """Return the set-point with the jerk limit of the firmware's trajectory planner."""
-        vehicle, tuning = self.vehicle, self.vehicle.tuning
-        return Setpoint(
-            Control.POSITION,
-            position=point,
-            yaw=self.yaw if vehicle.commanded.yaw is None else vehicle.commanded.yaw,
-            speed=self._cruise(),
-            speed_up=tuning.speed_up,
-            speed_down=tuning.speed_down,
-            accel=ACCEL_SHARE * tuning.accel,
-            accel_z=tuning.accel_z,
-            tilt=tuning.tilt,
-            jerk=JERK_AUTO,
-        )
-
-    def _cruise(self) -> float:
-        """Return the horizontal speed [m/s], limited until the nose points along the leg."""
-        vehicle = self.vehicle
-        share = CRUISE_SHARE + (1.0 - CRUISE_SHARE) * hypot(*self._wound)
-        speed = share * self._cruise_wanted()
-        if self.yaw is None or abs(wrap(self.yaw - vehicle.estimate.attitude[2])) < ALIGNED:
-            return speed
-        return min(speed, SPEED_ASIDE)
 
     def near(self, sideways: float, height: float) -> bool:
         """Return whether the point is within these distances [m]."""
@@ -159,10 +94,10 @@ class TakeOff(Hold):
         """Return True: the manoeuvre is a take-off."""
         return True
 
-    def towards(self, point: Vector) -> Setpoint:
-        """Return the set-point with the climb rate of the ramp."""
-        share = climb_share(self.vehicle)
-        return replace(super().towards(point), speed_up=share * self.vehicle.parameters["MPC_TKO_SPEED"])
+    def cruise(self) -> Cruise:
+        """Return the speeds of the trajectory, with the climb rate of the ramp."""
+        climb = climb_share(self.vehicle) * self.vehicle.parameters["MPC_TKO_SPEED"]
+        return super().cruise()._replace(up=climb)
 
     def arrived(self, passing: bool = False) -> bool:
         """Return whether the vehicle is within NAV_MC_ALT_RAD below the altitude, or above it."""

@@ -16,6 +16,7 @@ from volery.kernel.api import Handle
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
 from volery.simulation.autopilots.px4 import event_interface
 from volery.simulation.autopilots.px4.offboard import Joystick, SetpointStream
+from volery.simulation.autopilots.px4.position_control import PositionLoops
 from volery.simulation.autopilots.state_groups import NEVER, Home
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
 
@@ -151,6 +152,7 @@ class Commander:
         """Reset to the state after a boot."""
         self.joystick = Joystick()
         self.stream = SetpointStream()
+        self.control = PositionLoops(self.vehicle)
         self.log = event_interface.EventLog(self.vehicle)
         self.requested = LOITER
         """Mode that the user requested."""

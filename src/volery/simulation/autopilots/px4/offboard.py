@@ -5,9 +5,7 @@ position, a velocity, an acceleration, or several of them; masked and NaN values
 MANUAL_CONTROL; modes and failsafes read whether they are available, lost or moved.
 
 The firmware plans no path in OFFBOARD: a point is approached at a speed proportional to the distance, up to
-MPC_XY_VEL_MAX. The recorded airframe has a large drag, against which the integral of the velocity loop winds
-up, so that a speed is reached slowly and a long leg overshoots by two metres. A reference velocity with the
-same gains and the same drag reproduces both.
+MPC_XY_VEL_MAX.
 """
 
 from __future__ import annotations
@@ -29,6 +27,7 @@ from volery.simulation.autopilots.onboard_mission import (
 )
 from volery.simulation.autopilots.px4.event_interface import FRAME_UNSUPPORTED, SETPOINT_INVALID, EventLog
 from volery.simulation.autopilots.px4.flight_modes import climb_share
+from volery.simulation.autopilots.px4.position_control import PositionLoops, Wanted
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
@@ -257,40 +256,15 @@ def attitude_target(fields: dict[str, Any]) -> AttitudeTarget | None:
     return AttitudeTarget((w / size, x / size, y / size, z / size), rate, thrust)
 
 
-JERK = 60.0
-"""Jerk limit of set-points that are flown directly [m/s^3]."""
-
-PUSH = 7.0
-"""Horizontal acceleration at the start of OFFBOARD, as recorded [m/s^2]."""
-
-VELOCITY_GAIN, VELOCITY_INTEGRAL = 1.8, 0.4
-"""MPC_XY_VEL_P_ACC [1/s], MPC_XY_VEL_I_ACC [1/s^2]."""
-
-DRAG = 1.0
-"""Drag of the recorded airframe divided by its mass (SIH_KDV / SIH_MASS) [1/s]."""
-
-LAG = 0.6
-"""Additional lag of the simulated inner loops behind the recorded airframe [s]."""
-
-SUBSTEP = 0.02
-"""Step of the integration of the reference velocity [s]."""
-
-
 class FollowTarget(Manoeuvre):
     """Follow an ``OffboardTarget`` axis by axis; without one, hold."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self._setpoint: OffboardTarget | None = None
-        self._velocity: Vector = (0.0, 0.0, 0.0)
-        self._integral = (0.0, 0.0)
-        self._last: Ns = 0
 
     def enter(self) -> None:
-        """Start with the present velocity."""
-        self._velocity = self.vehicle.estimate.velocity
-        self._integral = (DRAG * self._velocity[0], DRAG * self._velocity[1])
-        self._last = self.vehicle.kernel.now()
+        """Forget the set-point."""
         self._setpoint = None
 
     def follow(self, target: OffboardTarget) -> None:
@@ -306,63 +280,18 @@ class FollowTarget(Manoeuvre):
         return self._setpoint is not None and self._setpoint.lifts(self.vehicle.estimate.position[2])
 
     def step(self) -> None:
-        """Integrate the reference velocity and apply it."""
+        """Control what the set-point states."""
         vehicle = self.vehicle
-        now = vehicle.kernel.now()
-        passed, self._last = to_seconds(now - self._last), now
         if self._setpoint is None:
             self._setpoint = OffboardTarget(position=vehicle.estimate.position)
-        self._velocity = self._reference_velocity(self._setpoint, passed)
-        tuning = vehicle.tuning
-        rate = self._setpoint.yaw_rate
-        vehicle.drive(
-            Setpoint(
-                Control.VELOCITY,
-                velocity=self._velocity,
-                yaw=self._setpoint.yaw if rate is None else None,
-                yaw_rate=rate,
-                speed=tuning.speed,
-                speed_up=climb_share(vehicle) * tuning.speed_up,
-                speed_down=tuning.speed_down,
-                accel=2.0 * PUSH,
-                accel_z=tuning.accel_z,
-                tilt=tuning.tilt,
-                jerk=JERK,
-            )
+        target, rate = self._setpoint, self._setpoint.yaw_rate
+        control: PositionLoops = vehicle.firmware_state.control
+        control.fly(
+            Wanted(target.position, target.velocity, target.acceleration),
+            climb_share(vehicle) * vehicle.tuning.speed_up,
+            target.yaw if rate is None else None,
+            rate,
         )
-
-    def _reference_velocity(self, setpoint: OffboardTarget, passed: float) -> Vector:
-        """Return the velocity that the recorded airframe would have reached [m/s]."""
-        north, east = self._axis_velocity(setpoint, 0), self._axis_velocity(setpoint, 1)
-        speed, most = hypot(north, east), self.vehicle.tuning.speed
-        if speed > most:
-            north, east = north * most / speed, east * most / speed
-        for _ in range(max(1, round(passed / SUBSTEP))):
-            self._integrate(north, east)
-        return self._velocity[0], self._velocity[1], self._axis_velocity(setpoint, 2)
-
-    def _integrate(self, north: float, east: float) -> None:
-        """Integrate velocity loop and drag over one substep."""
-        vn, ve, _ = self._velocity
-        gn, ge = self._integral
-        dn, de = north - vn, east - ve
-        an = VELOCITY_GAIN * dn + gn - DRAG * vn
-        ae = VELOCITY_GAIN * de + ge - DRAG * ve
-        push = hypot(an, ae)
-        share = PUSH / push if push > PUSH else 1.0
-        self._velocity = (vn + an * share * SUBSTEP, ve + ae * share * SUBSTEP, 0.0)
-        self._integral = (gn + VELOCITY_INTEGRAL * dn * SUBSTEP, ge + VELOCITY_INTEGRAL * de * SUBSTEP)
-
-    def _axis_velocity(self, setpoint: OffboardTarget, axis: int) -> float:
-        place, speed, push = setpoint.position[axis], setpoint.velocity[axis], setpoint.acceleration[axis]
-        wanted = speed if isfinite(speed) else 0.0
-        if isfinite(place):
-            gain = 0.95 if axis < 2 else 1.0  # MPC_XY_P, MPC_Z_P
-            ahead = LAG * self._velocity[axis] if axis < 2 else 0.0
-            wanted += gain * (place - self.vehicle.estimate.position[axis] - ahead)
-        elif isfinite(push) and not isfinite(speed):
-            wanted = self._velocity[axis] + push * 0.45
-        return wanted
 
 
 class Offboard(Manoeuvre):

@@ -41,7 +41,8 @@ def test_leg_of_fifty_metres(drone, recorded, sensors):
     peak = max(estimate.velocity[0] for _, estimate, _ in seen)
     assert unsettled[-1] == pytest.approx(figures["settled_s"], rel=FIFTH)
     assert peak == pytest.approx(figures["peak_m_s"], rel=FIFTH)
-    assert max(estimate.position[0] for _, estimate, _ in seen) - 50.0 < figures["overshoot_m"]
+    overshoot = max(estimate.position[0] for _, estimate, _ in seen) - 50.0
+    assert overshoot == pytest.approx(figures["overshoot_m"], rel=FIFTH)
     assert max(abs(estimate.position[2] + 10.0) for _, estimate, _ in seen) < 0.5
 
 

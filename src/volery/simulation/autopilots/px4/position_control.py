@@ -1,0 +1,284 @@
+"""PX4's multicopter position control: trajectory of the automatic modes, position loop, velocity loop.
+
+As in PX4 1.14, a trajectory moves straight towards the point with MPC_JERK_AUTO and MPC_ACC_HOR; its speed
+is what braking over the remaining distance allows, and it runs slower, down to standing still, the
+farther the vehicle is behind it (MPC_XY_ERR_MAX). Position error times MPC_XY_P, the trajectory's velocity
+and acceleration feed a PID on velocity. The loops fly the airframe that was recorded, SIH's quadrotor, whose
+drag is large: the integral winds up against it on a long leg, and the leg ends too far by what it has to
+unwind. The flight stack follows the position and velocity of that airframe.
+"""
+
+from __future__ import annotations
+
+from math import dist, hypot, isfinite, sqrt, tan
+from typing import NamedTuple
+
+from volery.base.frames import Vector
+from volery.base.time import Ns, from_seconds, to_seconds
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.autopilots.flight_stack.guidance import approach, shorten
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+SUBSTEP = 0.02
+"""Step of the integration [s]."""
+
+DRAG = 1.0
+"""Drag of the recorded airframe divided by its mass: SIH_KDV / SIH_MASS [1/s]."""
+
+LEAN_LAG, THRUST_LAG = 0.15, 0.06
+"""Lag from commanded to flown acceleration in the plane (attitude loops) and along the thrust [s]."""
+
+GRAVITY = 9.80665
+
+ACCEL_GAIN = 20.0
+"""Gain on a velocity error below which the trajectory's acceleration fades linearly [1/s]."""
+
+FOLLOW_GAIN, FOLLOW_LEAD = 0.95, 0.25
+"""How the flight stack follows the airframe of the loops: gain [1/s] and lead [s]."""
+
+FOLLOW_ACCEL, FOLLOW_JERK, FASTEST = 12.0, 100.0, 25.0
+"""Limits of the flight stack [m/s^2, m/s^3, m/s]; the loops limit the motion."""
+
+RESTART_AFTER = from_seconds(0.5)
+"""Time without a step after which the loops start anew."""
+
+ELSEWHERE = 12.0
+"""Distance of vehicle and loops from which the loops start anew [m]."""
+
+
+def braking_speed(jerk: float, accel: float, distance: float) -> float:
+    """Return the speed from which a distance suffices to brake, with time for the jerk [m/s]."""
+    ramp = 4.0 * accel * accel / jerk
+    return 0.5 * (sqrt(ramp * ramp + 8.0 * accel * distance) - ramp)
+
+
+class Cruise(NamedTuple):
+    """Limits of a trajectory: speeds in the plane, up and down [m/s]."""
+
+    speed: float
+    up: float
+    down: float
+
+
+class Trajectory:
+    """Position, velocity and acceleration that move towards a point, north, east, down."""
+
+    def __init__(self, position: Vector, velocity: Vector) -> None:
+        self.position, self.velocity = list(position), list(velocity)
+        self.accel = [0.0, 0.0, 0.0]
+
+    def step(self, vehicle: Vehicle, point: Vector, cruise: Cruise, flown: Vector, passed: float) -> None:
+        """Move towards a point.
+
+        Args:
+            vehicle: The vehicle, for its parameters.
+            point: North, east, down [m].
+            cruise: Limits of speed.
+            flown: Position of the aircraft [m].
+            passed: Time [s].
+        """
+        p = vehicle.parameters
+        jerk, push = p["MPC_JERK_AUTO"], p["MPC_ACC_HOR"]
+        ahead = [goal - here for goal, here in zip(point, self.position, strict=True)]
+        climbs = ahead[2] < 0.0
+        lift = p["MPC_ACC_UP_MAX"] if climbs else p["MPC_ACC_DOWN_MAX"]
+        level = hypot(ahead[0], ahead[1])
+        plane = min(cruise.speed, braking_speed(jerk, push, level))
+        brake = p["MPC_ACC_DOWN_MAX"] if climbs else p["MPC_ACC_UP_MAX"]
+        along = min(cruise.up if climbs else cruise.down, braking_speed(jerk, brake, abs(ahead[2])))
+        speed = _straight(level, abs(ahead[2]), plane, along)
+        distance = hypot(level, ahead[2])
+        share = speed / distance if distance > 1e-9 else 0.0
+        passed *= self._stretch(flown, p["MPC_XY_ERR_MAX"])
+        dn, de, dd = (share * way - v for way, v in zip(ahead, self.velocity, strict=True))
+        gap = hypot(dn, de)
+        wanted = min(push, approach(gap, ACCEL_GAIN, jerk)) / gap if gap > 1e-9 else 0.0
+        change_n, change_e = shorten(dn * wanted - self.accel[0], de * wanted - self.accel[1], jerk * passed)
+        down = max(-lift, min(lift, approach(dd, ACCEL_GAIN, jerk)))
+        change_d = max(-jerk * passed, min(jerk * passed, down - self.accel[2]))
+        for axis, change in enumerate((change_n, change_e, change_d)):
+            self.accel[axis] += change
+            before = self.velocity[axis]
+            self.velocity[axis] += self.accel[axis] * passed
+            self.position[axis] += 0.5 * (before + self.velocity[axis]) * passed
+
+    def _stretch(self, flown: Vector, most: float) -> float:
+        """Return the pace of the trajectory, 0 to 1: slower the farther the vehicle is behind it."""
+        north, east = self.position[0] - flown[0], self.position[1] - flown[1]
+        if most <= 0.0 or north * self.velocity[0] + east * self.velocity[1] < 0.0:
+            return 1.0
+        return 1.0 - min(1.0, hypot(north, east) / most)
+
+
+def _straight(level: float, height: float, plane: float, along: float) -> float:
+    """Return the speed along a straight line that exceeds neither the plane's nor the height's limit."""
+    distance = hypot(level, height)
+    speed = hypot(plane, along)
+    if level * speed > plane * distance:
+        speed = plane * distance / level
+    if height * speed > along * distance:
+        speed = along * distance / height
+    return speed
+
+
+class Wanted(NamedTuple):
+    """What the loops control, north, east, down [m, m/s, m/s^2]; NaN: not given."""
+
+    position: Vector
+    velocity: Vector
+    accel: Vector
+
+
+class AirframeLoops:
+    """Position and velocity loops that fly the recorded airframe."""
+
+    def __init__(self, position: Vector, velocity: Vector) -> None:
+        self.position, self.velocity = list(position), list(velocity)
+        self.accel = [0.0, 0.0, 0.0]
+        self._thrust = [DRAG * v for v in velocity]
+        self._integral = list(self._thrust)
+
+    def stand(self, position: Vector) -> None:
+        """Keep the airframe on the ground; its climb may grow."""
+        self.position = list(position)
+        for axis in range(2):
+            self.velocity[axis] = self.accel[axis] = self._thrust[axis] = self._integral[axis] = 0.0
+
+    def step(self, vehicle: Vehicle, wanted: Wanted, limits: Cruise) -> None:
+        """Fly one substep."""
+        p, speeds, push = vehicle.parameters, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+        free = [False, False, False]
+        for axis, gain in enumerate((p["MPC_XY_P"], p["MPC_XY_P"], p["MPC_Z_P"])):
+            place, speed, accel = wanted.position[axis], wanted.velocity[axis], wanted.accel[axis]
+            free[axis] = isfinite(accel) and not isfinite(place) and not isfinite(speed)
+            push[axis] = accel if isfinite(accel) else 0.0
+            speeds[axis] = speed if isfinite(speed) else 0.0
+            if isfinite(place):
+                speeds[axis] += gain * (place - self.position[axis])
+        north, east = shorten(speeds[0], speeds[1], limits.speed)
+        down = max(-limits.up, min(limits.down, speeds[2]))
+        self._fly(vehicle, (north, east, down), push, free)
+
+    def _fly(self, vehicle: Vehicle, speeds: Vector, push: list[float], free: list[bool]) -> None:
+        """Fly velocities with accelerations fed forward; a free axis has no velocity loop."""
+        p = vehicle.parameters
+        plane = p["MPC_XY_VEL_P_ACC"], p["MPC_XY_VEL_I_ACC"], p["MPC_XY_VEL_D_ACC"]
+        along = p["MPC_Z_VEL_P_ACC"], p["MPC_Z_VEL_I_ACC"], p["MPC_Z_VEL_D_ACC"]
+        miss = [0.0, 0.0, 0.0]
+        for axis, (gain, _, slope) in enumerate((plane, plane, along)):
+            if not free[axis]:
+                miss[axis] = speeds[axis] - self.velocity[axis]
+                push[axis] += gain * miss[axis] + self._integral[axis] - slope * self.accel[axis]
+        push[2] = max(-GRAVITY, min(GRAVITY, push[2]))
+        given = 1.0 - push[2] / GRAVITY
+        most = tan(vehicle.tuning.tilt) * GRAVITY
+        north, east = shorten(push[0], push[1], most)
+        north, east = north * given, east * given
+        if hypot(push[0], push[1]) > hypot(north, east):
+            unwind = 2.0 / max(0.1, plane[0])
+            miss[0] -= unwind * (push[0] - north)
+            miss[1] -= unwind * (push[1] - east)
+        for axis, (_, integral, _) in enumerate((plane, plane, along)):
+            if not free[axis]:
+                self._integral[axis] += integral * miss[axis] * SUBSTEP
+        self._integral[2] = max(-GRAVITY, min(GRAVITY, self._integral[2]))
+        for axis, (wanted, lag) in enumerate(((north, LEAN_LAG), (east, LEAN_LAG), (push[2], THRUST_LAG))):
+            self._thrust[axis] += SUBSTEP / lag * (wanted - self._thrust[axis])
+            self.accel[axis] = self._thrust[axis] - DRAG * self.velocity[axis]
+            before = self.velocity[axis]
+            self.velocity[axis] += self.accel[axis] * SUBSTEP
+            self.position[axis] += 0.5 * (before + self.velocity[axis]) * SUBSTEP
+
+
+class PositionLoops:
+    """Trajectory and loops of one vehicle; they outlast changes between the modes that use them."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._vehicle = vehicle
+        self._loops: AirframeLoops | None = None
+        self._trajectory: Trajectory | None = None
+        self._last: Ns = 0
+
+    def fly_to(self, point: Vector, cruise: Cruise, yaw: float | None = None) -> None:
+        """Move the trajectory towards a point and follow it.
+
+        Args:
+            point: North, east, down [m].
+            cruise: Limits of speed.
+            yaw: Heading [rad]; ``None``: keep it.
+        """
+        loops, steps = self._advanced()
+        trajectory = self._trajectory
+        if trajectory is None or self._vehicle.landed:
+            climb = 0.0 if trajectory is None else trajectory.velocity[2]
+            velocity = (0.0, 0.0, climb) if self._vehicle.landed else _vector(loops.velocity)
+            trajectory = self._trajectory = Trajectory(_vector(loops.position), velocity)
+        limits = self._limits()
+        for _ in range(steps):
+            trajectory.step(self._vehicle, point, cruise, _vector(loops.position), SUBSTEP)
+            loops.step(
+                self._vehicle,
+                Wanted(_vector(trajectory.position), _vector(trajectory.velocity), _vector(trajectory.accel)),
+                limits,
+            )
+        self._follow(loops, yaw, None)
+
+    def fly(self, wanted: Wanted, up: float, yaw: float | None, yaw_rate: float | None) -> None:
+        """Control position and velocity directly, without a trajectory.
+
+        Args:
+            wanted: What is controlled.
+            up: Limit of the climb [m/s].
+            yaw: Heading [rad], or
+            yaw_rate: turn rate [rad/s]; neither: keep the heading.
+        """
+        loops, steps = self._advanced()
+        self._trajectory = None
+        limits = self._limits()._replace(up=up)
+        for _ in range(steps):
+            loops.step(self._vehicle, wanted, limits)
+        self._follow(loops, yaw, yaw_rate)
+
+    def _limits(self) -> Cruise:
+        tuning = self._vehicle.tuning
+        return Cruise(tuning.speed, tuning.speed_up, tuning.speed_down)
+
+    def _advanced(self) -> tuple[AirframeLoops, int]:
+        """Return the loops and the substeps to now; the loops start anew where the vehicle is elsewhere."""
+        vehicle, loops, now = self._vehicle, self._loops, self._vehicle.kernel.now()
+        here = vehicle.estimate.position
+        if loops is None or now - self._last > RESTART_AFTER or dist(loops.position, here) > ELSEWHERE:
+            loops = self._loops = AirframeLoops(here, vehicle.estimate.velocity)
+            self._trajectory, self._last = None, now
+        elif vehicle.landed:
+            loops.stand(here)
+        steps = round(to_seconds(now - self._last) / SUBSTEP)
+        self._last += from_seconds(steps * SUBSTEP)
+        return loops, steps
+
+    def _follow(self, loops: AirframeLoops, yaw: float | None, yaw_rate: float | None) -> None:
+        """Let the flight stack follow the airframe of the loops."""
+        vehicle, here = self._vehicle, self._vehicle.estimate.position
+        north, east, down = (
+            v + FOLLOW_LEAD * a + FOLLOW_GAIN * (place - at)
+            for place, v, a, at in zip(loops.position, loops.velocity, loops.accel, here, strict=True)
+        )
+        vehicle.drive(
+            Setpoint(
+                Control.VELOCITY,
+                velocity=(north, east, down),
+                yaw=yaw,
+                yaw_rate=yaw_rate,
+                speed=FASTEST,
+                speed_up=FASTEST,
+                speed_down=FASTEST,
+                accel=FOLLOW_ACCEL,
+                accel_z=FOLLOW_ACCEL,
+                tilt=vehicle.tuning.tilt,
+                jerk=FOLLOW_JERK,
+            )
+        )
+
+
+def _vector(values: list[float]) -> Vector:
+    return values[0], values[1], values[2]

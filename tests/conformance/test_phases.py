@@ -1,0 +1,42 @@
+"""Phases of the five-line mission, simulated against recorded: the aims of ``bench/phases.py`` hold."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+BENCH = Path(__file__).parents[2] / "bench" / "phases.py"
+
+NOT_REACHED = {
+    "ardupilot": set[str](),
+    "px4": {
+        "leg 2, from 1 m to 1 m",
+        "goal 3 within 1 m to LAND",
+        "LAND to disarmed",
+        "armed in all",
+        "overshoot",
+    },
+    "paparazzi": set[str](),
+}
+"""PX4's recorded estimate wanders more on arrival than the simulated one: docs/four-autopilots.md."""
+
+
+@pytest.fixture(scope="module")
+def phases() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("phases", BENCH)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["phases"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("autopilot", NOT_REACHED)
+def test_simulated_phases_are_within_the_aims(autopilot: str, phases: ModuleType) -> None:
+    compared = phases.compare(autopilot)
+    assert phases.TIME_TOLERANCE == 0.05
+    assert phases.TOLERANCE == 0.10
+    off = {one.figure.name: round(one.ratio, 2) for one in compared if not one.within}
+    assert off.keys() == NOT_REACHED[autopilot], off
