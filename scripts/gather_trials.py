@@ -59,8 +59,10 @@ def trials(autopilot: str) -> list[dict[str, Any]]:
 
 
 def _rounded(landing: TouchDown | None) -> dict[str, float] | None:
-    """The touch-down to two decimals: a diff shows what matters."""
-    return None if landing is None else {name: round(value, 2) for name, value in asdict(landing).items()}
+    """The touch-down in centimetres, and in thousandths of the battery: a diff shows what matters."""
+    if landing is None:
+        return None
+    return {name: round(value, 3 if name == "battery" else 2) for name, value in asdict(landing).items()}
 
 
 def main() -> int:

@@ -23,6 +23,7 @@ STREAMED = (
     "HOME_POSITION",
     "GPS_RAW_INT",
     "MISSION_CURRENT",
+    "VFR_HUD",
 )
 
 
@@ -131,6 +132,9 @@ class Scripted:
 
     def _gps_raw_int(self) -> None:
         self.say("GPS_RAW_INT", fix_type=3, satellites_visible=10)
+
+    def _vfr_hud(self) -> None:
+        self.say("VFR_HUD", throttle=45 if self.craft.armed else 0)
 
     # -- listening
 

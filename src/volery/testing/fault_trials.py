@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
+from itertools import count, pairwise
 from math import acos, atan2, degrees, dist, hypot
 from typing import Any, TypeVar
 
@@ -56,6 +56,19 @@ def _trial(kind: type[F], seconds: float | None = None, **arguments: Any) -> F:
     return kind(at_ns=0, duration_ns=None if seconds is None else from_seconds(seconds), **arguments)
 
 
+def lean_in_wind(spec: Multirotor, speed_m_s: float) -> float:
+    """Return the lean at which the thrust balances a wind's drag and the weight, deg: atan(D / m g)."""
+    drag = (spec.drag_linear + spec.drag_quadratic * speed_m_s) * speed_m_s
+    return degrees(atan2(drag, spec.mass * STANDARD_GRAVITY))
+
+
+LEAST_TILT_DEG = 30.0
+"""Largest tilt that every simulated autopilot allows itself, deg."""
+STRONG_WIND_M_S = next(
+    half / 2.0 - 1.0 for half in count(2) if lean_in_wind(Multirotor(), half / 2.0 + 0.5) > LEAST_TILT_DEG
+)
+"""The strongest wind against which this airframe still makes way, by 1 m/s, in steps of 0.5 m/s."""
+
 FAULTS: Mapping[str, Fault | None] = {
     "none": None,
     "cut-0.5": _trial(LinkCut, 0.5),
@@ -70,11 +83,9 @@ FAULTS: Mapping[str, Fault | None] = {
     "battery-low": _trial(BatteryLow, charge=0.08),
     "gps-lost": _trial(GpsLost),
     "motor-weak": _trial(MotorDead, thrust=0.7),
-    "wind": _trial(WindChange, speed_m_s=12.0, direction_deg=270.0, gusts_m_s=1.5),
+    "wind": _trial(WindChange, speed_m_s=STRONG_WIND_M_S, direction_deg=270.0, gusts_m_s=1.5),
 }
-"""From 8 % this airframe hovers for 34 s. 12 m/s is the strongest wind against which it still makes way: at
-30 degrees of tilt its drag holds 13 m/s.
-"""
+"""From 8 % this airframe hovers for 34 s."""
 
 
 @dataclass
@@ -230,12 +241,6 @@ BREAKS_M_S, UPRIGHT_DEG = 3.0, 20.0
 """Sink rate and lean at touch-down from which an airframe counts as damaged in still air."""
 GUSTS_COVERED = 2.0
 """Standard deviations of the gusts that a vehicle may lean against."""
-
-
-def lean_in_wind(spec: Multirotor, speed_m_s: float) -> float:
-    """Return the lean at which the thrust balances a wind's drag and the weight, deg: atan(D / m g)."""
-    drag = (spec.drag_linear + spec.drag_quadratic * speed_m_s) * speed_m_s
-    return degrees(atan2(drag, spec.mass * STANDARD_GRAVITY))
 
 
 def most_lean(spec: BodySpec, fault: Fault | None) -> float:

@@ -788,7 +788,8 @@ class Vehicle(ServicedVehicle):
         seen, limits = self._driver.telemetry, self.limits
         bounds = self._home_bounds() if policy.bounded else self._usable_bounds()
         watched = bounds if policy.bounded else None
-        monitor = BoundsMonitor(seen, watched, policy.ignored, needs_position=policy.travels)
+        needs_position = policy.travels or policy.holds_place
+        monitor = BoundsMonitor(seen, watched, policy.ignored, needs_position=needs_position)
         if not policy.holds_place:
             self._track.follow(None)
         is_drone = seen.kind == "drone"

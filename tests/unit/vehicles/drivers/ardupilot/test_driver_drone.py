@@ -89,7 +89,7 @@ def test_streams_that_do_not_come_are_asked_for_again(bench: Make) -> None:
     asked.ignore = set()
     at.kernel.run(8 * S)
     assert before >= 6
-    assert len(asked.streams) == 7
+    assert len(asked.streams) == 8
     settled = len(asked.sent("COMMAND_LONG"))
     at.kernel.run(30 * S)
     assert len(asked.sent("COMMAND_LONG")) == settled

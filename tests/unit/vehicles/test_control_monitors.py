@@ -1,0 +1,191 @@
+"""Thrust at its limit, the distance from what was commanded, and jumps of the estimate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from volery.base.errors import PositionLost, ThrustSaturated, VehicleError
+from volery.base.frames import LocalFrame
+from volery.base.position import AMSL, Position
+from volery.base.time import MS, S
+from volery.kernel.virtual import VirtualKernel
+from volery.testing.stage import SimulatedStage
+from volery.trace.events import Operation, Text
+from volery.vehicles import Drone, Limits, Velocity
+from volery.vehicles.address import parse
+from volery.vehicles.control_monitors import ThrustMonitor, TrackMonitor
+from volery.vehicles.limits import Bounds
+from volery.vehicles.telemetry import Telemetry
+
+HOME = Position(46.0825, -103.8995, AMSL(900.0))
+FRAME = LocalFrame(HOME.latitude, HOME.longitude, 900.0)
+BOUNDS = Bounds(HOME, Limits(), None)
+HOVERS_ONLY = 0.37
+"""Share of the thrust of each motor that just carries the simulated airframe."""
+
+
+def place(east: float, north: float, up: float = 10.0) -> Position:
+    latitude, longitude, _ = FRAME.from_enu((east, north, 0.0))
+    return Position(latitude, longitude, AMSL(900.0 + up))
+
+
+class Reported:
+    """A drone that reports its position ten times a second, in virtual time."""
+
+    def __init__(self) -> None:
+        self.kernel = VirtualKernel()
+        self.kernel.every(10 * MS, lambda: None)  # time passes
+        self.seen = Telemetry(self.kernel, "craft_1")
+        self.seen.kind, self.seen.armed, self.seen.flying = "drone", True, True
+        self.track = TrackMonitor(self.seen)
+        self.at(0.0, 0.0)
+
+    def at(self, east: float, north: float, up: float = 10.0, speed: float = 0.0) -> None:
+        self.kernel.run(self.kernel.now() + 100 * MS)
+        self.seen.note_message(self.kernel.now())
+        self.seen.velocity = Velocity(speed, 0.0, 0.0)
+        self.seen.update_position(place(east, north, up))
+
+    def found(self, seconds: float, *where: float) -> VehicleError | None:
+        """Return what is found in so many seconds at one place, to which its speed explains the way."""
+        error = None
+        for _ in range(round(seconds * 10)):
+            self.at(*where, speed=500.0)
+            error = error or self.track.check("go", self.kernel.now(), BOUNDS)
+        return error
+
+
+def test_off_the_path_for_three_seconds() -> None:
+    drone = Reported()
+    drone.track.follow(BOUNDS.path(place(0, 0), place(0, 100)))
+    assert drone.found(5.0, 14.0, 40.0, 60.0) is None  # however high
+    assert drone.found(2.5, 17.0, 40.0) is None
+    assert drone.found(1.0, 3.0, 40.0) is None
+    error = drone.found(3.5, 17.0, 40.0)
+    assert "it is 17 m off its commanded path, beyond 15 m (Limits.off_track)" in str(error)
+
+
+def test_a_vehicle_in_motion_may_overshoot_by_its_stopping_distance() -> None:
+    drone = Reported()
+    drone.at(0.0, 0.0, speed=12.0)
+    drone.track.follow(BOUNDS.path(place(0, 0), place(100, 0)))
+    assert drone.found(5.0, 0.0, 45.0) is None  # 12 m/s at 2 m/s^2: 36 m
+    assert "beyond 51 m" in str(drone.found(5.0, 0.0, 53.0))
+
+
+def test_at_a_place_the_height_counts() -> None:
+    drone = Reported()
+    drone.track.stay(BOUNDS)
+    assert drone.found(5.0, 0.0, 0.0, 20.0) is None
+    assert "off its commanded place" in str(drone.found(5.0, 0.0, 0.0, 30.0))
+
+
+def test_a_jump_of_the_estimate_is_a_new_reference() -> None:
+    drone = Reported()
+    drone.track.stay(BOUNDS)
+    drone.found(1.0, 0.0, 0.0)
+    drone.at(0.0, 30.0)
+    assert drone.track.check("go", drone.kernel.now(), BOUNDS) is None
+    assert drone.track.jumped_m == pytest.approx(30.0, abs=0.1)
+    assert drone.found(5.0, 0.0, 30.0) is None
+    assert drone.track.jumped_m == 0.0
+
+
+def test_what_its_velocity_explains_is_no_jump() -> None:
+    drone = Reported()
+    drone.track.stay(BOUNDS)
+    for step in range(20):
+        drone.at(0.0, 2.0 * step, speed=20.0)
+        drone.track.check("go", drone.kernel.now(), BOUNDS)
+        assert drone.track.jumped_m == 0.0
+
+
+def test_a_target_of_another_station_ends_it() -> None:
+    drone = Reported()
+    drone.track.stay(BOUNDS)
+    drone.seen.target = place(60, 0)
+    assert drone.found(10.0, 60.0, 0.0) is None
+
+
+def test_an_old_or_unfixed_position_is_no_control_error() -> None:
+    drone = Reported()
+    drone.track.stay(BOUNDS)
+    drone.seen.fix = "3d_fix"
+    drone.seen.fix = "no_fix"
+    assert drone.found(5.0, 60.0, 0.0) is None
+
+
+def test_an_invalid_estimate_is_a_lost_position() -> None:
+    drone = Reported()
+    drone.seen.note_estimate(False)
+    assert drone.seen.position_lost_for(drone.kernel.now()) == 0  # it never was valid
+    drone.seen.note_estimate(True)
+    drone.seen.note_estimate(False)
+    drone.found(2.0, 0.0, 0.0)
+    assert drone.seen.position_lost_for(drone.kernel.now()) == 2 * S
+    assert not drone.seen.located
+    drone.seen.note_estimate(True)
+    assert drone.seen.located
+
+
+@pytest.mark.parametrize(
+    ("thrust", "up", "flying", "said"),
+    [
+        (0.97, 0.0, True, "it has been at 97% thrust for 3 s and does not climb"),
+        (0.97, 0.0, False, "it has been at 97% thrust for 3 s and does not lift off"),
+        (0.97, 3.0, True, ""),
+        (0.90, -2.0, True, ""),
+        (float("nan"), 0.0, True, ""),
+    ],
+)
+def test_full_thrust_without_a_climb(thrust: float, up: float, flying: bool, said: str) -> None:
+    drone = Reported()
+    seen = drone.seen
+    monitor, error = ThrustMonitor(seen), None
+    for _ in range(40):
+        drone.at(0.0, 0.0)
+        seen.thrust, seen.flying, seen.velocity = thrust, flying, Velocity(0.0, 0.0, up)
+        error = error or monitor.check("go", drone.kernel.now())
+    assert (said in str(error)) if said else error is None
+
+
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4", "paparazzi"])
+def test_a_drone_without_the_thrust_to_climb_is_landed(autopilot: str) -> None:
+    stage = SimulatedStage(parse(f"sim:{autopilot}"), Drone, 3)
+    raised: list[VehicleError] = []
+
+    def flight() -> None:
+        stage.drone.takeoff(10)
+        for motor in range(4):
+            stage.flight.weaken_motor(motor, HOVERS_ONLY)
+        try:
+            stage.drone.goto(stage.at(0.0, 0.0, 60.0))
+        except VehicleError as error:
+            raised.append(error)
+
+    stage.perform(flight)
+    assert isinstance(raised[0], ThrustSaturated), raised
+    assert "it is on the ground" in str(raised[0])
+    assert not stage.drone.armed
+    stage.close()
+
+
+@pytest.mark.parametrize("autopilot", ["paparazzi"])
+def test_a_drone_that_loses_its_position_between_two_calls_is_landed(autopilot: str) -> None:
+    stage = SimulatedStage(parse(f"sim:{autopilot}"), Drone, 3)
+    raised: list[Any] = []
+
+    def flight() -> None:
+        stage.drone.takeoff(10)
+        stage.flight.block_gps()
+        stage.sleep(60.0)
+        raised.append(stage.drone._bounds_error)
+
+    stage.perform(flight)
+    assert isinstance(raised[0], PositionLost), raised
+    landed = [one.asked for one in stage.events if isinstance(one, Operation) and one.operation == "land"]
+    assert landed == ["land"]
+    assert not [event for event in stage.events if isinstance(event, Text) and "jumped" in event.text]
+    stage.close()
