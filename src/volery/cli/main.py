@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -15,6 +16,9 @@ from volery.cli import commands
 from volery.cli.command import BAD_INPUT, SECTIONS, Commands
 from volery.cli.configuration import read_defaults
 from volery.cli.console import Output
+
+INFORMATION = frozenset({"-h", "--help", "--version"})
+"""Options that a wrong configuration file does not stop: its error is printed beside what they print."""
 
 
 def _version(wanted: bool) -> None:
@@ -55,9 +59,11 @@ app = _application()
 def main() -> None:
     """Run the command line of this process, with the defaults of the nearest configuration file."""
     command = typer.main.get_group(app)
+    defaults: dict[str, Any] = {}
     try:
         defaults = read_defaults(command, Path.cwd())
     except (UsageError, OSError) as error:
         Output().complain(f"volery: {error}")
-        raise SystemExit(BAD_INPUT) from None
+        if not INFORMATION.intersection(sys.argv[1:]) and sys.argv[1:]:
+            raise SystemExit(BAD_INPUT) from None
     command(prog_name="volery", default_map=defaults)

@@ -7,6 +7,7 @@ not by their names. The libraries of the autopilots' projects decode DataFlash (
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Collection, Iterable, Mapping
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
@@ -135,6 +136,19 @@ def _tlog(path: Path, wanted: set[str]) -> Tables:
     return rows.tables()
 
 
+_DAMAGE = (
+    struct.error,
+    ArithmeticError,
+    AttributeError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    TypeError,
+    ValueError,
+)
+"""Errors that pymavlink and pyulog let through where the bytes of a log are wrong."""
+
+
 def _check_formats(path: Path) -> None:
     """Refuse a binary log that defines a message shorter than its head: pymavlink would read it for ever."""
     with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data:
@@ -172,19 +186,21 @@ def _dataflash(path: Path, wanted: set[str]) -> Tables:
                     name = f"{name}[{instance}]"
                 if time is not None:
                     rows.add(name, time / 1e6, fields)
-        except Exception:  # pymavlink raises bare ones at damage; what it read until then counts
-            pass
+        except Exception as error:
+            if type(error) is not Exception and not isinstance(error, _DAMAGE):
+                raise  # pymavlink raises bare ones at damage, too; what it read until then counts
     return rows.tables()
 
 
 def _ulog(path: Path, wanted: set[str]) -> Tables:
     require_extra("control", "logs of PX4")
     from pyulog import ULog
+    from pyulog.core import ULogException
 
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         try:
             log = ULog(str(path), sorted(wanted) or None, disable_str_exceptions=True)
-        except Exception as error:  # pyulog has no class of its own for damage
+        except (ULogException, *_DAMAGE) as error:
             raise UsageError(f"{path} is a damaged ULog: {error}") from error
     tables: Tables = {}
     for data in sorted(log.data_list, key=lambda one: (one.name, one.multi_id)):

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from volery.base.errors import UsageError
 from volery.cli.configuration import read_defaults
-from volery.cli.main import app
+from volery.cli.main import app, main
 
 
 @pytest.fixture
@@ -69,3 +69,26 @@ def test_the_command_line_wins_and_a_wrong_value_is_refused(tmp_path, command):
     right = CliRunner().invoke(app, ["simulate", nowhere, "--seed", "3"], default_map=defaults)
     assert "'--seed'" not in right.output
     assert "none" in right.output
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "shown"),
+    [
+        (["--help"], 0, "Usage"),
+        (["simulate", "--help"], 0, "Usage"),
+        (["--version"], 0, "volery"),
+        (["runs"], 2, ""),
+    ],
+)
+def test_a_wrong_file_is_named_and_does_not_stop_the_help(
+    tmp_path, monkeypatch, capsys, words, status, shown
+):
+    (tmp_path / "volery.toml").write_text("[simulat]\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.argv", ["volery", *words])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert (ended.value.code or 0) == status
+    written = capsys.readouterr()
+    assert "there is no command 'simulat'" in written.err
+    assert shown in written.out

@@ -8,6 +8,7 @@ of the model, and calls its operations. Values of the model's types (``bool``, `
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
@@ -299,11 +300,32 @@ def compile_component(
     headers = _generated_headers(component, client_library, sources)
     include = (sources.folder, headers, *client_library.include, *INCLUDE)
     fallback = (option for path in client_library.fallback for option in ("-idirafter", str(path)))
-    units = compiled_by(tools, _translation_units(component, sources), include, (*component.flags, *fallback))
+    files = _translation_units(component, sources)
+    try:
+        units = compiled_by(tools, files, include, (*component.flags, *fallback))
+    except ModelError as error:
+        raise _of_the_class(component, sources, error) from None
     ours = ["component.cpp", "virtual_time.cpp", *(["main_entry.cpp"] if not component.class_name else [])]
     objects = [*units, *(_runtime_object(name) for name in ours)]
     options = [str(framework), *(f"-l{library}" for library in component.libraries)]
     return CompiledComponent(component, tools.library(objects, options), framework)
+
+
+_NO_MEMBER = re.compile(r"has no member named '(\w+)'|no member named '(\w+)' in")
+
+
+def _of_the_class(component: CppComponent, sources: Sources, error: ModelError) -> ModelError:
+    """Return an error of the compiler in generated code as one of the class that the code calls."""
+    if error.where is None or Path(error.where.file).resolve() in sources.own or not component.class_name:
+        return error
+    where = sources.place_of_class(component.class_name) or component.where
+    missing = _NO_MEMBER.search(error.what)
+    name = next((one for one in missing.groups() if one), "") if missing else ""
+    if name in [one.name for one in component.provided]:
+        what = f"has no member function {name!r}, an operation that it provides"
+    else:
+        what = f"does not fit the ports and operations of the model: {error.what}"
+    return ModelError(what, component.name, where)
 
 
 def build_framework() -> Path:

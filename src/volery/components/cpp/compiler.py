@@ -61,11 +61,23 @@ class Sources:
 
     def file_of_class(self, name: str) -> Path | None:
         """Return the file that defines a class, headers first, or None."""
-        definition = re.compile(
-            rf"\b(?:class|struct)\s+{re.escape(name)}\b(?:\s+final)?\s*(?::[^:;{{][^;{{]*)?\{{"
-        )
+        definition = _definition(name)
         in_order = sorted(self.own, key=lambda file: file.suffix not in _HEADER_SUFFIXES)
         return next((file for file in in_order if definition.search(_code(file))), None)
+
+    def mentions(self, function: str) -> bool:
+        """Return whether a file declares, defines or calls a function of this name."""
+        return any(re.search(rf"\b{re.escape(function)}\s*\(", _code(file)) for file in self.own)
+
+    def place_of_class(self, name: str) -> Location | None:
+        """Return file and line of the definition of a class, or None."""
+        file = self.file_of_class(name)
+        found = _definition(name).search(_text(file)) if file is not None else None
+        return Location(str(file), _text(file).count("\n", 0, found.start()) + 1) if file and found else None
+
+
+def _definition(name: str) -> re.Pattern[str]:
+    return re.compile(rf"\b(?:class|struct)\s+{re.escape(name)}\b(?:\s+final)?\s*(?::[^:;{{][^;{{]*)?\{{")
 
 
 def find_sources(path: Path, where: Location | None = None) -> Sources:

@@ -2,7 +2,7 @@
 
 Every Python file is loaded as a run loads it: its imports and its top level are executed, its classes are
 compared with the ports, parameters and operations of the model. Nothing is constructed and no time passes.
-C++ components are compiled when a run starts and are not checked here.
+C++ components are compiled, unless there is no compiler; the objects are kept for the run.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from volery.base.errors import ModelError, VoleryError
+from volery.components.cpp.compiler import find_sources
 from volery.components.loader import Loader
 from volery.components.programs import ScriptProgram
 from volery.components.virtual_stdlib import virtual_modules
@@ -25,7 +26,7 @@ from volery.ros.client_libraries.importable_modules import importable_modules
 from volery.ros.graph import EmbeddedGraph
 from volery.ros.messages import define_imported
 from volery.run.assembly.component_builder import PYTHON_ROS, provided_operations, python_program
-from volery.run.assembly.cpp import is_cpp
+from volery.run.assembly.cpp import compile_all, describe_component, is_cpp
 from volery.run.ending import Ending
 from volery.simulation.autopilots.autopilot import firmwares
 
@@ -76,10 +77,13 @@ def _faults(system: System, languages: frozenset[str]) -> Iterator[ModelError]:
     loader = Loader({**virtual_modules(kernel, seed=0), **modules})
     for instance in system.instances:
         component = instance.component
-        if not component.path or is_cpp(component) or component.language not in languages:
+        if not component.path or component.language not in languages:
             continue
         try:
-            _check_instance(system, instance, loader)
+            if is_cpp(component):
+                _check_cpp(system, instance)
+            else:
+                _check_instance(system, instance, loader)
         except ModelError as error:
             yield error
         except VoleryError as error:
@@ -95,3 +99,13 @@ def _check_instance(system: System, instance: Instance, loader: Loader) -> None:
         given |= set(instance.parameters)
     operations = provided_operations(system, instance)
     program.check(sorted(given), operations, instance.activity is not None)
+
+
+def _check_cpp(system: System, instance: Instance) -> None:
+    """Compile a component; that an active class has a ``run`` is seen in its text, as it may have none."""
+    compile_all(system, [instance], "times")
+    description = describe_component(system, instance.component)
+    sources = find_sources(description.path)
+    if description.class_name and instance.activity is not None and not sources.mentions("run"):
+        what = "has no member function 'run', which an active component needs"
+        raise ModelError(what, description.name, sources.place_of_class(description.class_name))
