@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from math import cos, radians
 from typing import Any
 
 import pytest
@@ -177,10 +178,20 @@ def set_to(rig: Any, name: str, value: float) -> float:
 def test_a_simulation_parameter_without_effect_is_refused(bench: Any) -> None:
     rig = bench()
     rig.run(0.5)
-    before = rig.vehicle.parameters["SIM_WIND_SPD"]
-    assert set_to(rig, "SIM_WIND_SPD", before + 5.0) == before
-    assert rig.texts()[-1] == "Param write denied (SIM_WIND_SPD)"
+    before = rig.vehicle.parameters["SIM_WIND_TURB"]
+    assert set_to(rig, "SIM_WIND_TURB", before + 5.0) == before
+    assert rig.texts()[-1] == "Param write denied (SIM_WIND_TURB)"
     assert set_to(rig, "SIM_RC_FAIL", 1.0) == 1.0
+
+
+def test_wind_by_parameter_leans_the_copter_into_it(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    set_to(rig, "SIM_WIND_DIR", 0.0)
+    set_to(rig, "SIM_WIND_SPD", 8.0)
+    rig.run(8.0)
+    _, pitch, yaw = rig.vehicle.estimate.attitude
+    assert -pitch * cos(yaw) > radians(3.0)  # nose down towards the north
 
 
 def test_satellites_and_motors_fail_by_parameter(bench: Any) -> None:

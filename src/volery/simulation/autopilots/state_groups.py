@@ -152,7 +152,7 @@ class FailsafeState:
     """Names of the failsafes whose condition is true."""
     station_last_ns: Ns = NEVER
     """Time of the last message of the ground station that controls the vehicle [ns]."""
-    simulated: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    simulated: tuple[float, float, float, float, float] = (0.0, 0.0, 1.0, 0.0, 180.0)
     """Values of the parameters that inject faults, as they were last applied."""
     low_voltage_since: dict[str, Ns] = field(default_factory=dict)
     """Since when [ns] the battery has been below a voltage, by the name of the parameter that holds it."""

@@ -65,6 +65,8 @@ _SHARED = {
     "SIM_ENGINE_MUL": "share of that motor's thrust",
     "SIM_GPS_DISABLE": "any value but 0: the receiver sees no satellites",
     "SIM_RC_FAIL": "any value but 0: the transmitter's throttle reads 950",
+    "SIM_WIND_DIR": "direction that the wind comes from",
+    "SIM_WIND_SPD": "mean speed of the wind",
     "STAT_BOOTCNT": "counts the boots",
     "SYSID_MYGCS": "system id whose heartbeats and manual control count",
 }

@@ -8,7 +8,7 @@ three for a rover.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import dist
+from math import cos, dist, radians, sin
 from typing import Any
 
 from volery.base.time import MS, Ns, from_seconds
@@ -103,13 +103,18 @@ def on_step(vehicle: Vehicle) -> None:
 
 
 def simulate_faults(vehicle: Vehicle) -> None:
-    """Inject the faults that SIM_GPS_DISABLE and SIM_ENGINE_MUL name, once after each change."""
+    """Inject the faults and the wind that SIM_ parameters name, once after each change."""
     parameters = vehicle.parameters
     motor_and_share = parameters["SIM_ENGINE_FAIL"], parameters["SIM_ENGINE_MUL"]
-    wanted = (parameters["SIM_GPS_DISABLE"], *motor_and_share)
-    if wanted == vehicle.failsafes.simulated:
+    wind = parameters["SIM_WIND_SPD"], parameters["SIM_WIND_DIR"]
+    wanted = (parameters["SIM_GPS_DISABLE"], *motor_and_share, *wind)
+    before = vehicle.failsafes.simulated
+    if wanted == before:
         return
     vehicle.failsafes.simulated = wanted
+    if wind != before[3:]:
+        speed, towards = wind[0], radians(wind[1] + 180.0)
+        vehicle.flight.set_wind(north=speed * cos(towards), east=speed * sin(towards))
     vehicle.flight.block_gps(bool(wanted[0]))
     if vehicle.flies:
         for motor in range(4):

@@ -64,6 +64,7 @@ from volery.simulation.world.state_layout import (
     U_GPS_DRIFT,
     U_MAG_BLOCKED,
     U_MOTOR_HEALTH,
+    U_WIND,
     W_THROTTLE,
     Array,
     Bodies,
@@ -285,6 +286,10 @@ class Flight:
         self._world.set_input(
             self._body, U_GPS_DRIFT, north, east, float(self._world.advance_to_now(self._body))
         )
+
+    def set_wind(self, north: float, east: float) -> None:
+        """Set the mean velocity of the air about this vehicle, towards the north and the east [m/s]."""
+        self._world.set_input(self._body, U_WIND, east, north, 0.0)
 
     def short_cells(self, cells: int) -> None:
         """Inject or clear a fault: *cells* of the battery give no voltage; at least one always does."""
