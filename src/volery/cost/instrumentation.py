@@ -438,16 +438,17 @@ class StepCounter:
         self._cell = [0]
         self.taken = 0
         self.libraries = LibraryCalls(self._cell, libraries) if libraries else None
-        self._ticks: dict[int, tuple[repeat[None], int]] = {}
+        self._ticks: dict[int, repeat[None]] = {}  # by weight
+        self._left: list[int] = []  # length hints at the last reading
 
     def take(self) -> int:
         """Return the steps since the last call."""
         steps, self._cell[0] = self._cell[0], 0
-        for weight, (tick, left) in self._ticks.items():
-            now_left = length_hint(tick)
-            if now_left != left:
-                steps += weight * (left - now_left)
-                self._ticks[weight] = tick, now_left
+        left = list(map(length_hint, self._ticks.values()))
+        if left != self._left:
+            for weight, now, before in zip(self._ticks, left, self._left, strict=True):
+                steps += weight * (before - now)
+            self._left = left
         self.taken += steps
         return steps
 
@@ -457,7 +458,9 @@ class StepCounter:
             tree, self._weights, self.libraries.libraries if self.libraries else ()
         )
         for weight in sorted(ticks):
-            self._ticks.setdefault(weight, (repeat(None, _MANY), _MANY))
+            if weight not in self._ticks:
+                self._ticks[weight] = repeat(None, _MANY)
+                self._left.append(_MANY)
         return counted
 
     def names(self) -> dict[str, Any]:
@@ -469,7 +472,7 @@ class StepCounter:
                 f"{ITERATED}{name}__": self._item_counter(name)
                 for name in (*ITERATING_BUILTINS, *ITERATING_METHODS)
             },
-            **{f"{TICK}{weight}__": tick.__next__ for weight, (tick, _) in self._ticks.items()},
+            **{f"{TICK}{weight}__": tick.__next__ for weight, tick in self._ticks.items()},
         }
 
     def _library_names(self) -> dict[str, Any]:

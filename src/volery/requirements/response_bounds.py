@@ -222,7 +222,21 @@ class _Work:
         self.since: Ns = 0  # executed since the last activation ended
         self.costs: list[Ns] = []
         self.places: dict[str, None] = {}  # the components it computed in, in order
+        self.most: Ns = 0  # executed in one window
+        self._window = 0  # the latest one in which it executed
+        self._within: Ns = 0  # executed in it so far
         self._last: deque[Ns] = deque(maxlen=IN_A_ROW)
+
+    def executed(self, start: Ns, end: Ns) -> None:
+        """Add what was executed from *start* to *end* to its windows."""
+        while start < end:
+            window = start // WINDOW
+            until = end if end // WINDOW == window else (window + 1) * WINDOW
+            within = until - start + (self._within if self._window == window else 0)
+            self._window, self._within = window, within
+            if within > self.most:
+                self.most = within
+            start = until
 
     def ended(self) -> None:
         self._last.append(self.since)
@@ -242,29 +256,22 @@ class Demands:
     def __init__(self) -> None:
         self._work: dict[str, dict[str, _Work]] = {}  # by whose flows of control they are, and processor
         self._releases: dict[str, _Releases] = {}
-        self._windows: dict[tuple[str, str], tuple[int, Ns]] = {}  # by processor and owner: window, in it
-        self._most: dict[tuple[str, str], Ns] = {}
+        self._owners: dict[str, str] = {}  # by the names of tasks
 
     def slice(self, event: Slice) -> None:
         """Add a slice of a task."""
-        task, start = event.task, event.start
-        # the component of the task: drone/mavros for "drone/mavros (set-points)"
-        owner = task if task.endswith(BACKGROUND) else task.partition(" (")[0]
-        where = self._work.setdefault(owner, {})
-        work = where.get(event.processor)
+        start, end, processor, _, task, component = event
+        owner = self._owners.get(task)
+        if owner is None:  # the component of the task: drone/mavros for "drone/mavros (set-points)"
+            owner = self._owners[task] = task if task.endswith(BACKGROUND) else task.partition(" (")[0]
+            self._work.setdefault(owner, {})
+        where = self._work[owner]
+        work = where.get(processor)
         if work is None:
-            work = where[event.processor] = _Work()
-        work.since += event.end - start
-        work.places[event.component] = None
-        who = event.processor, owner
-        while start < event.end:
-            window = start // WINDOW
-            until = min(event.end, (window + 1) * WINDOW)
-            before = self._windows.get(who, (window, 0))
-            executed = until - start + (before[1] if before[0] == window else 0)
-            self._windows[who] = window, executed
-            self._most[who] = max(self._most.get(who, 0), executed)
-            start = until
+            work = where[processor] = _Work()
+        work.since += end - start
+        work.places[component] = None
+        work.executed(start, end)
 
     def activation(self, event: Activation) -> None:
         """Add an activation that ended: what was executed since the one before belongs to it."""
@@ -286,7 +293,7 @@ class Demands:
         if processor.scheduler != FIXED_PRIORITY:
             return {}
         here = {name: where[processor.name] for name, where in self._work.items() if processor.name in where}
-        executed = {name: Load(self._most.get((processor.name, name), 0)) for name in here}
+        executed = {name: Load(work.most) for name, work in here.items()}
         known = {
             name: demand
             for name, work in here.items()
