@@ -71,6 +71,8 @@ class Parameters:
         self._order = tuple(defaults)
         self._index = {parameter.name: index for index, parameter in enumerate(self._order)}
         self._values = {parameter.name: parameter.value for parameter in self._order}
+        self.changes = 0
+        """Number of values that were set so far."""
         for name, value in (overrides or {}).items():
             if name not in self._index:
                 raise UsageError(f"the autopilot has no parameter {name!r}{did_you_mean(name, self._index)}")
@@ -113,6 +115,7 @@ class Parameters:
         if index is None or not isfinite(value):
             return None
         self._values[name] = quantised(self._order[index].type, value)
+        self.changes += 1
         return self.at(index)
 
 

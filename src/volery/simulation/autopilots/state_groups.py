@@ -110,6 +110,8 @@ class SwitchState:
     """That end: 1 right, -1 left."""
     options: dict[int, bool] = field(default_factory=dict)
     """Whether the switch of a channel is up, by channel."""
+    read_from: tuple[list[int], int] | None = None
+    """Pulse widths of all channels, and changes of parameters, that all of them were last read from."""
 
 
 @dataclass

@@ -157,7 +157,8 @@ class World:
         terrain: Terrain | None = None,
         columns: int = 0,
     ) -> None:
-        self._now = now
+        self.now = now
+        """Returns the time [ns]."""
         self.frame = frame
         self.specs = tuple(bodies)
         count = len(self.specs)
@@ -180,7 +181,7 @@ class World:
 
     def advance_to_now(self, body: int) -> int:
         """Advance *body* to the present and return its grid step; its row may then be read, not kept."""
-        step = self._now() // STEP
+        step = self.now() // STEP
         self._last_read[body] = step
         if self.arrays.reached[body] < step:
             self._catch_up(step)
@@ -188,7 +189,7 @@ class World:
 
     def set_input(self, body: int, column: int, *values: float) -> None:
         """Set inputs of *body*, from *column* of its row on, with effect from the next grid step."""
-        self._pending[body].append(_PendingInput(self._now() // STEP + 1, column, values))
+        self._pending[body].append(_PendingInput(self.now() // STEP + 1, column, values))
 
     def payload_power(self, body: int, watts: float) -> None:
         """Set the electrical power of the computers on *body* [W], from the next grid step on."""

@@ -251,6 +251,7 @@ class TargetMonitor:
         self._telemetry = telemetry
         self._takeover = takeover
         self._goal: Position | None = None
+        self._compared: tuple[Position, Position, bool] | None = None
         self._confirmed = False
         self._other_since: Ns | None = None
 
@@ -331,8 +332,16 @@ class TargetMonitor:
         return self._confirmed
 
     def _reports(self, goal: Position) -> bool:
+        """Return whether the reported target is *goal*; the answer holds until another one is reported."""
         target = self._telemetry.target
-        if target is None or horizontal_distance(target, goal) > SAME_TARGET_M:
+        if target is None:
+            return False
+        if self._compared is None or self._compared[0] is not target or self._compared[1] is not goal:
+            self._compared = target, goal, self._same(target, goal)
+        return self._compared[2]
+
+    def _same(self, target: Position, goal: Position) -> bool:
+        if horizontal_distance(target, goal) > SAME_TARGET_M:
             return False
         level = isinstance(goal.altitude, AMSL) and self._telemetry.kind == DRONE_KIND
         return not level or abs(target.altitude.metres - goal.altitude.metres) <= SAME_TARGET_M

@@ -202,9 +202,10 @@ def on_step(vehicle: Vehicle) -> None:
     """Expire overrides, and disarm automatically after a landing or without a take-off."""
     pilot_input.on_step(vehicle)
     boot.find_home(vehicle)
-    pilot_input.read_mode_switch(vehicle, "FLTMODE_CH", "FLTMODE")
-    pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
-    pilot_input.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
+    if not pilot_input.sticks_rest(vehicle):
+        pilot_input.read_mode_switch(vehicle, "FLTMODE_CH", "FLTMODE")
+        pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
+        pilot_input.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
     pilot_input.keep_track(vehicle)
     commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))
     if not vehicle.armed:

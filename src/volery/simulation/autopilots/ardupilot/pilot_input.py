@@ -157,6 +157,18 @@ def position_of(pulse: int) -> int:
     return 1 + sum(pulse > end for end in POSITIONS)
 
 
+def sticks_rest(vehicle: Vehicle) -> bool:
+    """Return whether switches and rudder, read again, would have no effect.
+
+    So it is while no channel and no parameter has changed, and neither mode switch nor rudder is timed.
+    """
+    switches = vehicle.switches
+    read_from = vehicle.rc.pulses(), vehicle.parameters.changes
+    rest = read_from == switches.read_from and not switches.rudder and switches.read in (0, switches.mode)
+    switches.read_from = read_from
+    return rest
+
+
 def read_mode_switch(vehicle: Vehicle, channel: str, modes: str) -> None:
     """Enter the mode of the switch once it has moved.
 

@@ -200,9 +200,10 @@ def on_step(vehicle: Vehicle) -> None:
     """Expire overrides and count the driving time, at each tick."""
     pilot_input.on_step(vehicle)
     boot.find_home(vehicle)
-    pilot_input.read_mode_switch(vehicle, "MODE_CH", "MODE")
-    pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
-    pilot_input.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
+    if not pilot_input.sticks_rest(vehicle):
+        pilot_input.read_mode_switch(vehicle, "MODE_CH", "MODE")
+        pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
+        pilot_input.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
     pilot_input.keep_track(vehicle)
     if vehicle.armed:
         vehicle.ground.flight_time += ROVER.periodic.tick

@@ -210,6 +210,7 @@ class Flight:
 
     def __init__(self, world: World, body: int) -> None:
         self._world = world
+        self._now = world.now
         self._body = body
         self.spec: BodySpec = world.specs[body]
         self.frame: LocalFrame = world.frame
@@ -222,18 +223,18 @@ class Flight:
 
     def estimate(self) -> Estimate:
         """Return the estimate now; the same object until the next grid step."""
-        step = self._world.advance_to_now(self._body)
-        time = step * STEP
-        if self._latest is not None and self._latest.time == time:
-            return self._latest
+        latest, now = self._latest, self._now()
+        if latest is not None and latest.time <= now < latest.time + STEP:
+            return latest
+        time = self._world.advance_to_now(self._body) * STEP
         row = self._world.arrays.rows[self._body]
         rows = (
             row[K_POSITION:VISIBLE].tolist(),
             row[M_GYRO:SAMPLES_END].tolist(),
             row[S_CHARGE : S_AMPS + 1].tolist(),
         )
-        self._latest = Estimate(self._airframe, time, rows)
-        return self._latest
+        latest = self._latest = Estimate(self._airframe, time, rows)
+        return latest
 
     def drive(self, setpoint: Setpoint) -> None:
         """Control to *setpoint* from the next grid step on.

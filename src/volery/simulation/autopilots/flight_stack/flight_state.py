@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cached_property
 from math import inf, sqrt
 
 from volery.base.frames import LocalFrame, Quaternion, Vector
@@ -184,14 +183,21 @@ class GpsFix:
     count: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Airframe:
-    """Constants of a vehicle that are needed to read its estimate."""
+    """Constants of a vehicle that are needed to read its estimate, and the estimator's last origin."""
 
     frame: LocalFrame
     flying: bool
     capacity_as: float
     sensors: SensorSuite
+    _origin: tuple[Vector, Vector] | None = None
+
+    def origin_at(self, ned: Vector) -> Vector:
+        """Return latitude, longitude [degrees] and height AMSL [m] of an origin [m], which seldom changes."""
+        if self._origin is None or self._origin[0] != ned:
+            self._origin = ned, self.frame.from_ned(ned)
+        return self._origin[1]
 
 
 def _fix_of(about: Airframe, sensed: Sequence[float]) -> GpsFix:
@@ -225,12 +231,14 @@ class Estimate:
         rows: Columns from K_POSITION to VISIBLE, from M_GYRO to SAMPLES_END, and from S_CHARGE to S_AMPS.
     """
 
-    __slots__ = ("__dict__", "_about", "_memory", "_sensed", "_state", "time")
+    __slots__ = ("_about", "_fix", "_geodetic", "_memory", "_sensed", "_state", "time")
 
     def __init__(self, about: Airframe, time: Ns, rows: tuple[list[float], list[float], list[float]]) -> None:
         self._about = about
         self.time = time
         self._memory, self._sensed, self._state = rows
+        self._geodetic: Vector | None = None
+        self._fix: GpsFix | None = None
 
     def _value(self, column: int) -> float:
         return self._memory[column - K_POSITION]
@@ -251,24 +259,26 @@ class Estimate:
         return row[at], row[at + 1], row[at + 2]
 
     def _about_origin(self, column: int) -> Vector:
-        north, east, down = self._vector(column)
-        origin = self._vector(K_ORIGIN)
-        return north - origin[0], east - origin[1], down - origin[2]
+        at, origin = column - K_POSITION, K_ORIGIN - K_POSITION
+        row = self._memory
+        return row[at] - row[origin], row[at + 1] - row[origin + 1], row[at + 2] - row[origin + 2]
 
     @property
     def position(self) -> Vector:
         """Position north, east, down about the estimator's origin [m]."""
         return self._about_origin(K_POSITION)
 
-    @cached_property
+    @property
     def geodetic(self) -> Vector:
         """Estimated latitude and longitude [degrees] and height AMSL [m]."""
-        return self._about.frame.from_ned(self._vector(K_POSITION))
+        if self._geodetic is None:
+            self._geodetic = self._about.frame.from_ned(self._vector(K_POSITION))
+        return self._geodetic
 
-    @cached_property
+    @property
     def origin(self) -> Vector:
         """Latitude and longitude [degrees] and height AMSL [m] of the estimator's origin."""
-        return self._about.frame.from_ned(self._vector(K_ORIGIN))
+        return self._about.origin_at(self._vector(K_ORIGIN))
 
     @property
     def origin_ned(self) -> Vector:
@@ -361,10 +371,12 @@ class Estimate:
         distance = self._sensed[M_RANGE - M_GYRO]
         return distance if distance >= 0.0 else None
 
-    @cached_property
+    @property
     def gps(self) -> GpsFix:
         """The receiver's last fix."""
-        return _fix_of(self._about, self._sensed)
+        if self._fix is None:
+            self._fix = _fix_of(self._about, self._sensed)
+        return self._fix
 
     @property
     def battery_volts(self) -> float:

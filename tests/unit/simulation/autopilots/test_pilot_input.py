@@ -1,0 +1,29 @@
+from __future__ import annotations
+
+from volery.base.frames import LocalFrame
+from volery.base.time import S
+from volery.kernel.virtual import VirtualKernel
+from volery.simulation.autopilots.ardupilot import FIRMWARE
+from volery.simulation.autopilots.ardupilot.pilot_input import sticks_rest
+from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.flight_stack.flight import make_world
+from volery.simulation.world.body_specs import Multirotor
+
+
+def test_sticks_are_read_again_after_a_channel_or_a_parameter_has_changed() -> None:
+    kernel = VirtualKernel()
+    _, flights = make_world(kernel.now, [Multirotor()], seed=1, frame=LocalFrame(46.0, 7.0, 500.0))
+    autopilot = Autopilot(kernel, flights[0], FIRMWARE, warm=True)
+    kernel.run(5 * S)
+    vehicle = autopilot.vehicle
+    assert sticks_rest(vehicle)
+    vehicle.rc.override(6, 1900, kernel.now())
+    assert not sticks_rest(vehicle)
+    assert sticks_rest(vehicle)
+    assert vehicle.set_parameter("RC6_OPTION", 11.0)
+    assert not sticks_rest(vehicle)
+    vehicle.switches.mode = -1  # a switch of modes was released: the mode switch counts again
+    assert not sticks_rest(vehicle)
+    kernel.run(6 * S)
+    assert vehicle.switches.mode == vehicle.switches.read
+    assert sticks_rest(vehicle)
