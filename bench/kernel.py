@@ -192,6 +192,8 @@ def main() -> None:
         "SimPy, 100 processes": lambda: simpy_sleepers(100, events),
         "volery, 20 processes computing on a core": lambda: computing(20, events // 2),
         "SimPy, 20 processes computing on a core": lambda: simpy_computing(20, events // 2),
+        "volery, 10,000 processes of 60 events": lambda: sleepers(10_000, 600_000),
+        "SimPy, 10,000 processes of 60 events": lambda: simpy_sleepers(10_000, 600_000),
         "volery, queue handed to and fro": lambda: handover(events // 2),
         "SimPy, store handed to and fro": lambda: simpy_handover(events // 2),
         "100 threads handing a baton": lambda: baton(100, events // 10),
@@ -213,6 +215,10 @@ def main() -> None:
             "computing on a core, to SimPy's (which does not preempt)",
             rate["volery, 20 processes computing on a core"]
             / rate["SimPy, 20 processes computing on a core"],
+        ),
+        (
+            "10,000 processes of 60 events, to SimPy's",
+            rate["volery, 10,000 processes of 60 events"] / rate["SimPy, 10,000 processes of 60 events"],
         ),
         (
             "queues, to SimPy's stores",

@@ -2,9 +2,10 @@
 
 Each row is executed by turns with this checkout and with the other, each in its own virtual environment; the
 figures are minima of CPU seconds (user and system, children included) over the rounds. The kernel's rows are
-in ``bench/kernel.py``, the bodies' in ``bench/physics.py``, the messages' in ``bench/graph.py``.
+in ``bench/kernel.py``, the bodies' in ``bench/physics.py``, the messages' in ``bench/graph.py``. For the
+figures of a wheel, install it in the .venv of a folder that has ``examples`` and ``bench/kernels`` as well.
 
-    python bench/speed.py --against ../volery-before [--rounds 3] [--only delivery]
+    python bench/speed.py --against ../volery-before [--here FOLDER] [--rounds 3] [--only delivery]
 """
 
 from __future__ import annotations
@@ -150,17 +151,19 @@ def smallest(rounds: list[Measured]) -> Measured:
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--against", type=Path, default=HERE, help="a checkout with its own .venv")
+    options.add_argument("--here", type=Path, default=HERE, help="what is measured; by default this checkout")
     options.add_argument("--rounds", type=int, default=3)
     options.add_argument("--only", default="", help="rows whose name contains this")
     given = options.parse_args()
-    other = given.against.resolve()
-    if not python(other).exists():
-        sys.exit(f"speed: {other} has no .venv/bin/python; install volery there in a .venv of its own")
+    other, measured = given.against.resolve(), given.here.resolve()
+    for folder in (other, measured):
+        if not python(folder).exists():
+            sys.exit(f"speed: {folder} has no .venv/bin/python; install volery there in a .venv of its own")
     print(f"{'CPU seconds':40}{'reference':>10}{'here':>10}{'ratio':>8}  to reach", flush=True)
     for name, (measure, wanted) in ROWS.items():
         if given.only not in name:
             continue
-        rounds = [(measure(other), measure(HERE)) for _ in range(given.rounds)]
+        rounds = [(measure(other), measure(measured)) for _ in range(given.rounds)]
         reference = smallest([one for one, _ in rounds])
         here = smallest([one for _, one in rounds])
         ratio = reference.seconds / here.seconds

@@ -234,8 +234,7 @@ class _Work:
             until = end if end // WINDOW == window else (window + 1) * WINDOW
             within = until - start + (self._within if self._window == window else 0)
             self._window, self._within = window, within
-            if within > self.most:
-                self.most = within
+            self.most = max(self.most, within)
             start = until
 
     def ended(self) -> None:
