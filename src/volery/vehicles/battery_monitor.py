@@ -50,7 +50,7 @@ def landing_time(height: float) -> float:
 
 
 def count_cells(volts: float) -> int:
-    """Return the number of lithium-polymer cells in series of a battery at rest; 0 if it cannot be told."""
+    """Return the number of lithium-polymer cells of a battery at rest; 0 if they cannot be counted."""
     least, most = RESTED_CELL_VOLTS
     fitting = [cells for cells in range(1, MOST_CELLS + 1) if least <= volts / cells <= most]
     return fitting[0] if len(fitting) == 1 else 0
@@ -161,7 +161,7 @@ class BatteryMonitor:
         )
 
     def _cell_volts(self) -> float:
-        """Return the voltage of a cell, V; NaN where it cannot be told."""
+        """Return the voltage of a cell, V; NaN where its cells are not counted."""
         return self._telemetry.battery.volts / self._cells if self._cells else nan
 
 

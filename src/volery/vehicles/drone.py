@@ -17,6 +17,8 @@ from volery.vehicles.vehicle import Vehicle, path_timeout, travel_timeout
 VELOCITY_LASTS_S = 3.0
 SETPOINT_LASTS_S = 1.0
 """Duration of attitudes and accelerations, which a control loop sets several times a second."""
+LANDED_STATE_WITHIN: Ns = 2 * S
+"""Time after disarming in which the landed state is reported."""
 SAFE_ACTION_WITHIN: Ns = 10 * S
 """Time for which an autopilot in a failsafe may hold before it lands or returns: 5 s by default in PX4."""
 RETURN_CLIMB = 30.0
@@ -63,7 +65,9 @@ class Drone(Vehicle):
         if height <= 0:
             raise UsageError(f"{self.name}: {asked}: give metres above home, above 0")
         telemetry = self._driver.telemetry
-        if self.flying:
+        if self.flying and not telemetry.armed:  # it has landed, and will report so
+            self._executor.wait(lambda: not telemetry.flying, LANDED_STATE_WITHIN)
+        if telemetry.flying:
             where = f"it flies already, {telemetry.above_home:.1f} m above home"
             raise Refused(self.name, asked, f"{where}; goto(position) changes its height")
         violation = height_violation(height, self.limits, telemetry.home)
