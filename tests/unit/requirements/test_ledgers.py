@@ -173,7 +173,7 @@ def test_a_vehicle_between_two_states() -> None:
 
 
 @pytest.mark.parametrize(
-    ("speed", "armed", "landed"), [(0.29, False, True), (0.3, False, False), (0.0, True, False)]
+    ("speed", "armed", "landed"), [(0.99, False, True), (1.0, False, False), (0.0, True, False)]
 )
 def test_landed_is_disarmed_and_at_rest(speed: float, armed: bool, landed: bool) -> None:
     ledger = VehicleLedger(VehicleSetup("d"))
