@@ -11,7 +11,6 @@ import threading
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple, Protocol, TypeVar, cast
-from weakref import WeakKeyDictionary
 
 from volery.base.errors import LinkSilent, VoleryError
 from volery.base.time import Ns, S, to_seconds
@@ -152,8 +151,8 @@ class ClientLibrary(Protocol):
 
 T = TypeVar("T")
 PATIENCE: Ns = 10 * S
-_waiting: WeakKeyDictionary[Kernel, list[str]] = WeakKeyDictionary()
-"""Names of the tasks that wait for a thread."""
+_waiting: dict[Kernel, list[str]] = {}
+"""Names of the tasks that wait for a thread, for kernels where there are any."""
 POLL_S = 0.05
 """Period of polling for what a client library does not announce, s."""
 
@@ -192,6 +191,8 @@ def run_in_thread(kernel: Kernel, what: str, work: Callable[[], T], within: Ns =
             raise LinkSilent(f"{what}: no answer within {to_seconds(within):g} s")
     finally:
         waiting.remove(task.name)
+        if not waiting:
+            _waiting.pop(kernel, None)
     value, error = outcome[0]
     if error is not None:
         raise error
