@@ -30,6 +30,7 @@ import numpy as np
 from native import ACTIVATIONS, JUDGING, KERNELS, costs_of, wanted
 from volery.calibration.core_measurement import core_law, isa, measure
 from volery.calibration.host_machine import this_machine
+from volery.calibration.queue_measurement import measure_queues
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native.block_costs import blocks_of, static_costs
 from volery.cost.native.compilation import (
@@ -186,7 +187,7 @@ def main() -> None:
     given = parser.parse_args()
     with TemporaryDirectory() as made:
         taken = measure(Path(made, "notes"), lambda name, done, whole: None)
-    law = core_law(this_machine("host"), isa(), taken)
+    law = core_law(this_machine("host"), isa(), taken, measure_queues())
     errors, slowdowns = [], []
     for path in sorted(KERNELS.glob("*.cpp")):
         if given.kernels and path.stem not in given.kernels:

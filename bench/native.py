@@ -10,7 +10,10 @@ when the model was finished. (The second and the third were looked at while it w
   slowdown  counting code over plain code
   A72       instructions of the kernel's own code on a Cortex-A72, against those that qemu-aarch64 executes
 
-    python bench/native.py [--rounds 9] [--no-qemu] [kernel ...]
+    python bench/native.py [--rounds 9] [--no-qemu] [--unseen] [kernel ...]
+
+With --unseen the kernels of bench/unseen_kernels, which were written before their errors were known and
+not used while the model was made.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from tempfile import TemporaryDirectory
 
 from volery.calibration.core_measurement import core_law, isa, measure
 from volery.calibration.host_machine import this_machine
+from volery.calibration.queue_measurement import measure_queues
 from volery.cost import load_catalogue
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native.block_costs import BlockCosts, traced_costs
@@ -40,6 +44,7 @@ from volery.cost.native.instrumented_run import (
 )
 
 KERNELS = Path(__file__).parent / "kernels"
+UNSEEN = Path(__file__).parent / "unseen_kernels"
 CALIBRATING, JUDGING = 0, 3
 ACTIVATIONS = 12
 MOST_TRACED = 400_000
@@ -124,7 +129,7 @@ def judge(path: Path, law: CoreLaw, rounds: int, folder: Path) -> Judged:
 def on_this_machine(paths: list[Path], rounds: int) -> None:
     with TemporaryDirectory() as made:
         taken = measure(Path(made, "notes"), lambda name, done, whole: None)
-    law = core_law(this_machine("host"), isa(), taken)
+    law = core_law(this_machine("host"), isa(), taken, measure_queues())
     print(f"this machine at {law.greatest_mhz:g} MHz; cycles of one activation with the judging input")
     print(f"{'kernel':18}{'estimated':>12}{'measured':>12}{'error':>9}{'model':>9}{'slowdown':>10}")
     judged = []
@@ -218,8 +223,10 @@ def main() -> None:
     parser.add_argument("kernels", nargs="*")
     parser.add_argument("--rounds", type=int, default=9)
     parser.add_argument("--no-qemu", action="store_true")
+    parser.add_argument("--unseen", action="store_true")
     given = parser.parse_args()
-    paths = [KERNELS / f"{name}.cpp" for name in given.kernels] or sorted(KERNELS.glob("*.cpp"))
+    folder = UNSEEN if given.unseen else KERNELS
+    paths = [folder / f"{name}.cpp" for name in given.kernels] or sorted(folder.glob("*.cpp"))
     on_this_machine(paths, given.rounds)
     if given.no_qemu or shutil.which("qemu-aarch64") is None:
         print("no qemu-aarch64 (scripts/debian-packages native qemu): instructions are not compared\n")

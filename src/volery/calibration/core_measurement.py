@@ -24,6 +24,7 @@ from typing import NamedTuple
 
 from volery.base.errors import UsageError
 from volery.calibration.host_machine import Machine
+from volery.calibration.queue_measurement import QueueSizes
 from volery.cost import Cache, CoreLaw, LibraryLaw, MemoryLaw, OperationTiming
 from volery.cost.native import llvm_toolchain, run_tool
 
@@ -109,12 +110,13 @@ IF_ODD = {
 """A branch by the lowest bit of a register whose value is available at once."""
 
 
-CHAIN, FREE, LIBRARY, MEMORY = "chain_", "free_", "library_", "memory_"
+CHAIN, FREE, LIBRARY, DELAY, MEMORY = "chain_", "free_", "library_", "delay_", "memory_"
 RANDOM, NEVER, WIDTH, FORWARDED = "branches_random", "branches_never", "width", "forward"
 SECOND, THIRD, BEHIND, ROW = "memory_second", "memory_third", "memory_behind", "memory_row"
 LARGEST_THIRD = 32 << 20
 """Largest third cache, bytes: a larger one is shared by many cores and counts as memory."""
-UNROLLED, PASSES = 48, 20
+UNROLLED, PASSES = 240, 4
+"""Links of a chain in a loop, so that its jump is negligible, and passes of the loop."""
 BRANCHES = CALLS = LOADS = 64
 """Branches, calls and lines of memory in a pass of ``measure.c``."""
 
@@ -160,7 +162,7 @@ def build(folder: Path) -> Path:
 
 def snippet_names() -> tuple[str, ...]:
     """Return the names of all snippets."""
-    library = tuple(LIBRARY + name for name in _calls())
+    library = (*(LIBRARY + name for name in _calls()), *(DELAY + name for name in _functions_of_x()))
     memory = (SECOND, THIRD, BEHIND, ROW)
     return (*(name for name, _, _ in _loops(isa()) if name != "tick"), RANDOM, NEVER, *memory, *library)
 
@@ -168,7 +170,7 @@ def snippet_names() -> tuple[str, ...]:
 def time_snippet(program: Path, name: str) -> Timing:
     """Time a snippet until its median is precise, for at most ``MOST_ROUNDS`` rounds."""
     each = {RANDOM: BRANCHES, NEVER: BRANCHES}.get(name, UNROLLED * PASSES)
-    each = CALLS if name.startswith((LIBRARY, MEMORY)) else each
+    each = CALLS if name.startswith((LIBRARY, DELAY, MEMORY)) else each
     cycles: list[float] = []
     ticks: list[float] = []
     while True:
@@ -249,6 +251,11 @@ def _calls() -> list[str]:
     return re.findall(r"^LIBRARY\((\w+),", _library(), re.MULTILINE)
 
 
+def _functions_of_x() -> list[str]:
+    """Return the names of calls whose result is a number that depends on X."""
+    return re.findall(r"^LIBRARY\((?!snprintf)(\w+),.*\bX\b", _library(), re.MULTILINE)
+
+
 def _generated(machine: str) -> str:
     """Return the text before ``measure.c``: the loops and the table of cases."""
     begin, end, (numbers, passes), changed = PROLOGUE[machine]
@@ -267,8 +274,9 @@ def _generated(machine: str) -> str:
             f'        __asm__ volatile("{begin}; .rept {times}; {snippet}; .endr; {end}"\n'
             f"                         : {numbers}(at), {passes}(left) :: {changed});\n    }}\n}}\n"
         )
-    out += [f"static void {LIBRARY}{name}(long);\n" for name in _calls()]
-    cases = [name for name, _, _ in _loops(machine)] + [LIBRARY + name for name in _calls()]
+    calls = [LIBRARY + name for name in _calls()] + [DELAY + name for name in _functions_of_x()]
+    out += [f"static void {name}(long);\n" for name in calls]
+    cases = [name for name, _, _ in _loops(machine)] + calls
     return "".join(out) + "#define CASES " + ", ".join(f'{{"{name}", {name}}}' for name in cases) + ",\n"
 
 
@@ -306,10 +314,13 @@ def noisy_snippets(taken: dict[str, Timing]) -> list[str]:
     return [name for name, one in taken.items() if not one.tight]
 
 
-WINDOW, TABLES, HISTORY = 512, 12, 60
-"""Not measured: values of a large core; the predictor's were chosen on the kernels' first two inputs."""
+TABLES, HISTORY = 12, 60
+"""Not measured: values of a large core's branch predictor, chosen on the kernels' first two inputs."""
 
 LINE_BYTES = 64.0
+
+CONVERSIONS = {"lround": 1}
+"""Conversions in the chain of a call; calls with numbers of 32 bits (``…f``) have two."""
 
 SHARE_OF_REFILL = 2.0
 """Cycles of a misprediction in which the branch itself executes: the rest is the refill."""
@@ -322,13 +333,14 @@ ALSO = {"malloc": "_Znwm", "free": "_ZdlPvm", "sin": "sincos"}
 """Symbols with the time of another one: operators new and delete, both functions of an angle."""
 
 
-def core_law(machine: Machine, isa: str, taken: Mapping[str, Timing]) -> CoreLaw:
+def core_law(machine: Machine, isa: str, taken: Mapping[str, Timing], queues: QueueSizes) -> CoreLaw:
     """Return the figures of the core. Latencies are whole cycles; below half a cycle nothing is executed.
 
     Args:
         machine: The computer.
         isa: Its instruction set.
         taken: Times of all snippets.
+        queues: Sizes of the reorder buffer and the issue queues.
     """
     operations: dict[str, OperationTiming] = {}
     for name, snippet in SNIPPETS[isa].items():
@@ -348,16 +360,17 @@ def core_law(machine: Machine, isa: str, taken: Mapping[str, Timing]) -> CoreLaw
         cpu="x86-64" if isa == "x86_64" else "generic",
         provenance="measured",
         source=f"volery calibrate processor on {machine.description}",
-        validity="the window and the prediction of branches are assumed",
+        validity=" and ".join((*queues.assumed(), "the prediction of branches")) + " are assumed",
         least_mhz=mhz * 0.5,
         greatest_mhz=mhz,
         width=_pipes(min(taken[WIDTH].cycles, taken[FREE + "increment"].cycles)),
         refill=round(max(1.0, mispredicted - SHARE_OF_REFILL), 1),
         forward=round(max(0.0, taken[FORWARDED].cycles - operations["fp_add"].latency)),
         operations=operations,
-        library=_library_law(taken),
+        library=_library_law(taken, operations),
         memory=_memory(taken, operations["load"].latency, mhz),
-        window=WINDOW,
+        window=queues.window,
+        queues=queues.issue_queues(),
         tables=TABLES,
         history=HISTORY,
     )
@@ -389,18 +402,25 @@ def _memory(taken: Mapping[str, Timing], load: float, mhz: float) -> MemoryLaw:
     )
 
 
-def _library_law(taken: Mapping[str, Timing]) -> LibraryLaw:
+def _library_law(taken: Mapping[str, Timing], operations: Mapping[str, OperationTiming]) -> LibraryLaw:
     calls = {
         name.removeprefix(LIBRARY): round(one.cycles, 1)
         for name, one in taken.items()
         if name.startswith(LIBRARY)
     }
+    latencies = {}
+    for name in _functions_of_x():
+        beside = operations["fp_multiply"].latency + operations["fp_add"].latency
+        beside += operations["convert"].latency * CONVERSIONS.get(name, 2 * name.endswith("f"))
+        latencies[name] = round(max(calls[name], taken[DELAY + name].cycles - beside), 1)
     both = calls.pop("malloc_free")
     calls |= {"malloc": round(both / 2.0, 1), "free": round(both / 2.0, 1)}
-    calls |= {symbol: calls[name] for name, symbol in ALSO.items()}
+    for figures in (calls, latencies):
+        figures |= {symbol: figures[name] for name, symbol in ALSO.items() if name in figures}
     return LibraryLaw(
         provenance="measured",
         source="calls in a row, with arguments as a robot's code has them",
         unknown=sorted(calls.values())[len(calls) // 2],
         calls=calls,
+        latencies=latencies,
     )

@@ -111,6 +111,21 @@ static void *volatile held;
 #define X arguments[i]
 #define Y others[i]
 #include "library.h"
+#undef LIBRARY
+#undef X
+
+/* The same calls, the argument of each after the result of the one before. */
+static volatile double nothing;
+#define LIBRARY(name, call)                             \
+    static void delay_##name(long passes) {             \
+        double sum = 0.0, none = nothing;               \
+        for (long pass = 0; pass < passes; ++pass)      \
+            for (int i = 0; i < 64; ++i)                \
+                sum = call;                             \
+        total = sum;                                    \
+    }
+#define X (arguments[i] + none * sum)
+#include "library.h"
 
 typedef struct {
     const char *name;

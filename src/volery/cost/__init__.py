@@ -14,7 +14,16 @@ from volery.cost.catalogue import (
     parse_catalogue,
     read_catalogue,
 )
-from volery.cost.code_laws import Cache, CodeLaw, CoreLaw, LibraryLaw, MemoryLaw, OperationTiming
+from volery.cost.code_laws import (
+    Cache,
+    CodeLaw,
+    CoreLaw,
+    IssueQueue,
+    LibraryLaw,
+    MemoryLaw,
+    OperationTiming,
+    PipeGroup,
+)
 from volery.cost.figures import (
     Figure,
     Line,
@@ -54,6 +63,7 @@ __all__ = [
     "Cost",
     "CountedPricing",
     "Figure",
+    "IssueQueue",
     "LibraryCall",
     "LibraryLaw",
     "LibraryTable",
@@ -61,6 +71,7 @@ __all__ = [
     "MemoryLaw",
     "OperationTable",
     "OperationTiming",
+    "PipeGroup",
     "PowerLaw",
     "Price",
     "Pricing",

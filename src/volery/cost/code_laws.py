@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import BaseModel, ConfigDict, Field
 
 from volery.base.errors import EstimateError
@@ -68,11 +70,35 @@ class OperationTiming(BaseModel):
     per_cycle: float
 
 
+PipeGroup = Literal["integer", "branch", "multiply", "divide", "load", "store", "vector", "slow"]
+
+
+class IssueQueue(BaseModel):
+    """Operations that wait for their operands before the pipes of these groups."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    entries: int = Field(gt=0)
+    pipes: tuple[PipeGroup, ...] = Field(min_length=1)
+
+
 class LibraryLaw(WithProvenance):
-    """Cycles of calls into libraries by symbol; any other takes ``unknown`` cycles, and a report names it."""
+    """Cycles of calls into libraries by symbol; any other takes ``unknown`` cycles, and a report names it.
+
+    Attributes:
+        unknown: Cycles of any other call.
+        calls: Cycles of a call in a row of independent ones.
+        latencies: Cycles from the argument to the result; twice the cycles where it is not stated.
+    """
 
     unknown: float
     calls: dict[str, float] = Field(default_factory=dict)
+    latencies: dict[str, float] = Field(default_factory=dict)
+
+    def cycles(self, symbol: str) -> tuple[float, float]:
+        """Return the cycles of a call and its latency."""
+        own = self.calls.get(symbol, self.unknown)
+        return own, self.latencies.get(symbol, 2.0 * own)
 
 
 class Cache(BaseModel):
@@ -113,6 +139,7 @@ class CoreLaw(WithProvenance):
         cpu: Processor that code is generated for, LLVM's name.
         width: Instructions that enter per cycle.
         window: Entries of the reorder buffer.
+        queues: Issue queues; operations of a group of pipes without one never wait for a free entry.
         refill: Cycles from the end of a mispredicted branch to the next instruction.
         forward: Cycles from a store to a load of the same address (store-to-load forwarding).
         tables: Tagged tables of the branch predictor.
@@ -127,6 +154,7 @@ class CoreLaw(WithProvenance):
     greatest_mhz: float
     width: float
     window: int
+    queues: tuple[IssueQueue, ...] = ()
     refill: float
     forward: float
     tables: int

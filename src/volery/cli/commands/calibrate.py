@@ -84,7 +84,7 @@ def ros(
 
     check_client(client, python)  # before any file is made
     plan = Plan(*rounds, within / 100.0)
-    machine = this_machine(name)
+    machine = this_machine(name, catalogue=out)
     rounds_file = out.with_name(f"{out.name}.{client}.rounds")
     complete = True
     with at_frequency(machine, frequency) as mhz:
@@ -182,7 +182,7 @@ def python(
     from volery.calibration.timed_code import Rounds
 
     limits = Rounds(*rounds, within / 100.0)
-    machine = this_machine(name)
+    machine = this_machine(name, catalogue=out)
     with (
         at_frequency(machine, frequency) as mhz,
         _progress_bar(output, "calibrating python", "warming up") as update,
@@ -300,8 +300,9 @@ def processor(output: Output, out: CatalogueFile = CATALOGUE, name: EntryName = 
     """
     from volery.calibration.core_measurement import core_law, isa, measure, noisy_snippets
     from volery.calibration.host_machine import put_law, this_machine
+    from volery.calibration.queue_measurement import measure_queues
 
-    machine, here = this_machine(name), isa()
+    machine, here = this_machine(name, catalogue=out), isa()
     log = out.with_name(f"{out.name}.notes")
     bar = Progress(TextColumn("{task.description}"), BarColumn(), console=output.notes)
     bar.disable = not output.shows_progress
@@ -310,7 +311,7 @@ def processor(output: Output, out: CatalogueFile = CATALOGUE, name: EntryName = 
         measured = measure(
             log, lambda name, done, whole: bar.update(line, description=name, completed=done, total=whole)
         )
-    law = core_law(machine, here, measured)
+    law = core_law(machine, here, measured, measure_queues())
     frequencies = law.least_mhz, law.greatest_mhz
     put_law(out, machine, ("core_model",), law.model_copy(update={"name": ""}), frequencies)
     log.unlink(missing_ok=True)

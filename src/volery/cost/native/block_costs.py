@@ -199,6 +199,7 @@ def execute(
         sequence.blocks, sequence.taken, tables.first, tables.table, tables.operations, tables.capacity,
         tables.core, tables.slots, tables.library, tables.histories, sequence.misses,
         np.concatenate([tables.levels, last]), 0.0 if memory_cycles is None else memory_cycles[1],
+        tables.entries,
     )  # fmt: skip
 
 

@@ -1,13 +1,15 @@
 """Model of a superscalar core with out-of-order execution, driven by the machine blocks that ran.
 
-Instructions enter the reorder buffer in order, ``width`` slots a cycle. An instruction executes when its
-operands are available and a pipe is free, and retires in order. A store is identified by the text of its
-address and the versions of the registers in it: a load of the same address is forwarded from it, and a load
-of parts of several stores waits until they have retired. Computed jumps are predicted by their last target
-with the same history. After a misprediction nothing enters until the branch is done and ``refill`` cycles
-have passed. A library call occupies the front end for its cycles, and its result is available after twice as
-many. An access hits the first cache, or is served by the level in the trace. Memory delivers one line at a
-time: a prefetched line is available as soon as memory can deliver it, any other after the latency as well.
+Instructions enter the reorder buffer in order, ``width`` slots a cycle. An operation waits in the issue queue
+of its pipes until its operands are available and a pipe is free, the oldest first; nothing enters while the
+queue that the next instruction needs is full. Instructions retire in order. A store is identified by the text
+of its address and the versions of the registers in it: a load of the same address is forwarded from it, and a
+load of parts of several stores waits until they have retired. Computed jumps are predicted by their last
+target with the same history. After a misprediction nothing enters until the branch is done and ``refill``
+cycles have passed. A library call occupies the front end for its cycles, and its result is available after
+its latency. An access hits the first cache, or is served by the level in the trace. Memory delivers one line
+at a time: a prefetched line is available as soon as memory can deliver it, any other after the latency as
+well.
 
 Branches are predicted by a simplified TAGE (Seznec and Michaud, JILP 8, 2006): a table of counters by branch,
 and tagged tables by branch and by ever longer histories of taken branches. The longest history with an entry
@@ -155,7 +157,7 @@ COLUMNS = FIRST_BUMP + BUMPS
 PLAIN, CONDITIONAL, COMPUTED, LIBRARY, JUMP = range(5)
 
 # columns of the operation table
-LATENCY, KIND_OF, GROUP = range(3)
+LATENCY, KIND_OF, GROUP, QUEUE = range(4)
 # entries of the vector of the core's figures
 WIDTH, WINDOW, REFILL, FORWARD = range(4)
 # columns of the table of cache misses
@@ -196,6 +198,36 @@ def _first_free(used: Array, capacity: Array, pipes: int, ready: float, need: fl
 
 
 @numeric
+def _queued_until(queues: Array, operations: Array, one: Array) -> float:
+    """Return when each issue queue that an instruction needs has a free entry."""
+    at = 0.0
+    for column in (LOAD, OPERATION, STORE):
+        if one[column] >= 0 and operations[one[column], QUEUE] >= 0.0:
+            at = max(at, queues[int(operations[one[column], QUEUE]), 0])
+    return float(at)
+
+
+@numeric
+def _occupy(queues: Array, operation: Array, until: float) -> None:
+    """Occupy the first free entry of an operation's issue queue ``until`` it executes.
+
+    A queue is a heap of the times at which its entries become free; entries that it lacks never do.
+    """
+    if operation[QUEUE] < 0.0:
+        return
+    heap = queues[int(operation[QUEUE])]
+    at, below = 0, 1
+    while below < len(heap):
+        if below + 1 < len(heap) and heap[below + 1] < heap[below]:
+            below += 1
+        if heap[below] >= until:
+            break
+        heap[at] = heap[below]
+        at, below = below, 2 * below + 1
+    heap[at] = until
+
+
+@numeric
 def _record_store(
     keys: Array, times: Array, key: np.int64, one: Array, number: int, done: float, leaves: float
 ) -> None:
@@ -231,11 +263,11 @@ def _forward(keys: Array, times: Array, key: np.int64, one: Array, start: float,
 
 @numeric
 def _load(used: Array, capacity: Array, operation: Array, at: float, times: int) -> float:
-    """Return when the last of ``times`` loads has its value from the first cache."""
+    """Return when the last of ``times`` loads starts."""
     started = at
     for _ in range(times):
         started = _issue(used, capacity, operation, at, 1.0)
-    return float(started + operation[LATENCY])
+    return float(started)
 
 
 @numeric
@@ -325,8 +357,8 @@ def _predict(
 
 _ARGUMENTS = (
     "int64[::1]", "int8[::1]", "int64[::1]", "int64[:,::1]", "float64[:,::1]", "float64[::1]", "float64[::1]",
-    "float64[::1]", "float64[::1]", "int64[::1]", "int64[:,::1]", "float64[::1]", "float64",
-    "float64[::1]", "float64[::1]",
+    "float64[::1]", "float64[:,::1]", "int64[::1]", "int64[:,::1]", "float64[::1]", "float64",
+    "float64[::1]", "float64[::1]", "float64[:,::1]",
     "float64[::1]", "int64[::1]", "float64[:,:,::1]", "float64[::1]", "int64[:,::1]", "float64[:,::1]",
     "int64[::1]", "int64[::1]", "int64[:,:,::1]", "int64[::1]", "int64[:,::1]", "int64[::1]",
 )  # fmt: skip
@@ -337,7 +369,7 @@ def _compose(digest: str) -> Callable[..., int]:
     def execute_blocks(
         blocks: Array, taken: Array, first: Array, table: Array, operations: Array, capacity: Array,
         core: Array, slots: Array, library: Array, histories: Array, misses: Array, levels: Array,
-        line: float, cost: Array, stalled: Array,
+        line: float, cost: Array, stalled: Array, queues: Array,
         ready: Array, version: Array, used: Array, leaves: Array, stored_key: Array, stored: Array,
         targets: Array, base: Array, tagged: Array, record: Array, folds: Array, position: Array,
     ) -> int:  # fmt: skip
@@ -354,18 +386,21 @@ def _compose(digest: str) -> Callable[..., int]:
                 one = table[row]
                 enters = max(enters + slots[row] / core[WIDTH], leaves[number % window])
                 if one[KIND] == LIBRARY:
-                    done = max(enters, ready[0], ready[1]) + 2.0 * library[row]
-                    enters += library[row]
+                    done = max(enters, ready[0], ready[1]) + library[row, 1]
+                    enters += library[row, 0]
                     ready[0] = ready[1] = done
                 else:
+                    enters = max(enters, _queued_until(queues, operations, one))
                     at = _available(one[FIRST_ADDRESS:FIRST_WRITE], ready, enters)
                     done = _available(one[FIRST_READ:FIRST_ADDRESS], ready, enters)
                     place = _address(one, version) if one[PLACE] != 0 else np.int64(0)
                     last_miss = _end_of_misses(misses, next_miss, step, row)
                     if one[LOAD] >= 0:
-                        loaded = _load(used, capacity, operations[one[LOAD]], at, one[LOADS])
+                        operation = operations[one[LOAD]]
+                        starts = _load(used, capacity, operation, at, one[LOADS])
+                        _occupy(queues, operation, starts)
                         arrives, free = _fetch_lines(misses, next_miss, last_miss, levels, line, at, free)
-                        done = max(done, loaded, arrives)
+                        done = max(done, starts + operation[LATENCY], arrives)
                         if one[PLACE] != 0:
                             done = max(done, _forward(stored_key, stored, place, one, at, core[FORWARD]))
                     else:
@@ -373,9 +408,13 @@ def _compose(digest: str) -> Callable[..., int]:
                     next_miss = last_miss
                     if one[OPERATION] >= 0:
                         operation = operations[one[OPERATION]]
-                        done = _issue(used, capacity, operation, done, float(one[TIMES])) + operation[LATENCY]
+                        starts = _issue(used, capacity, operation, done, float(one[TIMES]))
+                        _occupy(queues, operation, starts)
+                        done = starts + operation[LATENCY]
                     if one[STORE] >= 0:
-                        done = max(done, _issue(used, capacity, operations[one[STORE]], at, 1.0))
+                        starts = _issue(used, capacity, operations[one[STORE]], at, 1.0)
+                        _occupy(queues, operations[one[STORE]], starts)
+                        done = max(done, starts)
                         if one[PLACE] != 0:
                             _record_store(stored_key, stored, place, one, number, done, max(done, retired))
                     changes = _write_registers(one[FIRST_WRITE:FIRST_BUMP], ready, version, done, changes)
@@ -396,12 +435,20 @@ def _compose(digest: str) -> Callable[..., int]:
     return execute_blocks
 
 
+def _empty_queues(entries: Array) -> Array:
+    """Return the heaps of the issue queues, rows of one length."""
+    queues = np.full((len(entries), max(entries, default=1)), np.inf)
+    for queue, size in enumerate(entries):
+        queues[queue, :size] = 0.0
+    return queues
+
+
 execute_blocks = NumericCode("execute_blocks", _compose, (Path(__file__),), _ARGUMENTS)
 
 
 def run(
     blocks: Array, taken: Array, first: Array, table: Array, operations: Array, capacity: Array, core: Array,
-    slots: Array, library: Array, histories: Array, misses: Array, levels: Array, line: float,
+    slots: Array, library: Array, histories: Array, misses: Array, levels: Array, line: float, entries: Array,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Execute machine blocks.
 
@@ -414,11 +461,12 @@ def run(
         capacity: Capacity of the pipes per cycle.
         core: Width, window, refill and forwarding.
         slots: Slots of the front end by row.
-        library: Cycles of a library call by row.
+        library: Cycles and latency of a library call by row.
         histories: Lengths of the branch predictor's histories.
         misses: Accesses that the first cache does not serve, in order.
         levels: Latency of each level, cycles.
         line: Cycles in which memory delivers a line, 0 where it is a level like the others.
+        entries: Entries of each issue queue.
 
     Returns:
         Cycles from the end of the block before to the end of each block, and how many of them nothing entered
@@ -444,7 +492,7 @@ def run(
         for declared, value in zip(_ARGUMENTS, stated, strict=False)
     ]
     execute_blocks.bind(
-        *arrays, line, cost, stalled,
+        *arrays, line, cost, stalled, _empty_queues(entries),
         np.zeros(REGISTERS), np.zeros(REGISTERS, dtype=np.int64),
         np.full((len(capacity), SLOT_CYCLES, 2), -1.0),
         np.zeros(int(core[WINDOW])),

@@ -46,12 +46,13 @@ class InstructionTables:
         first: First row of each machine block, and one more.
         table: Instructions, one a row.
         slots: Slots of the front end by instruction.
-        library: Cycles of a library call by instruction.
-        operations: Classes of operations: latency, own pipes, group's pipes.
+        library: Cycles and latency of a library call by instruction.
+        operations: Classes of operations: latency, own pipes, group's pipes, issue queue.
         capacity: Operations that pipes start per cycle.
         core: Width, window, refill and forwarding of the core.
         histories: Lengths of the branch predictor's histories.
         levels: Latencies of the caches, from the first on.
+        entries: Entries of each issue queue.
     """
 
     first: Array
@@ -63,6 +64,7 @@ class InstructionTables:
     core: Array
     histories: Array
     levels: Array
+    entries: Array
 
     def instructions(self, block: int) -> int:
         """Return the number of instructions of a machine block."""
@@ -97,7 +99,7 @@ def instruction_tables(
                 and "flags" in before.writes
             )
             slots.append(0.0 if fused else effect.slots)
-            library.append(_library_cycles(block, defined, law, rows[-1]) if last else 0.0)
+            library.append(_library_cycles(block, defined, law, rows[-1]) if last else (0.0, 0.0))
             if last and block.end is End.BRANCH:
                 rows[-1][core_model.KIND] = core_model.CONDITIONAL
             elif last and block.end is End.COMPUTED:
@@ -113,21 +115,24 @@ def instruction_tables(
         np.array(first),
         table,
         np.array(slots),
-        np.array(library),
+        np.array(library).reshape(-1, 2),
         operations,
         capacity,
         core,
         history_lengths(law.tables, law.history),
         np.array([one.latency for one in law.memory.caches] if law.memory else [0.0]),
+        np.array([one.entries for one in law.queues], dtype=np.int64),
     )
 
 
-def _library_cycles(block: MachineBlock, defined: frozenset[str], law: CoreLaw, row: list[int]) -> float:
-    """Return the cycles of the library call that a block ends with, and mark its row; else 0."""
+def _library_cycles(
+    block: MachineBlock, defined: frozenset[str], law: CoreLaw, row: list[int]
+) -> tuple[float, float]:
+    """Return cycles and latency of the library call that a block ends with, and mark its row; else 0."""
     if not block.calls_library(defined):
-        return 0.0
+        return 0.0, 0.0
     row[core_model.KIND] = core_model.LIBRARY
-    return law.library.calls.get(block.target, law.library.unknown)
+    return law.library.cycles(block.target)
 
 
 def _row(effect: Effect, known: dict[str, int], places: dict[str, int]) -> list[int]:
@@ -151,15 +156,17 @@ def _row(effect: Effect, known: dict[str, int], places: dict[str, int]) -> list[
 
 
 def _operation_table(law: CoreLaw) -> tuple[Array, Array]:
-    """Return the classes of operations (latency, own pipes, group's pipes) and the pipes' capacity."""
+    """Return the classes of operations (latency, own pipes, group's, queue) and the pipes' capacity."""
     groups = sorted(set(GROUPS.values()))
+    queues: dict[str, int] = {group: number for number, one in enumerate(law.queues) for group in one.pipes}
     capacity = np.zeros(len(OPERATION_CLASSES) + len(groups))
-    table = np.zeros((len(OPERATION_CLASSES), 3))
+    table = np.zeros((len(OPERATION_CLASSES), 4))
     for number, name in enumerate(OPERATION_CLASSES):
         operation = law.operations[name]
         renamed = operation.latency < 0.5  # eliminated by register renaming: it takes no pipe
         group = number if renamed else len(OPERATION_CLASSES) + groups.index(GROUPS[name])
         capacity[number] = operation.per_cycle
         capacity[group] = max(capacity[group], operation.per_cycle)
-        table[number] = (operation.latency, number, group)
+        queue = -1 if renamed else queues.get(GROUPS[name], -1)
+        table[number] = (operation.latency, number, group, queue)
     return table, capacity

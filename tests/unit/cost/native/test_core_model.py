@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from volery.cost import load_catalogue
+from volery.cost import IssueQueue, LibraryLaw, load_catalogue
 from volery.cost.native.block_costs import ExecutionSequence, execute
 from volery.cost.native.instruction_tables import instruction_tables
 from volery.cost.native.machine_code import End, Instruction, MachineBlock
@@ -104,3 +104,61 @@ def test_prefetched_lines_take_the_time_of_a_line():
 
 def test_a_store_miss_delays_no_instruction():
     assert late("mov qword ptr [rbx], rax", level=3, memory=MEMORY) == cycles("mov qword ptr [rbx], rax")
+
+
+def two_misses(between: int, first: str, second: str, queues: tuple[IssueQueue, ...] = LAW.queues) -> float:
+    """Cycles of one pass with two loads from memory, and operations after each that may wait for it."""
+    lines = [CHAIN, *[first] * between, "mov rcx, qword ptr [rcx]", *[second] * between]
+    ran = np.zeros(REPEATS, dtype=np.int64)
+    rows = np.array([(step, row, 3, 0) for step in range(REPEATS) for row in (0, between + 1)])
+    encoded = instruction_tables([piece(*lines)], LAW.model_copy(update={"queues": queues}), frozenset())
+    took, _ = execute(encoded, ExecutionSequence(ran, np.zeros(REPEATS, dtype=np.int8), rows), MEMORY)
+    return float(took.sum()) / REPEATS
+
+
+WAITING = ("add rdx, rax", "add rsi, rcx")
+OVERLAP, NO_OVERLAP = 1.4 * MEMORY[0], 1.8 * MEMORY[0]
+
+
+def test_a_full_issue_queue_stops_what_follows():
+    (queue,) = LAW.queues
+    assert two_misses(queue.entries - 4, *WAITING) < OVERLAP
+    assert two_misses(queue.entries + 4, *WAITING) > NO_OVERLAP
+
+
+def test_operations_that_execute_leave_the_issue_queue():
+    (queue,) = LAW.queues
+    assert two_misses(queue.entries + 4, "add rdx, rbx", "add rsi, rbx") < OVERLAP
+
+
+def test_operations_wait_in_the_queue_of_their_pipes():
+    small, large = (IssueQueue(entries=entries, pipes=("integer",)) for entries in (4, 90))
+    vector = IssueQueue(entries=4, pipes=("vector",))
+    assert two_misses(60, *WAITING, queues=(vector, large)) < OVERLAP
+    assert two_misses(60, *WAITING, queues=(vector,)) < OVERLAP
+    assert two_misses(60, *WAITING, queues=(small,)) > NO_OVERLAP
+
+
+def call_of(symbol: str, latencies: dict[str, float], *more: str) -> float:
+    library = LibraryLaw(
+        provenance="measured", source="test", unknown=50.0, calls={"f": 20.0}, latencies=latencies
+    )
+    law = LAW.model_copy(update={"library": library})
+    block = piece(*more, f"call {symbol}", end=End.CALL)
+    block.target = symbol
+    ran = np.zeros(REPEATS, dtype=np.int64)
+    took, _ = execute(
+        instruction_tables([block], law, frozenset()),
+        ExecutionSequence(ran, np.zeros(REPEATS, dtype=np.int8)),
+    )
+    return float(took.sum()) / REPEATS
+
+
+def test_calls_of_which_each_needs_the_result_before_take_their_latency():
+    assert call_of("f", {"f": 70.0}) == pytest.approx(70.0, rel=0.05)
+    assert call_of("f", {}) == pytest.approx(40.0, rel=0.05)  # twice the cycles where none is stated
+    assert call_of("g", {}) == pytest.approx(100.0, rel=0.05)
+
+
+def test_independent_calls_take_their_cycles():
+    assert call_of("f", {"f": 70.0}, "xor eax, eax", "xorps xmm0, xmm0") == pytest.approx(20.0, rel=0.1)
