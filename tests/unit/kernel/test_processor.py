@@ -11,7 +11,7 @@ from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.kernel.network import Network
 from volery.kernel.processor import Processor
-from volery.kernel.task import ExecutionContext
+from volery.kernel.task import ExecutionContext, Scope
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import current_task, executing_in
 from volery.trace.events import Event, Preemption
@@ -366,3 +366,97 @@ def test_preemptions_are_recorded_with_both_jobs(virtual: VirtualKernel, events:
     virtual.run(S)
     told = [event for event in events if isinstance(event, Preemption)]
     assert told == [Preemption(4 * MS, "cpu", 0, "low", "high")]
+
+
+def test_busy_time_leaves_out_jobs_that_wait_for_a_core(virtual: VirtualKernel) -> None:
+    core = Processor(virtual, "cpu")
+    compute(virtual, core, "a", at=0, ms=4)
+    compute(virtual, core, "b", at=1, ms=4)
+    seen: list[float] = []
+    for when in (3, 6):
+        virtual.call_at(when * MS, lambda: seen.append(core.busy_ns(virtual.now()) / MS))
+    virtual.run(S)
+    assert seen == [3, 6]
+
+
+def test_a_halted_processor_continues_where_it_stopped(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu")
+    compute(virtual, core, "a", at=0, ms=6, priority=2)
+    compute(virtual, core, "b", at=3, ms=1, priority=1)
+    virtual.call_at(2 * MS, core.halt)
+    seen: list[float] = []
+    virtual.call_at(8 * MS, lambda: seen.append(core.busy_ns(virtual.now()) / MS))
+    virtual.call_at(10 * MS, core.resume)
+    virtual.run(S)
+    assert slices() == [(0, 2, "cpu.0", "a"), (10, 14, "cpu.0", "a"), (14, 15, "cpu.0", "b")]
+    assert seen == [2]
+
+
+def test_a_job_that_ends_at_the_instant_of_a_halt_is_complete(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu")
+    done: list[int] = []
+
+    def body() -> None:
+        virtual.sleep_until(MS)
+        virtual.consume(4 * MS)
+        with virtual:
+            done.append(virtual.now())
+
+    virtual.call_at(5 * MS, core.halt)  # asked for before the timer of the job
+    virtual.spawn(body, "a", ExecutionContext("a", core))
+    virtual.run(S)
+    assert done == [5 * MS]
+    assert slices() == [(1, 5, "cpu.0", "a")]
+
+
+def test_nothing_starts_on_a_halted_processor(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu")
+    core.halt()
+    compute(virtual, core, "a", at=1, ms=2)
+    virtual.call_at(5 * MS, core.resume)
+    virtual.run(S)
+    assert slices() == [(5, 7, "cpu.0", "a")]
+
+
+def test_background_computing_that_waits_for_a_core_can_grow(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu")
+    node = ExecutionContext("node", core, 1)
+    compute(virtual, core, "high", at=0, ms=5, priority=9)
+    for when in (1, 2):
+        virtual.call_at(when * MS, lambda: core.load(node, 2 * MS))
+    virtual.run(S)
+    assert slices() == [(0, 5, "cpu.0", "high"), (5, 9, "cpu.0", "node")]
+
+
+def test_background_computing_has_the_deadline_of_its_context(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu", scheduler="edf")
+    late, soon = (ExecutionContext(name, core, deadline=ms * MS) for name, ms in (("late", 50), ("soon", 20)))
+    virtual.call_at(0, lambda: core.load(late, 4 * MS))
+    virtual.call_at(MS, lambda: core.load(soon, 2 * MS))
+    compute(virtual, core, "without", at=0, ms=1, priority=9)
+    virtual.run(S)
+    assert slices() == [
+        (0, 1, "cpu.0", "late"),
+        (1, 3, "cpu.0", "soon"),
+        (3, 6, "cpu.0", "late"),
+        (6, 7, "cpu.0", "without"),
+    ]
+
+
+@pytest.mark.parametrize("of", ["the job that runs", "a job that waits"])
+def test_a_cancelled_task_leaves_its_core_to_the_next(
+    virtual: VirtualKernel, slices: Slices, of: str
+) -> None:
+    core = Processor(virtual, "cpu")
+    scope = Scope("mission", virtual.root)
+
+    def body() -> None:
+        virtual.consume(20 * MS)
+
+    first, second = (9, 1) if of == "the job that runs" else (1, 9)
+    virtual.spawn(body, "cancelled", ExecutionContext("cancelled", core, first), scope)
+    compute(virtual, core, "other", at=0, ms=6, priority=second)
+    virtual.call_at(3 * MS, lambda: virtual.cancel(scope, "enough"))
+    virtual.run(S)
+    other = [(3, 9, "cpu.0", "other")] if first > second else [(0, 6, "cpu.0", "other")]
+    assert slices() == ([(0, 3, "cpu.0", "cancelled")] if first > second else []) + other

@@ -378,3 +378,43 @@ def test_the_watchdog_reports_only_the_task_that_does_not_block() -> None:
 def test_the_watchdogs_patience_must_be_positive() -> None:
     with pytest.raises(UsageError, match="above 0"):
         VirtualKernel(watchdog_s=0.0)
+
+
+def test_a_sleep_until_now_hands_over_to_no_other_task(virtual: VirtualKernel, spawn: Spawn) -> None:
+    seen: list[str] = []
+
+    def sleeper() -> None:
+        virtual.sleep_until(MS)
+        seen.append("before")
+        virtual.sleep_until(virtual.now())
+        seen.append("after")
+
+    def other() -> None:
+        virtual.sleep_until(MS)
+        seen.append("other")
+
+    spawn(sleeper, "sleeper")
+    spawn(other, "other")
+    virtual.run(S)
+    assert seen == ["before", "after", "other"]
+
+
+def test_with_a_pace_a_lone_task_waits_for_the_wall_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    waits: list[int] = []
+    wait = Pacer.wait
+
+    def waiting(pacer: Pacer, now: int, when: int) -> int | None:
+        waits.append(when)
+        return wait(pacer, now, when)
+
+    monkeypatch.setattr(Pacer, "wait", waiting)
+    kernel = VirtualKernel(pace=1e6)
+
+    def body() -> None:
+        for number in range(1, 4):
+            kernel.sleep_until(number * MS)
+
+    kernel.spawn(body, "sleeper", ExecutionContext("sleeper"))
+    kernel.run(S)
+    kernel.close()
+    assert {MS, 2 * MS, 3 * MS} <= set(waits)
