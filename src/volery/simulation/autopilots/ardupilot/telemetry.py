@@ -380,7 +380,7 @@ def sys_status(vehicle: Vehicle, health: Health) -> Fields:
     if vehicle.parameters["FENCE_ENABLE"]:
         enabled |= GEOFENCE
         healthy = healthy & ~GEOFENCE if "fence" in vehicle.failsafes.active else healthy | GEOFENCE
-    if age > FIX_AFTER and vehicle.estimate.gps.fix_type == 0:
+    if age > FIX_AFTER and vehicle.estimate.fix_type == 0:
         healthy &= ~GPS
     volts, amps, left = _battery(vehicle)
     return {

@@ -6,7 +6,7 @@ Only topics with subscribers are built and published, which saves hundreds of me
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import cos, radians
 from typing import Any, NamedTuple
@@ -219,6 +219,10 @@ SUBSCRIBER_CHECK_PERIOD: Ns = 200 * MS
 JOY = "sensor_msgs/msg/Joy"
 
 
+def _raise(_index: int, error: Exception) -> None:
+    raise error
+
+
 class _TopicGroup:
     """Topics of one period."""
 
@@ -241,11 +245,9 @@ class _TopicGroup:
         self._round += 1
         if not self._subscribed or not self._endpoint.is_active:
             return
-        stamp = self._endpoint.stamp()
-        for topic, publisher in self._subscribed:
-            message = topic.build(self._endpoint.controller, stamp)
-            if message is not None:
-                publisher.publish(message)
+        stamp, controller = self._endpoint.stamp(), self._endpoint.controller
+        built = [(publisher, topic.build(controller, stamp)) for topic, publisher in self._subscribed]
+        self._endpoint.publish([one for one in built if one[1] is not None])
 
 
 class DjiEndpoint:
@@ -280,6 +282,11 @@ class DjiEndpoint:
         return (self._graph.epoch if self._graph else 0) + self._kernel.now()
 
     # -- ROS graph
+
+    def publish(self, messages: Sequence[tuple[Publisher, Any]]) -> None:
+        """Publish messages that were built for this call."""
+        if self._node is not None and messages:
+            self._node.publish_all(messages, _raise)
 
     def join(self, graph: RosGraph, namespace: str, place: ExecutionContext) -> None:
         """Serve on a graph.

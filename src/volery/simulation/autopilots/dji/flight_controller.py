@@ -96,6 +96,7 @@ class FlightController:
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
         self._activates_at_power_on = False
+        self._aircraft = vehicle.parameters.changes, aircraft_type(vehicle.parameters)
         vehicle.rc.transmitter[SWITCH - 1] = SWITCH_PULSES[GRANTS_AT[self.aircraft][0]]
         self.reset()
 
@@ -123,7 +124,10 @@ class FlightController:
     @property
     def aircraft(self) -> str:
         """Type of the aircraft, such as A3 or M100."""
-        return aircraft_type(self.vehicle.parameters)
+        parameters = self.vehicle.parameters
+        if self._aircraft[0] != parameters.changes:
+            self._aircraft = parameters.changes, aircraft_type(parameters)
+        return self._aircraft[1]
 
     @property
     def rc_connected(self) -> bool:
@@ -174,7 +178,7 @@ class FlightController:
     def gps_health(self) -> int:
         """GPS health, 0 to 5; 0 until the position is trusted, and again without satellites."""
         vehicle = self.vehicle
-        good = vehicle.has_position and vehicle.estimate.gps.fix_type >= 3
+        good = vehicle.has_position and vehicle.estimate.fix_type >= 3
         return HOME_IS_LEVEL if good else HOME_IS_UNKNOWN
 
     def place(self) -> tuple[float, float, float]:
@@ -186,7 +190,7 @@ class FlightController:
         if vehicle.uptime() < vehicle.rules.startup.origin_after:
             return 0.0, 0.0, 0.0
         latitude, longitude, amsl = vehicle.estimate.geodetic
-        if vehicle.estimate.gps.fix_type >= 3 and vehicle.estimate.position_ok:
+        if vehicle.estimate.fix_type >= 3 and vehicle.estimate.position_ok:
             self._place = (latitude, longitude)
         return *self._place, amsl + vehicle.parameters["PRESSURE_OFFSET"]
 

@@ -372,6 +372,11 @@ class Estimate:
         return distance if distance >= 0.0 else None
 
     @property
+    def fix_type(self) -> int:
+        """MAVLink GPS_FIX_TYPE of the receiver's last sample."""
+        return int(self._sensed[M_GPS_FIX - M_GYRO])
+
+    @property
     def gps(self) -> GpsFix:
         """The receiver's last fix."""
         if self._fix is None:

@@ -109,7 +109,7 @@ def fix_type(vehicle: Vehicle) -> int:
     """Return the fix type of GPS_INT: 0 none, 3 3D, 4 differential, 5 RTK (MAVLink has two RTK types)."""
     if vehicle.uptime() < ACQUIRED_AFTER:
         return 0
-    return min(5, vehicle.estimate.gps.fix_type)
+    return min(5, vehicle.estimate.fix_type)
 
 
 def fix_is_valid(vehicle: Vehicle) -> bool:

@@ -358,7 +358,7 @@ def sys_status(vehicle: Vehicle) -> Fields:
     healthy = HEALTHY
     if commander_of(vehicle).armable or vehicle.armed:
         healthy |= PREARM
-    if estimate.gps.fix_type == 0:
+    if estimate.fix_type == 0:
         healthy &= ~GPS
     return {
         "onboard_control_sensors_present": PRESENT,
