@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -32,12 +32,16 @@ class Machine:
     frequency_mhz: float
 
 
-def this_machine(name: str = "", cpuinfo: Path = CPUINFO) -> Machine:
+def this_machine(name: str = "", cpuinfo: Path = CPUINFO, catalogue: Path | None = None) -> Machine:
     """Return this computer as Linux describes it.
+
+    A computer whose frequency cannot be fixed reports another one at each look. So that all its laws hold
+    together, the frequency is that of its entry in the catalogue, once there is one.
 
     Args:
         name: Name for models; by default it is made from the description.
         cpuinfo: File with the description.
+        catalogue: File that the entry of the computer is written to.
 
     Raises:
         UsageError: There is no description, or no frequency in it.
@@ -52,7 +56,20 @@ def this_machine(name: str = "", cpuinfo: Path = CPUINFO) -> Machine:
     mhz = median(reported) if reported else _scaled_mhz()
     plain = re.sub(r"\((?:R|TM)\)|@.*| CPU| Processor", "", description)
     short = re.sub(r"[^a-z0-9]+", "-", plain.lower()).strip("-")
-    return Machine(name or short, description, os.cpu_count() or 1, float(round(mhz)))
+    machine = Machine(name or short, description, os.cpu_count() or 1, float(round(mhz)))
+    return replace(machine, frequency_mhz=_entry_mhz(catalogue, machine) or machine.frequency_mhz)
+
+
+def _entry_mhz(catalogue: Path | None, machine: Machine) -> float | None:
+    """Return the frequency of the machine's entry; None if there is none, or several frequencies."""
+    if catalogue is None or not catalogue.exists():
+        return None
+    entry = parse_catalogue(catalogue.read_text(encoding="utf-8"), str(catalogue)).processors.get(
+        machine.name
+    )
+    if entry is None or entry.description != machine.description or entry.least_mhz != entry.greatest_mhz:
+        return None
+    return entry.least_mhz
 
 
 def _scaled_mhz() -> float:

@@ -31,7 +31,7 @@ VOLERY = str(Path(sys.executable).with_name("volery"))
 PACE = Pace(block_ms=100.0, period_ms=10.0, sleeps_ms=(5.0, 20.0), counts=(1, 2))
 MACHINE = Machine("here", "this machine", 2, 2000.0)
 SAID = {"publish", "publish_next", "sleep", "wait", "receive", "connect", "accept", "init", "node_handle"}
-SAID |= {"advertise", "subscribe", "service_client", "advertise_service"}
+SAID |= {"advertise", "subscribe", "service_client", "advertise_service", "call_service", "serve"}
 
 NODE = """
 import rospy
@@ -95,6 +95,9 @@ def test_both_libraries_are_calibrated(ros: None, tmp_path: Path) -> None:
         assert set(these["sleep"].points) == {5000.0, 20000.0}
         assert these["init"].typical > 0.0
         assert these["sleep"].typical > 0.0
+        assert set(these["publish_next"].points) == {2.0, 8.0}
+        assert these["call_service"].typical > 0.0
+        assert these["serve"].typical > 0.0
         under = Conditions(client, MACHINE.description, MACHINE.frequency_mhz)
         write_entry(tmp_path / "catalogue.yaml", MACHINE, ros_law(these, under))
     entry = load_catalogue(tmp_path / "catalogue.yaml").processor("here")

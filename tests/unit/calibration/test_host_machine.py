@@ -3,7 +3,8 @@ from pathlib import Path
 import pytest
 
 from volery.base.errors import UsageError
-from volery.calibration.host_machine import Machine, at_frequency, this_machine
+from volery.calibration.host_machine import Machine, at_frequency, put_law, this_machine
+from volery.cost import CodeLaw, Figure
 
 INTEL = "model name\t: Intel(R) Core(TM) i5-3470 CPU @ 3.20GHz\ncpu MHz\t\t: 1599.998\n" * 2
 
@@ -51,3 +52,20 @@ def test_the_frequency_is_set_on_all_cores_and_restored(tmp_path: Path) -> None:
         assert mhz == 1300.0
         assert {file.read_text() for file in limits} == {"1300000"}
     assert {file: file.read_text() for file in limits} == limits
+
+
+def test_a_host_keeps_the_frequency_of_its_entry(tmp_path: Path) -> None:
+    """The reported one varies from moment to moment; laws of one host must hold together."""
+    catalogue = tmp_path / "catalogue.yaml"
+    law = CodeLaw(
+        language="python",
+        provenance="measured",
+        source="a test",
+        slowdown=Figure(value=1.0, provenance="measured", source="a test"),
+        at_mhz=1600.0,
+    )
+    put_law(catalogue, this_machine(cpuinfo=cpuinfo(tmp_path)), ("code", "python"), law, (1600.0, 1600.0))
+    now = cpuinfo(tmp_path, INTEL.replace("1599.998", "3040.0"))
+    assert this_machine(cpuinfo=now, catalogue=catalogue).frequency_mhz == 1600.0
+    assert this_machine(cpuinfo=now).frequency_mhz == 3040.0
+    assert this_machine("desk", cpuinfo=now, catalogue=catalogue).frequency_mhz == 3040.0

@@ -60,7 +60,13 @@ def points_of(one: Round, clock: Clock) -> Points:
     """Return the times of each call in one round."""
     taken = _RoundAnalysis(one, clock)
     points: Points = {}
-    for call, x, value in [*taken.once(), *taken.loops(), *taken.publishing(), *taken.hearing()]:
+    for call, x, value in [
+        *taken.once(),
+        *taken.loops(),
+        *taken.publishing(),
+        *taken.hearing(),
+        *taken.services(),
+    ]:
         points.setdefault(call, {}).setdefault(x, []).append(value)
     return points
 
@@ -139,6 +145,15 @@ class _RoundAnalysis:
         for quiet, one in zip(waiting, receiving, strict=False):
             anyway = getattr(quiet, self._clock) * one.waited_ns / quiet.waited_ns
             yield "receive", 0.0, (getattr(one, self._clock) - anyway) / one.cycles
+
+    def services(self) -> Iterable[Point]:
+        """Yield cycles with a request minus idle ones, and waiting with requests minus without."""
+        idle, calling = self._by_name.get("idle_before_call", []), self._by_name.get("call_service", [])
+        for without, whole in zip(idle, calling, strict=False):
+            yield "call_service", 0.0, whole.each(self._clock) - without.each(self._clock)
+        for quiet, one in zip(self._by_name.get("wait", []), self._by_name.get("serve", []), strict=False):
+            anyway = getattr(quiet, self._clock) * one.waited_ns / quiet.waited_ns
+            yield "serve", 0.0, (getattr(one, self._clock) - anyway) / one.cycles
 
 
 def _grouped(samples: Round) -> dict[str, list[Sample]]:

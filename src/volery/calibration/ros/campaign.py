@@ -162,10 +162,12 @@ def ros_law(costs: Mapping[str, CallCost], under: Conditions) -> RosLaw:
 
 
 def _with_slope(costs: Mapping[str, CallCost]) -> dict[str, CallCost]:
-    """Give ``publish_next``, measured at one number of subscribers only, the slope of ``publish``."""
+    """Give ``publish_next`` the slope of ``publish`` where it was measured at one number of subscribers."""
     first, following = costs.get("publish"), costs.get("publish_next")
     if first is None or following is None or following.typical <= 0.0:
         return {call: cost for call, cost in costs.items() if call != "publish_next"}
+    if len(following.points) > 1:
+        return dict(costs)
     [x] = following.points
     whole, caller = (
         _through_point(x, getattr(following, part).at(x), getattr(first, part).per_x)

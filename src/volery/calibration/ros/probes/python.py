@@ -17,13 +17,15 @@ CONNECT_S, SETTLE_S, GLANCE_S = 10.0, 0.1, 0.05
 SPIN_BLOCKS = 2.5
 """Blocks of receiving, which are longer since messages are rarer than cycles."""
 HALF_S = 0.5
+FEW, MANY = 2.0, 8.0
+"""Subscribers of a topic that is published just after another."""
 NODE, DEPTH = "calibration_probe", 10
 
 received = [0]
 
 
 def on_message(message: Any) -> None:
-    """Count a message of any subscription."""
+    """Count a message of any subscription, or a request."""
     received[0] += 1
 
 
@@ -46,6 +48,8 @@ class Client(Protocol):
     def subscribe(self, topic: str) -> Ends: ...  # noqa: D102
     def service_client(self) -> object: ...  # noqa: D102
     def advertise_service(self) -> object: ...  # noqa: D102
+    def caller(self) -> Callable[[], Any]: ...  # noqa: D102
+    def serve(self) -> Callable[[], Any]: ...  # noqa: D102
     def sleeper(self, seconds: float) -> Callable[[], Any]: ...  # noqa: D102
     def wait(self, seconds: float) -> None: ...  # noqa: D102
 
@@ -85,6 +89,23 @@ class Rospy:
     def advertise_service(self) -> object:
         """Create a service."""
         return self._rospy.Service("calibration/service", self._service, lambda request: None)
+
+    def caller(self) -> Callable[[], Any]:
+        """Return a call of the peers' service, with a connection of its own as is usual."""
+        self._rospy.wait_for_service("calibration/served", CONNECT_S)
+        call: Callable[[], Any] = self._rospy.ServiceProxy("calibration/served", self._service)
+        return call
+
+    def serve(self) -> Callable[[], Any]:
+        """Serve the requests of the peers; return what ends it."""
+        response = import_module("std_srvs.srv").TriggerResponse
+
+        def answer(request: Any) -> Any:
+            on_message(request)
+            return response()
+
+        made = self._rospy.Service("calibration/answer", self._service, answer)
+        return lambda: made.shutdown("measured")
 
     def sleeper(self, seconds: float) -> Callable[[], Any]:
         """Return ``Rate.sleep``."""
@@ -143,6 +164,23 @@ class Rclpy:
         )
         return made
 
+    def caller(self) -> Callable[[], Any]:
+        """Return a call of the peers' service that spins until the answer is there."""
+        client = self._node.create_client(self._service, "calibration/served")
+        client.wait_for_service(CONNECT_S)
+        spin = self._rclpy.spin_until_future_complete
+        return lambda: spin(self._node, client.call_async(self._service.Request()))
+
+    def serve(self) -> Callable[[], Any]:
+        """Serve the requests of the peers; return what ends it."""
+
+        def answer(request: Any, response: Any) -> Any:
+            on_message(request)
+            return response
+
+        made = self._node.create_service(self._service, "calibration/answer", answer)
+        return lambda: self._node.destroy_service(made)
+
     def sleeper(self, seconds: float) -> Callable[[], Any]:
         """Return ``Clock.sleep_for``."""
         clock, duration = self._node.get_clock(), self._duration(seconds=seconds)
@@ -197,6 +235,14 @@ def _until(done: Callable[[], bool]) -> None:
     end = time.monotonic() + CONNECT_S
     while not done() and time.monotonic() < end:
         time.sleep(GLANCE_S)
+
+
+def _connected(first: Ends, other: Ends, count: float) -> Callable[[], bool]:
+    return lambda: first.peers() > 0 and other.peers() >= count
+
+
+def _together(calls: list[Callable[[], Any]]) -> Callable[[], Any]:
+    return lambda: [call() for call in calls]
 
 
 class Probe:
@@ -272,20 +318,41 @@ class Probe:
             made[0].close()
             time.sleep(SETTLE_S)
 
-    def spinning(self) -> None:
+    def spinning(self, counts: list[float]) -> None:
         """Measure cycles that publish once, twice, and twice with a spin: later calls find warm threads."""
         first = self._client.advertise("calibration/to_1")
-        other = self._client.advertise("calibration/to_2")
-        _until(lambda: first.peers() > 0 and other.peers() > 1)
-        time.sleep(SETTLE_S)
-        self._block("publish_alone", 0, self._period_s, first.publish)
-        self._block("publish_both", 2, self._period_s, lambda: (first.publish(), other.publish()))
         spin = self._client.spin_once
-        if spin is not None:
-            both = (first.publish, other.publish, spin)
-            self._block("spin_once", 0, self._period_s, lambda: [call() for call in both])
+        for count in counts:
+            other = self._client.advertise(f"calibration/to_{count:.0f}")
+            _until(_connected(first, other, count))
+            time.sleep(SETTLE_S)
+            both = [first.publish, other.publish]
+            self._block("publish_alone", 0, self._period_s, first.publish)
+            self._block("publish_both", count, self._period_s, _together(both))
+            if spin is not None and count == counts[0]:
+                self._block("spin_once", 0, self._period_s, _together([*both, spin]))
+            other.close()
+            time.sleep(SETTLE_S)
         first.close()
-        other.close()
+
+    def calling(self) -> None:
+        """Measure cycles that call a service and idle cycles."""
+        call = self._client.caller()
+        call()
+        self._block("idle_before_call", 0, self._period_s, nothing)
+        self._block("call_service", 0, self._period_s, call)
+
+    def serving(self) -> None:
+        """Measure waiting with requests; waiting without is measured before each reception."""
+        end = self._client.serve()
+        wait, none = self._client.wait, received[0]
+        _until(lambda: (wait(GLANCE_S), received[0] > none)[1])
+        wait(SETTLE_S)
+        before = received[0]
+        measured = Measured()
+        wait(SPIN_BLOCKS * self._block_s)
+        measured.report("serve", 0, max(1, received[0] - before))
+        end()
 
     def receiving(self) -> None:
         """Measure waiting for messages without and with messages."""
@@ -316,9 +383,12 @@ def main(library: str, block_ms: str, period_ms: str, sleeps: str, counts: str) 
     probe.registrations()
     probe.sleeping(_numbers(sleeps))
     probe.publishing(_numbers(counts))
-    probe.spinning()
+    probe.spinning([FEW, MANY])
+    probe.calling()
     probe.receiving()
     probe.receiving()
+    probe.serving()
+    probe.serving()
 
 
 if __name__ == "__main__":

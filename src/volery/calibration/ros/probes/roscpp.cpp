@@ -24,6 +24,7 @@ using Action = std::function<void()>;
 const int kConnectMs = 10000;
 const int kGlanceMs = 50;  // a check costs some CPU time, so there are few
 const int kSettleMs = 100;
+const int kFew = 2, kMany = 8;  // subscribers of a topic that is published just after another
 const double kSpinBlocks = 2.5;  // messages are rarer than cycles
 
 long received = 0;
@@ -98,7 +99,10 @@ std::vector<double> numbers(const char* text) {
 
 void onMessage(const Message::ConstPtr&) { ++received; }
 
-bool onRequest(std_srvs::Trigger::Request&, std_srvs::Trigger::Response&) { return true; }
+bool onRequest(std_srvs::Trigger::Request&, std_srvs::Trigger::Response&) {
+  ++received;
+  return true;
+}
 
 void registrations(ros::NodeHandle& node) {
   ros::Publisher publisher;
@@ -136,19 +140,35 @@ void spinning(ros::NodeHandle& node, double period_ms, double block_ms) {
   Message message;
   message.data.resize(4);
   ros::Publisher first = node.advertise<Message>("calibration/to_1", 10);
-  ros::Publisher next = node.advertise<Message>("calibration/to_2", 10);
-  until([&] { return first.getNumSubscribers() > 0 && next.getNumSubscribers() > 1; });
-  pause(kSettleMs);
-  const auto both = [&] {
-    first.publish(message);
-    next.publish(message);
-  };
-  block("publish_alone", 0, period_ms, block_ms, [&] { first.publish(message); });
-  block("publish_both", 2, period_ms, block_ms, both);
-  block("spin_once", 0, period_ms, block_ms, [&] {
-    both();
-    ros::spinOnce();
-  });
+  for (int count : {kFew, kMany}) {
+    ros::Publisher next = node.advertise<Message>("calibration/to_" + std::to_string(count), 10);
+    until([&] { return first.getNumSubscribers() > 0 && next.getNumSubscribers() >= uint32_t(count); });
+    pause(kSettleMs);
+    const auto both = [&] {
+      first.publish(message);
+      next.publish(message);
+    };
+    block("publish_alone", 0, period_ms, block_ms, [&] { first.publish(message); });
+    block("publish_both", count, period_ms, block_ms, both);
+    if (count == kFew) {
+      block("spin_once", 0, period_ms, block_ms, [&] {
+        both();
+        ros::spinOnce();
+      });
+    }
+    next.shutdown();
+    pause(kSettleMs);
+  }
+}
+
+// Measures cycles that call a service, with a connection of its own as is usual, and idle cycles.
+void calling(ros::NodeHandle& node, double period_ms, double block_ms) {
+  ros::ServiceClient client = node.serviceClient<std_srvs::Trigger>("calibration/served");
+  client.waitForExistence(ros::Duration(kConnectMs / 1000.0));
+  std_srvs::Trigger trigger;
+  client.call(trigger);
+  block("idle_before_call", 0, period_ms, block_ms, [] {});
+  block("call_service", 0, period_ms, block_ms, [&] { client.call(trigger); });
 }
 
 // Waits as ros::spin() does.
@@ -176,6 +196,21 @@ void receiving(ros::NodeHandle& node, double block_ms) {
   measured.report("receive", 0, std::max(1L, received - before));
   feed.shutdown();
 }
+
+// Measures waiting with requests; waiting without is measured before each reception.
+void serving(ros::NodeHandle& node, double block_ms) {
+  ros::ServiceServer server = node.advertiseService("calibration/answer", onRequest);
+  const long none = received;
+  until([none] {
+    ros::spinOnce();
+    return received > none;
+  });
+  spin_for(kSettleMs);
+  const long before = received;
+  Measured measured;
+  spin_for(kSpinBlocks * block_ms);
+  measured.report("serve", 0, std::max(1L, received - before));
+}
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -193,7 +228,10 @@ int main(int argc, char** argv) {
   for (double ms : numbers(argv[3])) block("sleep", ms * 1000.0, ms, block_ms, [] {});
   publishing(*node, period_ms, block_ms, numbers(argv[4]));
   spinning(*node, period_ms, block_ms);
+  calling(*node, period_ms, block_ms);
   receiving(*node, block_ms);
   receiving(*node, block_ms);
+  serving(*node, block_ms);
+  serving(*node, block_ms);
   return 0;
 }

@@ -2,7 +2,9 @@
 
 ``sinks.py rospy`` or ``sinks.py rclpy``: eight nodes in one process. Topic ``calibration/to_N`` has N
 subscribers, ``calibration/quiet`` a publisher that never publishes, ``calibration/feed`` one that publishes
-twenty times a second. For rclpy it does not import volery: that runs in the Python that has rclpy.
+twenty times a second. Service ``calibration/served`` answers; ``calibration/answer``, a service of the probe,
+is called twenty times a second while it is there. For rclpy it does not import volery: that runs in the
+Python that has rclpy.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from importlib import import_module
 from typing import Any
 
 MOST = 8
-FEED_S = 0.05
+FEED_S, ABSENT_S = 0.05, 0.25
 
 
 def _ignore(message: Any) -> None:
@@ -48,7 +50,21 @@ def run_rospy() -> None:
     nodes = [_rospy_node(number) for number in range(1, MOST + 1)]
     quiet = nodes[0].Publisher("calibration/quiet", message, queue_size=10)
     feed = nodes[0].Publisher("calibration/feed", message, queue_size=10)
+    trigger: Any = import_module("std_srvs.srv")
+    nodes[1].Service("calibration/served", trigger.Trigger, lambda request: trigger.TriggerResponse())
+    call = nodes[1].ServiceProxy("calibration/answer", trigger.Trigger)
     over = _over()
+
+    def request() -> None:
+        wait = FEED_S
+        while not over.wait(wait):
+            try:
+                call()
+                wait = FEED_S
+            except Exception:  # rospy's own errors, of each copy of rospy: the probe does not serve now
+                wait = ABSENT_S
+
+    threading.Thread(target=request, daemon=True).start()
     while not over.wait(FEED_S):
         feed.publish(message(data=[0.0] * 4))
     del quiet
@@ -70,6 +86,10 @@ def run_rclpy() -> None:
     quiet = nodes[0].create_publisher(kind, "calibration/quiet", 10)
     feed = nodes[0].create_publisher(kind, "calibration/feed", 10)
     nodes[0].create_timer(FEED_S, lambda: feed.publish(kind(data=[0.0] * 4)))
+    trigger: Any = import_module("std_srvs.srv").Trigger
+    nodes[1].create_service(trigger, "calibration/served", lambda request, response: response)
+    caller = nodes[1].create_client(trigger, "calibration/answer")
+    nodes[1].create_timer(FEED_S, lambda: caller.service_is_ready() and caller.call_async(trigger.Request()))
     over = _over()
     while not over.is_set():
         executor.spin_once(timeout_sec=0.5)
