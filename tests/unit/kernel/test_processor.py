@@ -334,9 +334,10 @@ def test_busy_time_is_known_while_jobs_run(virtual: VirtualKernel) -> None:
 
 
 def test_nothing_takes_no_time(virtual: VirtualKernel, slices: Slices) -> None:
-    core = Processor(virtual, "cpu")
+    core = Processor(virtual, "cpu", context_switch=MS)
     compute(virtual, core, "idle", at=0, ms=0)
     core.load(ExecutionContext("node", core), 0)
+    task = virtual.spawn(lambda: core.serve(task, 0), "nothing", ExecutionContext("nothing", core))
     virtual.run(S)
     assert slices() == []
     assert virtual.now() == 0
