@@ -26,7 +26,8 @@ NOT_REACHED = {
 @pytest.fixture(scope="module")
 def phases() -> ModuleType:
     spec = importlib.util.spec_from_file_location("phases", BENCH)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules["phases"] = module
     spec.loader.exec_module(module)

@@ -158,3 +158,23 @@ def test_a_rover_holds_or_returns_as_asked(bench: Any) -> None:
         rig.run(7.0)
         assert rig.vehicle.mode.number == mode
         assert "GCS Failsafe" in rig.texts()
+
+
+def test_a_vehicle_that_lies_on_its_back_disarms(bench: Any) -> None:
+    """The crash check: more than 30 degrees from the target for two seconds, slow and hardly accelerating."""
+    rig = bench()
+    rig.airborne()
+    for motor in (0, 1):
+        rig.flight.weaken_motor(motor, 0.0)
+    rig.run_until(lambda: not rig.vehicle.armed, within=30.0)
+    rig.run(0.2)
+    assert any(text.startswith("Crash: Disarming: AngErr=") for text in rig.texts())
+
+
+def test_the_crash_check_can_be_switched_off(bench: Any) -> None:
+    rig = bench(parameters={"FS_CRASH_CHECK": 0})
+    rig.airborne()
+    for motor in (0, 1):
+        rig.flight.weaken_motor(motor, 0.0)
+    rig.run(15.0)
+    assert rig.vehicle.armed

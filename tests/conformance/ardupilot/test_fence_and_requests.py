@@ -189,6 +189,36 @@ def test_a_part_of_the_mission_is_replaced(bench: Any) -> None:
     assert rig.latest["MISSION_ACK"]["type"] == 1
 
 
+def test_a_part_of_an_empty_mission_is_requested(bench: Any) -> None:
+    """pymavlink's example of a partial write on a fresh vehicle: the original requests the items."""
+    rig = bench()
+    rig.run(0.5)
+    rig.send("MISSION_CLEAR_ALL", **TARGET)
+    rig.run(0.05)
+    rig.send("MISSION_WRITE_PARTIAL_LIST", **TARGET, start_index=0, end_index=0)
+    rig.run(0.05)
+    assert rig.latest["MISSION_REQUEST"]["seq"] == 0
+    rig.send("MISSION_ITEM_INT", **TARGET, seq=0, **point(16, 30, 0))
+    rig.run(0.05)
+    assert rig.latest["MISSION_ACK"]["type"] == ACCEPTED
+
+
+def test_a_gripper_is_there_where_it_is_enabled(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    assert rig.command(211, 1, 1) == FAILED
+    rig = bench(parameters={"GRIP_ENABLE": 1})
+    rig.run(0.5)
+    assert rig.command(211, 1, 1) == ACCEPTED
+    rig.run(3.0)
+    assert [text for text in rig.texts() if "Gripper" in text] == [
+        "Gripper load grabbing",
+        "Gripper load grabbed",
+    ]
+    assert rig.command(211, 1, 0) == ACCEPTED
+    assert rig.command(211, 1, 7) == FAILED
+
+
 ANSWERED: list[tuple[str, dict[str, Any], str]] = [
     ("AUTOPILOT_VERSION_REQUEST", {}, "AUTOPILOT_VERSION"),
     ("LOG_REQUEST_LIST", {"start": 0, "end": 65535}, "LOG_ENTRY"),

@@ -255,7 +255,7 @@ def test_yaw_turns_to_a_heading_and_by_an_angle(bench: Any) -> None:
 
 
 def test_brake_stops_with_the_jerk_of_the_position_controller(bench: Any) -> None:
-    """Speed fades with BRAKE_MODE_DECEL_RATE / PSC_JERK_XY = 1.5 s: 15 m from 10 m/s, and the lag before it."""
+    """Speed fades with BRAKE_MODE_DECEL_RATE / PSC_JERK_XY = 1.5 s: 15 m from 10 m/s, and a lag."""
     rig = bench()
     rig.airborne()
     fly_to(rig, coordinate_frame=LOCAL_OFFSET, type_mask=ONLY_POSITION, x=100.0)

@@ -207,3 +207,25 @@ def test_a_return_right_after_home_was_moved_ends_at_the_old_one(
     assert rig.mode(4, 5) == 0
     rig.run_until(lambda: not rig.vehicle.armed)
     assert rig.ned[0] == pytest.approx(ends_north, abs=2.0)
+
+
+def test_the_nose_turns_to_a_region_of_interest_until_there_is_none(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    latitude, longitude, amsl = rig.vehicle.estimate.geodetic
+    east = {"x": round(latitude * 1e7), "y": round((longitude + 0.001) * 1e7), "z": amsl}
+    assert rig.command_int(195, **east) == 0
+    rig.run(8.0)
+    assert rig.vehicle.estimate.attitude[2] == pytest.approx(1.57, abs=0.1)
+    assert rig.command_int(197) == 0
+    assert rig.vehicle.commanded.look_at is None
+
+
+def test_a_gripper_is_there_where_it_is_enabled(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    assert rig.command(211, 1, 1) == 3
+    rig = bench(parameters={"PD_GRIPPER_EN": 1})
+    rig.ready()
+    assert rig.command(211, 1, 1) == 0
+    assert rig.command(211, 1, 5) == 2

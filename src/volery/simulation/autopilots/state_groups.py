@@ -156,6 +156,8 @@ class FailsafeState:
     """Time of the last message of the ground station that controls the vehicle [ns]."""
     simulated: tuple[float, float, float, float, float] = (0.0, 0.0, 1.0, 0.0, 180.0)
     """Values of the parameters that inject faults, as they were last applied."""
+    crashing_since: Ns = NEVER
+    """Since when [ns] a vehicle leans far from where it should."""
     low_voltage_since: dict[str, Ns] = field(default_factory=dict)
     """Since when [ns] the battery has been below a voltage, by the name of the parameter that holds it."""
 

@@ -18,8 +18,9 @@ Multirotor: a rigid body under four rotors, drag, gravity and the ground.
   Helicopter Aerodynamics, 2.3). Shaft power k_Q w^3; electrical power is that over the efficiency of motor
   and controller. Valid in hover and slow flight; inflow of climb or fast flight, flapping, ground effect and
   the rotors' gyroscopic torque are not modelled.
-* Drag: F = -c_1 v - c_2 (|v_p| v_p + |v_a| v_a), v relative to the air, v_p its part in the plane of the rotors
-  and v_a along their axis, as in ArduPilot's simulator; valid to about 20 m/s. Rotation is damped by -c_w w.
+* Drag: F = -c_1 v - c_2 (|v_p| v_p + |v_a| v_a), v relative to the air, v_p its part in the plane of the
+  rotors and v_a along their axis, as in ArduPilot's simulator; valid to about 20 m/s. Rotation is damped by
+  -c_w w.
 * Ground: a spring and damper under each of four feet, Coulomb friction smoothed below 5 cm/s. Upside down the
   body lies on four points as far above the centre.
 

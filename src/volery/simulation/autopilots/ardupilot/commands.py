@@ -7,6 +7,7 @@ from functools import partial
 from math import isfinite, isnan, pi, radians
 
 from volery.base.frames import wrap
+from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.failsafes import fence_admits, on_fence_enable
 from volery.simulation.autopilots.ardupilot.modes import (
     CRITICAL,
@@ -47,7 +48,9 @@ SET_RELAY, REPEAT_RELAY, SET_SERVO, REPEAT_SERVO, FENCE_ENABLE, RUN_PREARM_CHECK
     207,
     401,
 )
-ROI_LOCATION, ROI_NONE, ROI, MOTOR_TEST = 195, 197, 201, 209
+ROI_LOCATION, ROI_NONE, ROI, MOTOR_TEST, GRIPPER = 195, 197, 201, 209, 211
+GRIPS_WITHIN = 2 * S
+"""Time of a servo gripper from the command to the report of its end."""
 START_MAG_CAL, ACCEPT_MAG_CAL, CANCEL_MAG_CAL = 42424, 42425, 42426
 CALIBRATION, STORAGE, REBOOT, MISSION_START, ARM_DISARM, GET_HOME = 241, 245, 246, 300, 400, 410
 
@@ -362,6 +365,18 @@ def on_region(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
+def on_gripper(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_GRIPPER: 0 releases, 1 grabs; it needs GRIP_ENABLE."""
+    if not vehicle.parameters["GRIP_ENABLE"]:
+        return FAILED
+    said = {0: "Gripper load releas", 1: "Gripper load grabb"}.get(round(command.param2))
+    if said is None:
+        return FAILED
+    vehicle.send_text(INFO, f"{said}ing")
+    vehicle.kernel.call_at(vehicle.kernel.now() + GRIPS_WITHIN, lambda: vehicle.send_text(INFO, f"{said}ed"))
+    return ACCEPTED
+
+
 def on_motor_test(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_MOTOR_TEST: only on the ground and disarmed; the test does not move anything."""
     if vehicle.armed or not vehicle.landed:
@@ -403,6 +418,7 @@ def shared_commands(
         ROI_LOCATION: on_region,
         ROI_NONE: on_region,
         MOTOR_TEST: on_motor_test,
+        GRIPPER: on_gripper,
         START_MAG_CAL: on_calibration,
         ACCEPT_MAG_CAL: on_calibration,
         CANCEL_MAG_CAL: on_calibration,

@@ -40,6 +40,7 @@ from volery.simulation.autopilots.dji.sdk_commands import (
     mission_refusal,
     sdk_command,
 )
+from volery.simulation.autopilots.manoeuvres.to_point import Land
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, MissionItem
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -556,6 +557,8 @@ class FlightController:
         elif number == DisplayMode.NAVI_GO_HOME:
             if manoeuvre.landing:
                 self._enter(DisplayMode.AUTO_LANDING, by_sdk=self._requested_by_sdk)
+                if isinstance(vehicle.manoeuvre, Land) and vehicle.home is not None:
+                    vehicle.manoeuvre.point = vehicle.home.ned
         elif number == DisplayMode.P_GPS and not vehicle.has_position:
             vehicle.send_text(WARNING, "position lost")
             self.hover()

@@ -282,7 +282,7 @@ class MissionService:
         first, last = fields["start_index"], fields["end_index"]
         if fields["mission_type"] != MISSION:
             self._acknowledge(peer, MISSION_UNSUPPORTED, fields["mission_type"])
-        elif not 0 <= first <= last < len(self._vehicle.mission):
+        elif not 0 <= first <= last <= len(self._vehicle.mission):
             self._vehicle.send_text(4, "Flight plan update rejected")
             self._acknowledge(peer, MISSION_ERROR)
         else:

@@ -47,6 +47,7 @@ from volery.simulation.autopilots.px4.offboard import AttitudeTarget, Offboard, 
 from volery.simulation.autopilots.vehicle_state import ArmingTimes, Manoeuvre, ParameterTable, Vehicle
 
 _SHARED = {
+    "PD_GRIPPER_EN": "any value but 0: there is a gripper",
     "BAT_CRIT_THR": "critical level of the battery",
     "BAT_EMERGEN_THR": "emergency level of the battery",
     "BAT_LOW_THR": "low level of the battery",

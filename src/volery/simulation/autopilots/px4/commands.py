@@ -41,7 +41,8 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 RETURN, LAND, TAKEOFF, ORBIT = 20, 21, 22, 34
 DO_SET_MODE, CHANGE_SPEED, SET_HOME, FLIGHT_TERMINATION, REPOSITION = 176, 178, 179, 185, 192
 STORAGE, REBOOT, MISSION_START, ARM_DISARM, REQUEST_PROTOCOL = 245, 246, 300, 400, 519
-ROI_LOCATION, ROI_NONE, ROI, GET_HOME, RUN_CHECKS = 195, 197, 201, 410, 401
+ROI_LOCATION, ROI_NONE, ROI, GET_HOME, RUN_CHECKS, GRIPPER = 195, 197, 201, 410, 401, 211
+GRIPPER_ACTIONS = (0, 1)
 MOTOR_TEST, CALIBRATION, ACTUATOR_TEST = 209, 241, 310
 
 CUSTOM_MODE_ENABLED = 1
@@ -291,8 +292,24 @@ def on_motor_test(vehicle: Vehicle, _command: Command) -> int:
 
 
 def accept(_vehicle: Vehicle, _command: Command) -> int:
-    """Accept a command that changes nothing here: storage of parameters, regions of interest."""
+    """Accept a command that changes nothing here, such as the storage of parameters."""
     return ACCEPTED
+
+
+def on_region(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_SET_ROI and its two forms: without a gimbal the nose turns to the place."""
+    place = (
+        commanded_point(vehicle, command) if command.number != ROI_NONE and (command.x or command.y) else None
+    )
+    vehicle.commanded.look_at = commanded_point(vehicle, command) if given else None
+    return ACCEPTED
+
+
+def on_gripper(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_GRIPPER, which needs PD_GRIPPER_EN."""
+    if not vehicle.parameters["PD_GRIPPER_EN"]:
+        return UNSUPPORTED
+    return ACCEPTED if to_integer(command.param2) in GRIPPER_ACTIONS else DENIED
 
 
 SHARED_COMMANDS: Mapping[int, Handler] = {
@@ -307,9 +324,10 @@ SHARED_COMMANDS: Mapping[int, Handler] = {
     ARM_DISARM: on_arm,
     REQUEST_PROTOCOL: accept,
     STORAGE: accept,
-    ROI: accept,
-    ROI_LOCATION: accept,
-    ROI_NONE: accept,
+    ROI: on_region,
+    ROI_LOCATION: on_region,
+    ROI_NONE: on_region,
+    GRIPPER: on_gripper,
     GET_HOME: on_get_home,
     RUN_CHECKS: on_run_checks,
     CALIBRATION: on_calibration,

@@ -13,7 +13,7 @@ from volery.base.frames import Vector
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
-from volery.simulation.autopilots.manoeuvres.to_point import Land, ToPoint
+from volery.simulation.autopilots.manoeuvres.to_point import Land, ToPoint, bearing
 from volery.simulation.autopilots.px4.position_control import Cruise, PositionLoops
 from volery.simulation.autopilots.state_groups import NEVER, Home
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
@@ -54,8 +54,14 @@ class Hold(ToPoint):
         if self.point is None:
             return
         control: PositionLoops = self.vehicle.firmware_state.control
-        commanded = self.vehicle.commanded.yaw
-        control.fly_to(self.point, self.cruise(), self.yaw if commanded is None else commanded)
+        control.fly_to(self.point, self.cruise(), self._heading())
+
+    def _heading(self) -> float | None:
+        """Return the heading [rad]: towards a region of interest, the commanded one, or that of the leg."""
+        commanded = self.vehicle.commanded
+        if commanded.look_at is not None:
+            return bearing(self.vehicle.estimate.position, commanded.look_at)
+        return self.yaw if commanded.yaw is None else commanded.yaw
 
     def cruise(self) -> Cruise:
         """Return the speeds of the trajectory."""

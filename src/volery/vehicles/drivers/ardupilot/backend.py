@@ -15,7 +15,13 @@ from volery.links.mavlink_messages import constant
 from volery.ros.graph import Node
 from volery.ros.messages import new
 from volery.vehicles.driver import Acceleration, AttitudeTarget
-from volery.vehicles.drivers.ardupilot.modes import LINK_LOSS_PARAMETERS, NUMBERS, RESTING, mode_name
+from volery.vehicles.drivers.ardupilot.modes import (
+    FENCE_PARAMETERS,
+    LINK_LOSS_PARAMETERS,
+    NUMBERS,
+    RESTING,
+    mode_name,
+)
 from volery.vehicles.drivers.mavlink.backend import (
     INT_FRAMES,
     POSITION_ONLY,
@@ -136,7 +142,7 @@ class ArduPilotMavlink(MavlinkClient):
         return ArduPilotDecoder(self._kernel, self.telemetry, record=record)
 
     def _requested_parameters(self) -> Sequence[str]:
-        return LINK_LOSS_PARAMETERS.get(self.telemetry.kind, ())
+        return (*LINK_LOSS_PARAMETERS.get(self.telemetry.kind, ()), *FENCE_PARAMETERS)
 
     def lasting_reasons(self, since: Ns) -> Sequence[str]:
         """Return the arming checks that fail since then and that waiting does not mend."""

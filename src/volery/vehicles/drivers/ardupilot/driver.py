@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite, isnan
+from math import isfinite, isnan, nan
 
-from volery.base.position import AboveHome, Position
+from volery.base.errors import Refused
+from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.vehicles.driver import (
@@ -28,7 +29,7 @@ from volery.vehicles.driver import (
     Waypoint,
 )
 from volery.vehicles.drivers.ardupilot.backend import RELEASED, ArduPilotBackend
-from volery.vehicles.drivers.ardupilot.modes import GUIDED, RESTING, on_link_loss
+from volery.vehicles.drivers.ardupilot.modes import GUIDED, RESTING, beyond_own_fence, on_link_loss
 from volery.vehicles.drivers.mavlink.backend import GROUND_SPEED, UNCHANGED, Ack, mission_item
 from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
 from volery.vehicles.drivers.steps import (
@@ -44,6 +45,7 @@ from volery.vehicles.drivers.steps import (
     climbed_to,
     disarmed_step,
     heading_reached,
+    horizontal_distance,
     immediate_step,
     mode_step,
     send_nothing,
@@ -162,6 +164,20 @@ class ArduPilot(MavlinkDriver):
         parameters = self._backend.parameters
         return on_link_loss(self.telemetry.kind, parameters) if parameters is not None else ""
 
+    def _check_own_fence(self, goal: Position) -> None:
+        """Refuse a goal outside the aircraft's own fence: ArduPilot ignores such a target without a word."""
+        parameters, home = self._backend.parameters, self.telemetry.home
+        if parameters is None or home is None:
+            return
+        height = nan
+        if isinstance(goal.altitude, AboveHome):
+            height = goal.altitude.metres
+        elif isinstance(goal.altitude, AMSL) and isinstance(home.altitude, AMSL):
+            height = goal.altitude.metres - home.altitude.metres
+        beyond = beyond_own_fence(parameters, horizontal_distance(home, goal), height)
+        if beyond:
+            raise Refused(self.name, f"go to {goal}", f"{beyond}; choose a goal inside or change the fence")
+
     # -- from the ground
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
@@ -191,6 +207,7 @@ class ArduPilot(MavlinkDriver):
         The speed follows the target: the first target after a take-off or a velocity restores WPNAV_SPEED.
         """
         rover = self.telemetry.kind != DRONE_KIND
+        self._check_own_fence(goal)
         start = self._armed_in_guided() if rover else self._guided()
         sent = 0
 

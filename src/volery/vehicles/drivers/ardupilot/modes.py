@@ -7,6 +7,7 @@ and ArduRover. The failsafe for a lost link acts only after a heartbeat of a gro
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 
 from volery.vehicles.drivers.mavlink.client import GCS_SYSTEM
 from volery.vehicles.drivers.steps import DRONE_KIND, ROVER_KIND
@@ -77,6 +78,34 @@ LINK_LOSS_PARAMETERS: Mapping[str, Sequence[str]] = {
     ROVER_KIND: ("FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "FS_ACTION", "SYSID_MYGCS"),
 }
 """Parameters that define the reaction, by kind of vehicle."""
+
+FENCE_PARAMETERS = ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_RADIUS", "FENCE_ALT_MAX")
+"""Parameters of the aircraft's own fence that a target is compared with."""
+_CEILING, _CIRCLE = 1, 2
+"""Bits of FENCE_TYPE."""
+
+
+def beyond_own_fence(parameters: Mapping[str, float], away_m: float, above_home_m: float) -> str:
+    """Return which parameter of the aircraft's own fence a target exceeds, in words; empty: none.
+
+    Polygons are not compared: the autopilot does not take up a target beyond them, which is noticed.
+
+    Args:
+        parameters: The parameters as read so far.
+        away_m: Distance of the target from home.
+        above_home_m: Height of the target above home; NaN is not compared.
+    """
+    if not parameters.get("FENCE_ENABLE", 0.0):
+        return ""
+    kinds = round(parameters.get("FENCE_TYPE", 0.0))
+    radius, ceiling = parameters.get("FENCE_RADIUS", inf), parameters.get("FENCE_ALT_MAX", inf)
+    if kinds & _CIRCLE and away_m > radius:
+        return f"it is {away_m:.0f} m from home, outside the aircraft's own fence (FENCE_RADIUS={radius:g})"
+    if kinds & _CEILING and above_home_m > ceiling:
+        limit = f"(FENCE_ALT_MAX={ceiling:g})"
+        return f"it is {above_home_m:.0f} m above home, over the aircraft's own fence {limit}"
+    return ""
+
 
 _COPTER: Mapping[int, str] = {
     1: "it returns home (RTL)",

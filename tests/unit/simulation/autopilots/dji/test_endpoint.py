@@ -194,7 +194,7 @@ def test_setpoints_that_are_not_fed_end_in_a_hover(apron: Make) -> None:
         assert yard.mode == 17
         yard.wait(0.8)
         assert yard.mode == 6
-        yard.wait(5.0)
+        yard.wait(8.0)
         assert hypot(*yard.flight.truth().velocity[:2]) < 0.4
 
     yard.run(body)
@@ -349,6 +349,9 @@ def test_a_low_battery_sends_it_home_and_a_setpoint_does_not_stop_it(apron: Make
         assert yard.mode == 15
         yard.flight.drain_battery(0.08)
         yard.until(lambda: yard.mode == 33, within=3.0)
+        assert not yard.task(GO_HOME)  # a critical battery overrides the SDK
+        assert not yard.task(LAND)
+        assert yard.mode == 33
         yard.until(lambda: yard.status == 0)
 
     yard.run(body)

@@ -293,3 +293,27 @@ def test_one_that_another_station_sends_elsewhere_is_not_sent_back() -> None:
         assert (east, north) == (pytest.approx(40.0, abs=1.0), pytest.approx(0.0, abs=1.0))
 
     field.fly(mission)
+
+
+@pytest.mark.parametrize(
+    ("limits", "goal", "named"),
+    [
+        ({"FENCE_TYPE": 2, "FENCE_RADIUS": 60}, at(100, 0), "FENCE_RADIUS=60"),
+        ({"FENCE_TYPE": 1, "FENCE_ALT_MAX": 30}, at(10, 0, 40), "FENCE_ALT_MAX=30"),
+    ],
+)
+def test_a_goal_beyond_the_aircrafts_own_fence_is_refused_at_once(
+    limits: dict[str, float], goal: Any, named: str
+) -> None:
+    field = Field(parameters={"FENCE_ENABLE": 1, **limits})
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        began = field.kernel.now()
+        with pytest.raises(Refused, match=named):
+            drone.goto(goal)
+        assert field.kernel.now() - began < S
+        drone.goto(at(20, 0))
+        drone.land()
+
+    field.fly(mission)
