@@ -298,9 +298,7 @@ def accept(_vehicle: Vehicle, _command: Command) -> int:
 
 def on_region(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_SET_ROI and its two forms: without a gimbal the nose turns to the place."""
-    place = (
-        commanded_point(vehicle, command) if command.number != ROI_NONE and (command.x or command.y) else None
-    )
+    given = command.number != ROI_NONE and (command.x or command.y)
     vehicle.commanded.look_at = commanded_point(vehicle, command) if given else None
     return ACCEPTED
 
