@@ -16,10 +16,9 @@ from typing import NamedTuple, Protocol
 from volery.base.errors import UsageError
 from volery.control.laws import PidGains, PidLaw
 from volery.vehicles import Drone
+from volery.vehicles.telemetry import HALF_US, MIDDLE_US
 
 GRAVITY = 9.80665
-MIDDLE_US, HALF_US = 1500, 500
-"""Middle and half of the range of pulse widths that manual control has, µs."""
 
 
 class Command(NamedTuple):

@@ -1,9 +1,9 @@
 """A flight under a control law with the operator's switch on top.
 
-The loop runs at a fixed period. Each time it looks at the switch first, then executes the manoeuvre, applies
-its command and records the terms of its loops. One function, ``_look``, decides who has control; nothing is
-sent while the transmitter has it. During calls that block, such as the take-off, a second task looks at the
-switch and aborts them.
+The loop runs at a fixed period: it looks at the switch, executes the manoeuvre, applies its command and
+records the terms of its loops. Between two samples it looks at the switch when a report of it arrives, and
+releases at once. One function, ``_look``, decides who has control; nothing is sent while the transmitter has
+it. During calls that block, such as the take-off, a second task looks at the switch and aborts them.
 """
 
 from __future__ import annotations
@@ -25,6 +25,9 @@ from volery.vehicles import Drone
 
 PERIOD: Ns = 50 * MS
 WATCH_PERIOD: Ns = 50 * MS
+"""Time after which the switch is looked at again if no report of it arrives."""
+POLL_PERIOD: Ns = 10 * MS
+"""Time between two looks where the loop of this program receives the reports, as over ROS."""
 SWITCH_WITHIN_S = 30.0
 """Time within which the operator must move the switch to its middle position before a flight."""
 LANDED_WITHIN_S = 180.0
@@ -65,6 +68,7 @@ class ControlledFlight:
         self._on_sample = on_sample
         self._landing = Landing()
         self._state = SwitchState()
+        self._looked_at: Ns = -1
         self._frame: LocalFrame | None = None
         self._engaged = False
         self._watching = False
@@ -117,7 +121,7 @@ class ControlledFlight:
         index = self._switch.channel - 1
         pulse = channels[index] if index < len(channels) else 0
         age = to_seconds(now - telemetry.rc_ns) if telemetry.rc_ns >= 0 else inf
-        return Received(pulse, age, telemetry.silence(now))
+        return Received(pulse, age, telemetry.silence(now), telemetry.rc_ns != self._looked_at)
 
     def _look(self) -> Authority:
         """Look at the switch and return who has control; a change is recorded."""
@@ -126,7 +130,16 @@ class ControlledFlight:
             if state.authority is not self._state.authority:
                 self._note(f"{state.authority.value}: {state.why}")
             self._state = state
+            self._looked_at = self._drone.telemetry.rc_ns
         return self._state.authority
+
+    def _await_report(self, within: Ns) -> bool:
+        """Wait for the next report of the switch, at most for *within* ns; return whether there was one."""
+        telemetry, last = self._drone.telemetry, self._looked_at
+        if not telemetry.detects_silence:  # this task runs the loop of the node that receives the reports
+            sleep(self._drone.kernel, min(within, POLL_PERIOD))
+            return self._drone.telemetry.rc_ns != last
+        return telemetry.changed.wait_for(lambda: telemetry.rc_ns != last, within, ends_activation=True)
 
     def _note(self, text: str) -> None:
         kernel = self._drone.kernel
@@ -174,7 +187,7 @@ class ControlledFlight:
                     else:
                         self._drone.land()
                 return
-            sleep(self._drone.kernel, WATCH_PERIOD)
+            self._await_report(WATCH_PERIOD)
 
     def _release(self) -> None:
         self._engaged = False
@@ -192,7 +205,7 @@ class ControlledFlight:
         last = kernel.now()
         begun = last
         while not manoeuvre.done:
-            rate.sleep()
+            self._await_sample(rate)
             authority = self._look()
             now = kernel.now()
             sample_s, last = max(to_seconds(now - last), 1e-3), now
@@ -211,6 +224,14 @@ class ControlledFlight:
             self._on_sample(to_seconds(now - begun))
             self._sample(manoeuvre, sample_s)
         return True
+
+    def _await_sample(self, rate: Rate) -> None:
+        """Sleep until the next sample is due; a takeover in the meantime releases at once."""
+        kernel = self._drone.kernel
+        while self._switch is not None and self._engaged and kernel.now() < rate.due:
+            if self._await_report(rate.due - kernel.now()) and self._look() is Authority.MANUAL:
+                self._release()
+        rate.sleep()
 
     def _take_control(self, manoeuvre: Manoeuvre) -> bool:
         if not self._engaged:
@@ -274,7 +295,7 @@ class ControlledFlight:
         until = last + from_seconds(LANDED_WITHIN_S)
         try:
             while kernel.now() < until:
-                rate.sleep()
+                self._await_sample(rate)
                 now = kernel.now()
                 sample_s, last = max(to_seconds(now - last), 1e-3), now
                 if self._look() is Authority.MANUAL:

@@ -110,11 +110,13 @@ class Received(NamedTuple):
         pulse: pulse width of the switch, µs; 0 if the receiver reports none.
         age_s: age of that report, s; infinite before the first.
         silent_s: time since the last message of the autopilot, s.
+        new: whether this report was not looked at before.
     """
 
     pulse: int
     age_s: float
     silent_s: float
+    new: bool = True
 
     @property
     def valid(self) -> bool:
@@ -136,14 +138,15 @@ def decide(settings: SwitchSettings, state: SwitchState, received: Received) -> 
         return _lost(state, settings.on_rc_loss, "the transmitter is lost")
     if not received.valid:
         return _lost(state, settings.on_rc_loss, f"channel {settings.channel} has no signal")
-    return _by_position(settings, state, received.pulse)
+    return _by_position(settings, state, received)
 
 
-def _by_position(settings: SwitchSettings, state: SwitchState, pulse: int) -> SwitchState:
+def _by_position(settings: SwitchSettings, state: SwitchState, received: Received) -> SwitchState:
+    pulse = received.pulse
     if pulse < settings.manual_below:
         return SwitchState(Authority.MANUAL, 0, f"the switch is at {pulse} us: manual takeover")
     if pulse > settings.landing_above:
-        confirmed = state.confirmed + 1
+        confirmed = state.confirmed + (1 if received.new else 0)
         if state.authority is Authority.AUTONOMOUS and confirmed >= CONFIRMED:
             why = f"the switch is at {pulse} us: emergency landing"
             return SwitchState(Authority.LANDING, confirmed, why)

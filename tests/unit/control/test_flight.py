@@ -16,9 +16,9 @@ from volery.control.safety_switch import Reaction, SwitchSettings
 SWITCH = SwitchSettings()
 BOTH = pytest.mark.parametrize("by", ["setpoints", "rc"])
 ALL = pytest.mark.parametrize("by", ["setpoints", "attitude", "rc"])
-REPORT_S, SAMPLE_S, DELAY_S = 0.05, 0.05, 0.01
-SETTLED_S = REPORT_S + SAMPLE_S + DELAY_S
-"""Time after which a moved switch has its effect: one report of RC channels, one sample of the loop."""
+REPORT_S, DELAY_S = 0.05, 0.01
+SETTLED_S = REPORT_S + DELAY_S
+"""Time after which a moved switch has its effect: one report of RC channels, and the link there and back."""
 
 
 def rotation() -> Rotation:

@@ -48,6 +48,12 @@ def test_a_received_low_switch_takes_over_from_every_state(settings, sequence):
     assert after(*sequence, at(1000), settings=settings).authority is MANUAL
 
 
+def test_one_report_that_is_looked_at_twice_begins_no_landing():
+    middle, high = at(1500), at(1900)
+    assert after(middle, high, high._replace(new=False), high._replace(new=False)).authority is AUTONOMOUS
+    assert after(middle, high, high._replace(new=False), high).authority is LANDING
+
+
 @given(settings_of, st.lists(looks, max_size=40))
 def test_the_program_gets_control_only_by_a_fresh_middle_position(settings, sequence):
     state = SwitchState()

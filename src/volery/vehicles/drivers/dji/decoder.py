@@ -26,7 +26,16 @@ from volery.ros.messages.dji_constants import (
 )
 from volery.trace.events import Text
 from volery.vehicles.drivers.steps import DRONE_KIND
-from volery.vehicles.telemetry import Attitude, Battery, StatusText, Telemetry, Velocity
+from volery.vehicles.telemetry import (
+    PILOT_FLIES,
+    PROGRAM_MAY_FLY,
+    Attitude,
+    Battery,
+    StatusText,
+    Telemetry,
+    Velocity,
+    pulse_of,
+)
 
 Handler = Callable[[Any], None]
 
@@ -195,7 +204,7 @@ class DjiDecoder:
         self._telemetry.battery = Battery(message.percentage / 100.0, volts, amperes)
 
     def _rc(self, message: Any) -> None:
-        """Detect a takeover: any movement of the mode switch takes the authority."""
+        """Decode sticks and switches; any move of the mode switch takes the authority."""
         if len(message.axes) <= SWITCH_AXIS:
             return
         switch = self._switch = float(message.axes[SWITCH_AXIS])
@@ -205,6 +214,14 @@ class DjiDecoder:
             self._lose("RC", "the pilot moved the mode switch: the authority is lost")
         elif self._taken == "RC" and switch == self._granted_at:
             self._taken = ""
+        at_program = self._granted_at is None or switch == self._granted_at
+        shares = [one / max(1.0, abs(one)) for one in message.axes]  # some switches are in ten-thousandths
+        channels = [pulse_of(one) for one in shares]
+        channels[SWITCH_AXIS] = PROGRAM_MAY_FLY if at_program else PILOT_FLIES
+        if self._transmitter not in {UNKNOWN, CONNECTED}:  # the last values are repeated
+            channels = [0] * len(channels)
+        self._telemetry.rc, self._telemetry.rc_ns = tuple(channels), self._kernel.now()
+        self._telemetry.changed.notify()
 
     def _rc_connection(self, message: Any) -> None:
         """Tell when the transmitter is lost and when it is back."""

@@ -17,7 +17,17 @@ from volery.links.paparazzi_aircraft import PaparazziAircraft
 from volery.links.pprzlink_messages import entry_name, entry_value, message_type
 from volery.trace.events import Text
 from volery.vehicles.drivers.steps import DRONE_KIND
-from volery.vehicles.telemetry import Answer, Attitude, Battery, StatusText, Telemetry, Velocity
+from volery.vehicles.telemetry import (
+    PILOT_FLIES,
+    PROGRAM_MAY_FLY,
+    Answer,
+    Attitude,
+    Battery,
+    StatusText,
+    Telemetry,
+    Velocity,
+    pulse_of,
+)
 
 STATUS = "ROTORCRAFT_STATUS"
 
@@ -102,6 +112,10 @@ PAUSE: Ns = S
 """Silence of the link after which the position has all of ``MISSED_AFTER`` again."""
 
 NOTICE, WARNING = 5, 4
+MAX_PPRZ = 9600
+"""Full thrust in ROTORCRAFT_FP, full deflection in ROTORCRAFT_RADIO_CONTROL; above half AUTO2."""
+LOST_FILTERS = frozenset({4, 5, 6, 8})
+"""GPS_LOST, IMU_LOST, COV_ERR and ERROR in STATE_FILTER_STATUS."""
 
 
 class Origin:
@@ -172,12 +186,14 @@ class PaparazziDecoder:
         self._handlers: Mapping[str, Callable[[Fields], None]] = {
             "ROTORCRAFT_FP": self._flight,
             STATUS: self._status,
+            "ROTORCRAFT_RADIO_CONTROL": self._radio,
             "INS_REF": self._reference,
             "GPS_INT": self._satellites,
             "ENERGY": self._energy,
             "ROTORCRAFT_NAV_STATUS": self._navigation,
             "DL_VALUE": self._value,
             "WP_MOVED_ENU": self._moved,
+            "STATE_FILTER_STATUS": self._state_filter,
             "INFO_MSG": lambda fields: self.add_text(NOTICE, fields["msg"]),
         }
 
@@ -268,6 +284,16 @@ class PaparazziDecoder:
             telemetry.battery = Battery(nan, fields["vsupply"], nan)
         self.update_ready()
 
+    def _radio(self, fields: Fields) -> None:
+        """Decode the transmitter: roll, pitch, throttle, yaw, mode switch, kill switch."""
+        if entry_name("ROTORCRAFT_RADIO_CONTROL", "status", fields["status"]) != "OK":
+            channels: tuple[int, ...] = (0,) * 6
+        else:
+            sticks = (pulse_of(fields[name] / MAX_PPRZ) for name in ("roll", "pitch", "throttle", "yaw"))
+            mode = PROGRAM_MAY_FLY if fields["mode"] > MAX_PPRZ // 2 else PILOT_FLIES
+            channels = (*sticks, mode, pulse_of(fields["kill"] / MAX_PPRZ))
+        self._telemetry.rc, self._telemetry.rc_ns = channels, self._kernel.now()
+
     def _update_arming(self, status: str) -> None:
         telemetry, began, now = self._telemetry, self.starting, self._kernel.now()
         telemetry.status = status.lower().replace("_", " ")
@@ -311,6 +337,7 @@ class PaparazziDecoder:
             degrees(fields["phi"] * ANGLE), degrees(fields["theta"] * ANGLE), heading
         )
         self.thrust = fields["thrust"]
+        telemetry.thrust = self.thrust / MAX_PPRZ
         if self.origin is None:
             return
         self._flight_at = self._kernel.now()
@@ -322,6 +349,9 @@ class PaparazziDecoder:
         north, east, up = (fields[name] * SPEED for name in ("vnorth", "veast", "vup"))
         telemetry.velocity = Velocity(north, east, up) if self.good_fix else Velocity(nan, nan, up)
         self.update_ready()
+
+    def _state_filter(self, fields: Fields) -> None:
+        self._telemetry.note_estimate(fields["state_filter_mode"] not in LOST_FILTERS)
 
     def _satellites(self, fields: Fields) -> None:
         self._telemetry.satellites = fields["numsv"]
