@@ -5,7 +5,8 @@ group such as ``volery bag``. ``volery.cli.main`` finds all of them, so a new co
 import the library inside their functions: ``volery --help`` imports all of them and must stay quick.
 
 A command is a function of an ``Output`` and of its options, and returns its exit status. The options that
-control the output (``--quiet``, ``--json``, ``--debug``) are added here.
+control the output (``--quiet``, ``--json``, ``--debug``) are added here. Options that several commands share
+are the fields of a dataclass: a parameter with that type stands for all of them.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import is_dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import typer
@@ -81,15 +83,21 @@ class Commands:
 def _command_line_function(
     function: Callable[..., int], options: tuple[OutputOption, ...]
 ) -> Callable[..., None]:
-    """Return *function* as Typer calls it: with output options in the place of its ``output``."""
+    """Return *function* as Typer calls it: output options for its ``output``, fields for its dataclasses."""
+    signature = inspect.signature(function, eval_str=True)
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    stated = [one.replace(kind=keyword) for one in signature.parameters.values() if one.name != "output"]
+    groups = {one.name: one.annotation for one in stated if is_dataclass(one.annotation)}
+    members = {name: inspect.signature(group, eval_str=True).parameters for name, group in groups.items()}
+    own = [one for one in stated if one.name not in groups]
+    own += [member.replace(kind=keyword) for shared in members.values() for member in shared.values()]
 
     def call(**arguments: Any) -> None:
         output = Output(**{option: arguments.pop(option) for option in options})
+        for name, group in groups.items():
+            arguments[name] = group(**{member: arguments.pop(member) for member in members[name]})
         raise typer.Exit(exit_status(output, lambda: function(output, **arguments)))
 
-    signature = inspect.signature(function, eval_str=True)
-    keyword = inspect.Parameter.KEYWORD_ONLY
-    own = [one.replace(kind=keyword) for one in signature.parameters.values() if one.name != "output"]
     added = [
         inspect.Parameter(
             option, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_OUTPUT_OPTIONS[option]

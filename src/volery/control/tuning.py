@@ -1,9 +1,10 @@
 """Tuning of a loop: a relay experiment, a fitted process, robust gains, and gains optimised on scenarios.
 
-A commanded rate becomes a quantity (heading, height) through a lag, a dead time and an integration. The relay
-makes that loop oscillate; gain, lag and dead time are fitted to the record. SIMC gives gains with known
-margins; the cross-entropy method improves them over scenarios with wind, slow links and a loaded computer,
-under bounds on the margins. What was tuned is judged on scenarios that were held back.
+A commanded rate becomes a quantity (heading, height) through a dead time, a rate loop with a limited
+acceleration, and an integration. The relay makes that loop oscillate; the process is fitted to the record.
+SIMC gives gains with known margins; the cross-entropy method improves them over scenarios with wind, slow
+links and a loaded computer, under bounds on margins and sensitivity. What was tuned is judged on scenarios
+that were held back.
 
 Sources: Åström and Hägglund, Automatica 20 (1984) 645; Skogestad, J. Process Control 13 (2003) 291 (SIMC);
 Rubinstein, Eur. J. Oper. Res. 99 (1997) 89 (cross-entropy).
@@ -12,7 +13,7 @@ Rubinstein, Eur. J. Oper. Res. 99 (1997) 89 (cross-entropy).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, pi, sqrt
 from typing import Any, NamedTuple
 
@@ -24,10 +25,14 @@ from volery.control.step_response import Array
 
 INTEGRATION_S = 0.01
 """Step of the simulated process, s."""
-FREQUENCIES = np.geomspace(1.5, 20.0, 16)
-DAMPINGS = np.array([0.35, 0.45, 0.55, 0.7, 0.85, 1.0, 1.4])
+FREQUENCIES = np.geomspace(1.5, 25.0, 10)
+DAMPINGS = np.array([0.4, 0.55, 0.7, 0.85, 1.0, 1.4])
+ACCELERATIONS = np.array([0.75, 1.1, 1.6, 2.4, 3.5, 5.0, 8.0, 1e9])
+"""The last is no limit; the others are multiples of the commanded rate's amplitude, 1/s."""
 DEAD_TIMES_S = np.arange(0.0, 0.81, 0.02)
-"""Values that the fit tries."""
+"""Values that the fit tries first."""
+REFINED = np.linspace(-1.0, 1.0, 7)
+"""Values about the best of them, as shares of the distance to its neighbours."""
 LEAST_CYCLES = 2
 
 
@@ -35,13 +40,15 @@ class Process(NamedTuple):
     """A commanded rate that becomes a quantity.
 
     The transfer function is ``gain w^2 exp(-dead_s p) / (p (p^2 + 2 damping w p + w^2))``, with ``w`` the
-    ``frequency``: an inner rate loop of the autopilot, the way to it and back, and an integration.
+    ``frequency``: an inner rate loop of the autopilot, the way to it and back, and an integration. The
+    acceleration is limited, so a large change of the command takes longer than a small one.
 
     Attributes:
         gain: rate per commanded rate.
         frequency: natural frequency of the rate loop, rad/s.
         damping: its damping.
         dead_s: dead time of link, autopilot and telemetry, s.
+        acceleration: greatest rate of change of the rate, units/s^2.
         misfit: standard deviation of the fitted record, in units of the quantity.
     """
 
@@ -49,6 +56,7 @@ class Process(NamedTuple):
     frequency: float
     damping: float
     dead_s: float
+    acceleration: float = inf
     misfit: float = 0.0
 
 
@@ -92,7 +100,7 @@ def relay_oscillation(times: Array, error: Array, output: Array, hysteresis: flo
 
 
 def fit_process(times: Array, values: Array, commands: Array) -> Process:
-    """Return the process that explains a record best (least squares over the grid of values).
+    """Return the process that explains a record best (least squares over a grid of values, then a finer one).
 
     Args:
         times: times of the samples, s.
@@ -100,34 +108,55 @@ def fit_process(times: Array, values: Array, commands: Array) -> Process:
         commands: commanded rate.
 
     Raises:
-        UsageError: nothing in the record moves.
+        UsageError: nothing in the record moves, or not as it is commanded.
     """
     grid = np.arange(float(times[0]), float(times[-1]), INTEGRATION_S)
     moved = np.interp(grid, times, values - values[0])
     command = commands[np.maximum(np.searchsorted(times, grid, side="right") - 1, 0)]
     if np.ptp(moved) == 0.0 or np.ptp(command) == 0.0:
         raise UsageError("nothing moves in the record of the experiment")
-    frequencies, dampings = (one.ravel() for one in np.meshgrid(FREQUENCIES, DAMPINGS))
-    units = np.cumsum(_rates(command, frequencies, dampings), axis=0) * INTEGRATION_S
+    limits = ACCELERATIONS * float(np.max(np.abs(command)))
+    coarse = _best_of_grid(moved, command, FREQUENCIES, DAMPINGS, limits, DEAD_TIMES_S)
+    if not coarse.gain > 0.0:
+        raise UsageError(f"the fitted gain is {coarse.gain:.3g}: the quantity does not follow its command")
+    near = coarse.acceleration / coarse.gain
+    fine = _best_of_grid(
+        moved,
+        command,
+        coarse.frequency * (FREQUENCIES[1] / FREQUENCIES[0]) ** REFINED,
+        coarse.damping * 1.25**REFINED,
+        near * 1.4**REFINED if near < limits[-1] else limits[-1:],
+        np.maximum(coarse.dead_s + np.array([-0.02, -0.01, 0.0, 0.01, 0.02]), 0.0),
+    )
+    unlimited = fine.acceleration >= fine.gain * limits[-1] / 2.0
+    return fine._replace(acceleration=inf) if unlimited else fine
+
+
+def _best_of_grid(
+    moved: Array, command: Array, frequencies: Array, dampings: Array, limits: Array, dead_times: Array
+) -> Process:
+    """Return the process with the least misfit; ``limits`` are accelerations per gain."""
+    copies = [one.ravel() for one in np.meshgrid(frequencies, dampings, limits)]
+    units = np.cumsum(_rates(command, *copies), axis=0) * INTEGRATION_S
+    offset_and_drift = np.stack((np.ones(len(moved)), np.arange(len(moved))), axis=1)
+    basis = np.linalg.qr(offset_and_drift)[0]
     best = Process(0.0, 1.0, 1.0, 0.0, misfit=inf)
-    drift = np.stack((np.ones_like(grid), grid - grid[0]), axis=1)
-    for dead in DEAD_TIMES_S:
-        delay = round(dead / INTEGRATION_S)
+    seen = (moved - basis @ (basis.T @ moved))[:, None]
+    for dead in dead_times:
+        delay = round(float(dead) / INTEGRATION_S)
         late = np.concatenate((np.zeros((delay, units.shape[1])), units[: len(units) - delay]))
-        late = late - drift @ np.linalg.lstsq(drift, late, rcond=None)[0]
-        seen = moved - drift @ np.linalg.lstsq(drift, moved, rcond=None)[0]
-        gains = (late * seen[:, None]).sum(axis=0) / (late**2).sum(axis=0)
-        misfits = np.std(seen[:, None] - late * gains, axis=0)
+        late -= basis @ (basis.T @ late)
+        gains = (late * seen).sum(axis=0) / np.maximum((late**2).sum(axis=0), 1e-12)
+        misfits = np.std(seen - late * gains, axis=0)
         index = int(np.argmin(misfits))
         if misfits[index] < best.misfit:
-            figures = (gains[index], frequencies[index], dampings[index], dead, misfits[index])
+            frequency, damping, limit = (one[index] for one in copies)
+            figures = (gains[index], frequency, damping, dead, gains[index] * limit, misfits[index])
             best = Process(*map(float, figures))
-    if not best.gain > 0.0:
-        raise UsageError(f"the fitted gain is {best.gain:.3g}: the quantity does not follow its command")
     return best
 
 
-def _rates(command: Array, frequencies: Array, dampings: Array) -> Array:
+def _rates(command: Array, frequencies: Array, dampings: Array, limits: Array) -> Array:
     """Return the rate of each copy of the rate loop, by time and copy."""
     rates = np.zeros((len(command), len(frequencies)))
     rate, change = np.zeros(len(frequencies)), np.zeros(len(frequencies))
@@ -135,6 +164,7 @@ def _rates(command: Array, frequencies: Array, dampings: Array) -> Array:
         change = change + INTEGRATION_S * frequencies * (
             frequencies * (wanted - rate) - 2.0 * dampings * change
         )
+        change = np.clip(change, -limits, limits)
         rate = rate + INTEGRATION_S * change
         rates[index] = rate
     return rates
@@ -266,8 +296,6 @@ def cost(
 ) -> Array:
     """Return for each copy of the gains the mean IAE per unit of step over scenarios, in s.
 
-    Overshoot beyond 5 % counts four times.
-
     Args:
         gains: gains; each may be an array with one element for each copy.
         process: the process.
@@ -318,34 +346,19 @@ def _simulate(
         old = commands[(index - late) % len(commands), :, across].T if index else command * 0.0
         wanted = process.gain * factor * old + push
         change = change + INTEGRATION_S * own * (own * (wanted - rate) - damping * change)
+        change = np.clip(change, -process.acceleration, process.acceleration)
         rate = rate + INTEGRATION_S * change
         value = value + rate * INTEGRATION_S
-        error = (step - value) / step
-        spent += np.where(error < -0.05, 4.0, 1.0) * np.abs(error) * INTEGRATION_S
+        spent += np.abs((step - value) / step) * INTEGRATION_S
     return spent
 
 
 # -- optimisation
 
 
-@dataclass(frozen=True)
-class Tuned:
-    """Result of a tuning.
-
-    Attributes:
-        gains: the gains.
-        margins: their margins on the fitted process.
-        cost: mean IAE per unit of step over the held-back scenarios, s.
-    """
-
-    gains: PidGains
-    margins: Margins
-    cost: float
-
-
 CANDIDATES, ELITE, ROUNDS = 96, 16, 8
-LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 2.0, 45.0
-"""Bounds of the optimisation: 6 dB and 45 degrees."""
+LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN, GREATEST_SENSITIVITY = 2.0, 45.0, 2.0
+"""Bounds of the optimisation: 6 dB, 45 degrees, and the greatest sensitivity Ms (usually 1.4 to 2)."""
 
 
 def optimise(
@@ -388,7 +401,10 @@ def optimise(
         elite = np.log(safe[order[:ELITE]])
         centre, spread = elite.mean(axis=0), np.maximum(elite.std(axis=0), 0.05)
     if best is None:
-        raise UsageError("no gains near the start have a gain margin of 2 and a phase margin of 45 degrees")
+        raise UsageError(
+            f"no gains near the start have a gain margin of {LEAST_GAIN_MARGIN:g}, a phase margin of "
+            f"{LEAST_PHASE_MARGIN:g} degrees and a sensitivity below {GREATEST_SENSITIVITY:g}"
+        )
     return with_gains(start, names, [float(f"{value:.4g}") for value in best])
 
 
@@ -398,9 +414,13 @@ def with_gains(gains: PidGains, names: Sequence[str], values: Sequence[float] | 
 
 
 def is_robust(gains: PidGains, process: Process, sample_s: float = 0.05) -> bool:
-    """Return whether a loop has the least margins."""
+    """Return whether a loop has the least margins and no more than the greatest sensitivity."""
     found = margins(gains, process, sample_s)
-    return found.gain >= LEAST_GAIN_MARGIN and found.phase >= LEAST_PHASE_MARGIN
+    return (
+        found.gain >= LEAST_GAIN_MARGIN
+        and found.phase >= LEAST_PHASE_MARGIN
+        and found.sensitivity <= GREATEST_SENSITIVITY
+    )
 
 
 def as_toml(loop: str, gains: PidGains, comment: str) -> str:

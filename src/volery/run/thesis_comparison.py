@@ -122,8 +122,8 @@ def _fly(law: str, folder: Path, on: str, seed: int) -> Flown:
     rates = "attitude=50&rate=20" if law == OURS else "attitude=10&rate=10"
     address = f"{on}{'&' if '?' in on else '?'}{rates}"
     run = fly(mission, address, Options(out=folder, seed=seed))
-    if run.error is not None:
-        raise run.error
+    if not run.completed:
+        raise run.error or KeyboardInterrupt  # a signal ends this flight, and with it the series
     (signal,) = (one for one in read_signals(folder) if one.name == "yaw")
     responses = [one for one in step_responses(signal) if abs(one.size) > STEPS[0] / 2.0]
     return Flown(law, replace(signal, controller=law), responses[-len(STEPS) :])

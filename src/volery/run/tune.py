@@ -1,31 +1,33 @@
 """``tune``: gains of a loop from a relay experiment, a fitted process and flown scenarios.
 
 The relay is flown on the vehicle. On a simulated vehicle the gains that the fitted process suggests are
-improved in flights over scenarios with wind and slow links, and judged in flights over scenarios that were
-held back; a real vehicle is spared both, and its gains are judged on the fitted process.
+improved in flights over scenarios with wind, slow links and a loaded computer, and judged in flights over
+other scenarios of the same distribution; a real vehicle is spared both, and its gains are judged on the
+fitted process. All gains that are tried keep the margins of ``control.tuning``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from volery.base.errors import UsageError, choices, did_you_mean
-from volery.base.time import to_seconds
-from volery.control.laws import DEGREES, OnOffGains, OnOffLaw, PidGains, PidLaw
+from volery.base.time import Ns, to_seconds
+from volery.control.flight import PERIOD
+from volery.control.laws import DEGREES, OnOffGains, OnOffLaw, PidGains, PidLaw, wrap
 from volery.control.manoeuvres import HEIGHT_GAINS, YAW_GAINS, Altitude, Manoeuvre, Rotation
-from volery.control.step_response import Array, make_signal, step_responses
+from volery.control.step_response import Array, StepResponse, make_signal, step_responses
 from volery.control.tuning import (
     Margins,
     Oscillation,
     Process,
-    Scenario,
     cost,
     fit_process,
+    is_robust,
     margins,
     optimise,
     relay_oscillation,
@@ -40,11 +42,16 @@ from volery.vehicles.address import parse
 
 SAMPLE_S = 0.05
 TRAINING, HELD_BACK = 16, 32
-CANDIDATES = 8
+"""Scenarios on the fitted process."""
+TRAINING_FLIGHTS, HELD_BACK_FLIGHTS = 6, 12
+HELD_BACK_SEED = 1000
+CANDIDATES = 16
 """Gains that are tried in flights."""
-OVERSHOOT_ALLOWED, OVERSHOOT_WEIGHT = 0.05, 1.0
-LEAST_MARGIN = 1.6
-"""Least gain margin of gains that are tried in flights."""
+SPREAD = 0.12
+"""Spread of the logarithm of the gains about the best ones that were flown."""
+TUNED = ("kp", "ki", "kd", "deceleration")
+WIDER = (1.0, 4.0, 4.0, 1.0)
+"""Factors of the spread by gain: integral and derivative matter less."""
 
 Make = Callable[[PidGains, Sequence[float]], Manoeuvre]
 
@@ -60,8 +67,7 @@ class Loop:
         flown: makes a flight over set-points with gains.
         hand: gains set by hand.
         steps: sizes of steps of the scenarios on the fitted process.
-        training: set-points of the flown scenarios to tune on.
-        held_back: set-points of the flown scenarios that judge.
+        goals: draws the set-points of a flight.
         noise: standard deviation of the measurement.
         push: standard deviation of a rate that wind adds.
         seconds: duration of a simulated scenario, s.
@@ -74,12 +80,29 @@ class Loop:
     flown: Make
     hand: PidGains
     steps: Sequence[float]
-    training: Sequence[float]
-    held_back: Sequence[float]
+    goals: Callable[[np.random.Generator], list[float]]
     noise: float
     push: float
     seconds: float
     height: float
+
+
+def _headings(random: np.random.Generator) -> list[float]:
+    """Return four turns of 30 to 175 degrees to either side, from north."""
+    goals = [0.0]
+    for _ in range(4):
+        turn = float(random.choice([-1.0, 1.0]) * random.uniform(30.0, 175.0))
+        goals.append(float(wrap(goals[-1] + turn)))
+    return goals
+
+
+def _heights(random: np.random.Generator) -> list[float]:
+    """Return three climbs and descents of 2 to 8 m, from 8 m."""
+    goals = [8.0]
+    for _ in range(3):
+        step = float(random.uniform(2.0, 8.0))
+        goals.append(goals[-1] + (step if goals[-1] - step < 4.0 or random.random() < 0.5 else -step))
+    return goals
 
 
 LOOPS = {
@@ -90,8 +113,7 @@ LOOPS = {
         lambda gains, goals: Rotation(goals, 6.0, PidLaw(gains)),
         YAW_GAINS,
         (45.0, 90.0, 120.0, 170.0),
-        (0.0, 90.0, -60.0, 110.0),
-        (0.0, 45.0, 165.0, 75.0, -100.0),
+        _headings,
         0.1,
         3.0,
         8.0,
@@ -104,16 +126,45 @@ LOOPS = {
         lambda gains, goals: Altitude(goals, 12.0, PidLaw(gains)),
         HEIGHT_GAINS,
         (2.0, 4.0, 8.0),
-        (8.0, 12.0, 6.0),
-        (8.0, 10.0, 16.0, 9.0),
+        _heights,
         0.02,
         0.1,
         15.0,
         8.0,
     ),
 }
-TRAINING_LINKS = ("", "wire=bytes&jitter=0.1", "wind=5,200,4")
-HELD_BACK_LINKS = ("wire=bytes&jitter=0.06&drop=0.03", "wind=7,90,3", "wire=bytes&baud=57600&drop=0.05")
+
+
+class FlownScenario(NamedTuple):
+    """A flight that tests gains: set-points, options of the address, sample time in ns, seed."""
+
+    goals: list[float]
+    options: str
+    period: Ns
+    seed: int
+
+
+def flown_scenarios(loop: Loop, count: int, seed: int) -> list[FlownScenario]:
+    """Return random flights in wind, over links with delay and loss.
+
+    In a third of them a loaded computer samples half as often.
+
+    Args:
+        loop: what is tuned.
+        count: number of flights.
+        seed: seed of the random numbers.
+    """
+    random = np.random.default_rng(seed)
+    found = []
+    for number in range(count):
+        goals = loop.goals(random)
+        wind = (
+            f"{random.uniform(0.0, 8.0):.1f},{random.uniform(0.0, 360.0):.0f},{random.uniform(0.0, 3.0):.1f}"
+        )
+        link = f"jitter={random.uniform(0.0, 0.08):.3f}&drop={random.uniform(0.0, 0.04):.3f}"
+        period = int(random.choice([PERIOD, PERIOD, 2 * PERIOD]))
+        found.append(FlownScenario(goals, f"wire=bytes&{link}&wind={wind}", period, 100 * seed + number))
+    return found
 
 
 class Judged(NamedTuple):
@@ -173,88 +224,92 @@ def tune(what: str, on: str, settings: GoSettings, options: Options, tell: Tell 
     tell("optimisation on the fitted process")
     training = scenarios(loop.steps, loop.noise, loop.push, TRAINING, options.seed)
     tuned = optimise(process, loop.hand, training, loop.seconds, options.seed)
-    simulated = parse(on).transport == "sim"
-    if simulated:
-
-        def train(gains: PidGains) -> Flights:
-            return _flights(loop, gains, on, settings, TRAINING_LINKS, loop.training)
-
-        tuned = _improve(loop, tuned, process, train, options.seed, tell)
-    held_back = scenarios(loop.steps, loop.noise, loop.push, HELD_BACK, options.seed + 1000)
+    flights = _Flights(loop, on, settings) if parse(on).transport == "sim" else None
+    if flights is not None:
+        tuned = _improve(loop, tuned, process, flights, options.seed, tell)
+    held_back = scenarios(loop.steps, loop.noise, loop.push, HELD_BACK, options.seed + HELD_BACK_SEED)
     judged = []
     for name, gains in (("by hand", loop.hand), ("SIMC", simc(process, loop.hand)), ("tuned", tuned)):
         tell(f"held-back scenarios: {name}")
-        flown = _flights(loop, gains, on, settings, HELD_BACK_LINKS, loop.held_back) if simulated else None
-        judged.append(_judge(loop, name, gains, process, held_back, flown))
+        found = NOT_FLOWN
+        if flights is not None:
+            found = flights(gains, flown_scenarios(loop, HELD_BACK_FLIGHTS, options.seed + HELD_BACK_SEED))
+        modelled = float(cost(gains, process, held_back, loop.seconds)[0])
+        judged.append(Judged(name, gains, margins(gains, process, SAMPLE_S), modelled, *found))
     return Tuning(loop, oscillation, process, tuple(judged))
 
 
-def _judge(
-    loop: Loop, name: str, gains: PidGains, process: Process, tests: Sequence[Scenario], flown: Flights | None
-) -> Judged:
-    modelled = float(cost(gains, process, tests, loop.seconds)[0])
-    found = flown or Flights(float("nan"), float("nan"))
-    return Judged(name, gains, margins(gains, process, SAMPLE_S), modelled, found.iae, found.overshoot)
-
-
-class Flights(NamedTuple):
+class Flown(NamedTuple):
     """Mean IAE per unit of step in s, and greatest overshoot as a share of its step."""
 
     iae: float
     overshoot: float
 
-    @property
-    def cost(self) -> float:
-        """IAE with a penalty on overshoot."""
-        return self.iae + OVERSHOOT_WEIGHT * max(0.0, self.overshoot - OVERSHOOT_ALLOWED)
+
+NOT_FLOWN = Flown(nan, nan)
 
 
-Fly = Callable[[PidGains], Flights]
+class _Flights:
+    """Flies scenarios with gains."""
+
+    def __init__(self, loop: Loop, on: str, settings: GoSettings) -> None:
+        self._loop, self._on, self._settings = loop, on, settings
+
+    def __call__(self, gains: PidGains, tests: Sequence[FlownScenario]) -> Flown:
+        """Return the figures over all steps of all flights."""
+        found = [one for test in tests for one in self._responses(gains, test)]
+        return Flown(
+            float(np.mean([one.iae / abs(one.size) for one in found])),
+            max(one.overshoot_share for one in found),
+        )
+
+    def _responses(self, gains: PidGains, test: FlownScenario) -> list[StepResponse]:
+        loop, period = self._loop, self._loop.relay.period
+        url = f"{self._on}{'&' if '?' in self._on else '?'}{test.options}"
+        settings = replace(self._settings, period=test.period)
+        record = _fly(
+            lambda: loop.flown(gains, test.goals), url, settings, Options(seed=test.seed), loop.name
+        )
+        times, values, aims, _, _ = record.T
+        signal = make_signal(
+            loop.name, "deg" if period else "m", (times, values), (times, aims), period=period
+        )
+        return step_responses(signal)
 
 
-def _improve(loop: Loop, tuned: PidGains, process: Process, flights: Fly, seed: int, tell: Tell) -> PidGains:
-    """Return the best of *tuned*, the gains by hand and gains between and about them, by flights."""
+def _improve(
+    loop: Loop, tuned: PidGains, process: Process, flights: _Flights, seed: int, tell: Tell
+) -> PidGains:
+    """Return the gains with the least IAE in flights, among the known ones and random ones near the best."""
     random = np.random.default_rng(seed)
-    names = ("kp", "ki", "kd", "deceleration")
-    given = [[float(getattr(one, name)) for name in names] for one in (loop.hand, tuned)]
-    ends = np.log(np.maximum(given, 1e-3))
+    tests = flown_scenarios(loop, TRAINING_FLIGHTS, seed)
+    known = [
+        one for one in (tuned, loop.hand, _between(loop.hand, tuned)) if is_robust(one, process, SAMPLE_S)
+    ]
     best, least = tuned, inf
     for number in range(CANDIDATES):
-        drawn = ends[number] if number < len(ends) else _between(ends, random)
-        gains = with_gains(tuned, names, [float(f"{value:.4g}") for value in np.exp(drawn)])
-        if number >= len(ends) and margins(gains, process, SAMPLE_S).gain < LEAST_MARGIN:
-            continue
+        gains = known[number] if number < len(known) else _near(best, process, random)
         tell(f"flights with gains {number + 1} of {CANDIDATES}")
-        spent = flights(gains).cost
+        spent = flights(gains, tests).iae
         if spent < least:
             best, least = gains, spent
     return best
 
 
-def _between(ends: Array, random: np.random.Generator) -> Array:
-    """Return a random point near the line between two points."""
-    share = random.uniform(0.0, 1.0)
-    point: Array = ends[0] * (1.0 - share) + ends[1] * share + 0.2 * random.standard_normal(ends.shape[1])
-    return point
+def _between(one: PidGains, other: PidGains) -> PidGains:
+    """Return the geometric mean of two gains."""
+    pairs = [(float(getattr(one, name)), float(getattr(other, name))) for name in TUNED]
+    return with_gains(other, TUNED, [float(f"{sqrt(a * b):.4g}") for a, b in pairs])
 
 
-def _flights(
-    loop: Loop, gains: PidGains, on: str, settings: GoSettings, links: Sequence[str], goals: Sequence[float]
-) -> Flights:
-    """Fly the set-points over each kind of link and weather."""
-    iae, overshoot = [], 0.0
-    for number, link in enumerate(links):
-        url = f"{on}{'&' if '?' in on else '?'}{link}" if link else on
-        record = _fly(lambda: loop.flown(gains, goals), url, settings, Options(seed=number + 1), loop.name)
-        times, values, aims, _, _ = record.T
-        period = loop.relay.period
-        signal = make_signal(
-            loop.name, "deg" if period else "m", (times, values), (times, aims), period=period
-        )
-        for found in step_responses(signal):
-            iae.append(found.iae / abs(found.size))
-            overshoot = max(overshoot, found.overshoot_share)
-    return Flights(float(np.mean(iae)), overshoot)
+def _near(best: PidGains, process: Process, random: np.random.Generator) -> PidGains:
+    """Return random gains near the best that have the margins."""
+    centre = np.array([max(float(getattr(best, name)), 1e-3) for name in TUNED])
+    while True:
+        drawn = centre * np.exp(SPREAD * random.standard_normal(len(TUNED)) * np.array(WIDER))
+        gains = with_gains(best, TUNED, [float(f"{value:.4g}") for value in drawn])
+        if is_robust(gains, process, SAMPLE_S):
+            return gains
 
 
 def _fly(make: Callable[[], Manoeuvre], on: str, settings: GoSettings, options: Options, loop: str) -> Array:
@@ -266,8 +321,8 @@ def _fly(make: Callable[[], Manoeuvre], on: str, settings: GoSettings, options: 
             rows.append((to_seconds(event.at), event.measurement, event.goal, event.error, event.output))
 
     run = go(make, on, settings, options, listener=collect)
-    if run.error is not None:
-        raise run.error
+    if not run.completed:
+        raise run.error or KeyboardInterrupt  # a signal ends this flight, and with it the series
     found: Array = np.array(rows)
     if found.ndim != 2:
         raise UsageError(f"the flight recorded no sample of {loop}; did the operator keep control?")

@@ -39,17 +39,22 @@ def relay_record(process: Process, seconds: float, amplitude: float, hysteresis:
         own = process.frequency
         wanted = process.gain * sent[-1 - delay]
         change += INTEGRATION_S * own * (own * (wanted - rate) - 2.0 * process.damping * change)
+        change = min(process.acceleration, max(-process.acceleration, change))
         rate += INTEGRATION_S * change
         value += INTEGRATION_S * rate
     return np.array(rows).T
 
 
-@pytest.mark.parametrize("process", [PROCESS, Process(1.1, 3.0, 1.0, 0.3)])
+@pytest.mark.parametrize(
+    "process", [PROCESS, Process(1.1, 3.0, 1.0, 0.3), Process(1.0, 10.0, 0.7, 0.1, acceleration=200.0)]
+)
 def test_the_process_is_found_again(process):
     times, values, _, outputs = relay_record(process, 30.0, 60.0, 2.0)
     found = fit_process(times, values, outputs)
     assert found.gain == pytest.approx(process.gain, rel=0.1)
     assert found.misfit < 0.05 * np.std(values)
+    if np.isfinite(process.acceleration):
+        assert found.acceleration == pytest.approx(process.acceleration, rel=0.25)
     for frequency in (0.5, 1.5, 3.0):  # the phase counts, not which part of it is dead time
         one, other = (
             -2.0 * p.damping * frequency / p.frequency - frequency * p.dead_s for p in (found, process)
@@ -105,7 +110,7 @@ def test_tuned_gains_beat_the_start_on_scenarios_that_were_held_back():
 
 
 def test_gains_are_written_as_they_are_read(tmp_path):
-    from volery.run.go import read_gains
+    from volery.run.gains import read_gains
 
     file = tmp_path / "gains.toml"
     file.write_text(as_toml("yaw", BASE, "tuned"))

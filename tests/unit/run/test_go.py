@@ -7,17 +7,12 @@ from pathlib import Path
 import pytest
 
 from volery.base.errors import UsageError
-from volery.control.laws import PidGains
 from volery.control.log_signals import read_signals
 from volery.control.manoeuvres import Rotation
 from volery.control.safety_switch import SwitchSettings
-from volery.run.go import GoSettings, go, read_gains, with_rates
+from volery.run.go import GoSettings, go, with_rates
 from volery.run.result import Options
 from volery.run.thesis_comparison import fly_thesis_comparison
-from volery.trace.events import Text
-from volery.trace.reader import read
-
-LOOPS = {"yaw": PidGains(kp=1.0, ki=0.5)}
 
 
 def test_the_telemetry_of_a_loop_is_requested_unless_stated() -> None:
@@ -27,66 +22,6 @@ def test_the_telemetry_of_a_loop_is_requested_unless_stated() -> None:
     )
     assert with_rates("sim:ardupilot", SwitchSettings(channel=7)).endswith("transmitter=7:1450")
     assert with_rates("sim:dji", None) == "sim:dji"
-
-
-def test_gains_are_read_and_others_kept(tmp_path: Path) -> None:
-    file = tmp_path / "gains.toml"
-    file.write_text("[yaw]\nkp = 2.5\n")
-    assert read_gains(file, LOOPS) == {"yaw": PidGains(kp=2.5, ki=0.5)}
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("[yaw]\nkp = nan\n", "kp is not a number"),
-        ("[yaw]\nkp = -1\n", "kp=-1"),
-        ("[yaw]\nkq = 1\n", "kq = 1 is no gain"),
-        ("[jaw]\nkp = 1\n", "no loop 'jaw'"),
-        ("yaw = 3\n", r"write a table"),
-        ("[yaw\n", "no TOML"),
-    ],
-)
-def test_wrong_gains_are_named(tmp_path: Path, text: str, said: str) -> None:
-    file = tmp_path / "gains.toml"
-    file.write_text(text)
-    with pytest.raises(UsageError, match=said) as error:
-        read_gains(file, LOOPS)
-    assert "gains.toml" in str(error.value)
-
-
-def test_a_missing_file_of_gains_is_named(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"nowhere\.toml"):
-        read_gains(tmp_path / "nowhere.toml", LOOPS)
-
-
-def test_gains_that_change_in_flight_are_used_and_wrong_ones_are_not(tmp_path: Path) -> None:
-    file = tmp_path / "gains.toml"
-    file.write_text("[yaw]\nkp = 3.0\n")
-    turns = Rotation([0.0], 6.0)
-    seen = []
-
-    def edit(seconds: float) -> None:
-        law = turns.laws["yaw"]
-        seen.append(law.gains.kp)  # type: ignore[attr-defined]  # it is a PID law
-        if len(seen) == 40:
-            file.write_text("[yaw]\nkp = 2.0\n")
-        if len(seen) == 80:
-            file.write_text("[yaw]\nkp = -2.0\n")
-
-    step = turns.step
-
-    def watched(measured, sample_s):
-        edit(sample_s)
-        return step(measured, sample_s)
-
-    turns.step = watched  # type: ignore[method-assign]
-    run = go(lambda: turns, "sim:ardupilot?start=warm", GoSettings(gains=file), Options(out=tmp_path / "run"))
-    assert run.error is None
-    assert set(seen) == {3.0, 2.0}
-    assert seen[-1] == 2.0
-    texts = [event.text for event in read(tmp_path / "run" / "trace.mcap").events if isinstance(event, Text)]
-    assert any("are in use" in text for text in texts)
-    assert any("remain as they were" in text and "kp=-2" in text for text in texts)
 
 
 def test_a_flight_records_its_loops(tmp_path: Path) -> None:
@@ -106,6 +41,8 @@ def test_wrong_settings_are_refused() -> None:
         GoSettings(by="stick")
     with pytest.raises(UsageError, match="above 0"):
         GoSettings(height=0.0)
+    with pytest.raises(UsageError, match="no graph 'ros3'"):
+        GoSettings(graph="ros3")
 
 
 def test_the_figures_of_the_thesis_are_met_and_beaten(tmp_path: Path) -> None:

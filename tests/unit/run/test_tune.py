@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -15,27 +16,43 @@ from volery.run.result import Options
 from volery.run.tune import tune
 
 
-def test_tuned_gains_have_margins_and_cost_less_on_the_fitted_process(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    short = replace(module.LOOPS["rotation"], training=(0.0, 90.0), held_back=(0.0, 60.0), seconds=4.0)
+def test_tuned_gains_keep_their_margins_and_fly(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    short = replace(module.LOOPS["rotation"], goals=lambda random: [0.0, float(random.choice([60.0, 90.0]))])
     monkeypatch.setattr(module, "LOOPS", {**module.LOOPS, "rotation": short})
     monkeypatch.setattr(tuning, "ROUNDS", 2)
     monkeypatch.setattr(tuning, "CANDIDATES", 24)
-    monkeypatch.setattr(module, "TRAINING", 6)
-    monkeypatch.setattr(module, "HELD_BACK", 8)
-    monkeypatch.setattr(module, "CANDIDATES", 2)  # the gains by hand and those of the process, in flights
-    monkeypatch.setattr(module, "TRAINING_LINKS", ("",))
-    monkeypatch.setattr(module, "HELD_BACK_LINKS", ("wire=bytes&jitter=0.06",))
+    for name, value in (
+        ("TRAINING", 6),
+        ("HELD_BACK", 8),
+        ("TRAINING_FLIGHTS", 1),
+        ("HELD_BACK_FLIGHTS", 1),
+        ("CANDIDATES", 2),
+    ):
+        monkeypatch.setattr(module, name, value)
     found = tune("rotation", "sim:ardupilot?start=warm", GoSettings(), Options(out=tmp_path))
     hand, simc, tuned = found.judged
     assert found.process.misfit < 1.5
     assert 2.0 < found.oscillation.ultimate_gain < 6.0
-    assert tuned.modelled <= hand.modelled
-    assert tuned.margins.gain > 1.5
+    assert found.process.acceleration < 500.0
+    assert tuned.margins.gain >= 2.0
+    assert tuned.margins.phase >= 45.0
+    assert tuned.margins.sensitivity <= 2.0
     assert max(hand.flown, simc.flown, tuned.flown) < 2.0
 
 
 def test_an_unknown_loop_is_named() -> None:
     with pytest.raises(UsageError, match="no loop 'pitch'; there is altitude or rotation"):
         tune("pitch", "sim:ardupilot", GoSettings(), Options())
+
+
+def test_an_interrupt_ends_the_whole_series(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    flights = []
+
+    def interrupted(*given: object, **more: object) -> SimpleNamespace:
+        flights.append(given)
+        return SimpleNamespace(completed=False, error=None)
+
+    monkeypatch.setattr(module, "go", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        tune("rotation", "sim:ardupilot", GoSettings(), Options(out=tmp_path))
+    assert len(flights) == 1

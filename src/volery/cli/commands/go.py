@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from volery.control.manoeuvres import Manoeuvre
     from volery.control.safety_switch import SwitchSettings
+    from volery.run.go import GoSettings
 
 commands = Commands("Fly", group="go", summary="Fly under a control law on this side of the link.")
 
@@ -28,83 +30,113 @@ By = Annotated[
         help="Apply commands as velocity or attitude set-points, or by RC override.",
     ),
 ]
-Switch = Annotated[
-    str,
-    typer.Option(
-        metavar="CHANNEL|none",
-        help="RC channel of the safety switch: below 1200 us manual, to 1700 us autonomous, above land.",
-    ),
-]
-OnRcLoss = Annotated[
-    str, typer.Option(metavar="land|release|continue", help="Reaction to the loss of the transmitter.")
-]
-OnTelemetryLoss = Annotated[
-    str, typer.Option(metavar="land|release", help="Reaction to the loss of telemetry.")
-]
-Gains = Annotated[
-    Path | None,
-    typer.Option(metavar="FILE", help="Gains by loop in TOML; read again while the vehicle flies."),
-]
 Height = Annotated[float, typer.Option(metavar="METRES", help="Height of the take-off above home.")]
 Hold = Annotated[float, typer.Option(metavar="SECONDS", help="Time for each set-point.")]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SwitchOptions:
+    """Options of the operator's safety switch."""
+
+    switch: Annotated[
+        str,
+        typer.Option(
+            metavar="CHANNEL|none",
+            help="RC channel of the safety switch: below 1200 us manual, to 1700 us autonomous, above land.",
+        ),
+    ] = "6"
+    on_rc_loss: Annotated[
+        str, typer.Option(metavar="land|release|continue", help="Reaction to the loss of the transmitter.")
+    ] = "land"
+    on_telemetry_loss: Annotated[
+        str, typer.Option(metavar="land|release", help="Reaction to the loss of telemetry.")
+    ] = "land"
+
+    def settings(self) -> SwitchSettings | None:
+        """Return the settings of the switch, or None for ``none``.
+
+        Raises:
+            UsageError: an option is wrong.
+        """
+        from volery.control.safety_switch import SwitchSettings, parse_reaction
+
+        rc, telemetry = parse_reaction(self.on_rc_loss), parse_reaction(self.on_telemetry_loss)
+        if self.switch == "none":
+            return None
+        if not self.switch.isdecimal():
+            raise UsageError(f"--switch {self.switch}: give the number of an RC channel, or none")
+        return SwitchSettings(channel=int(self.switch), on_rc_loss=rc, on_telemetry_loss=telemetry)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlightOptions(SwitchOptions):
+    """Options of every flight under a law."""
+
+    on: On
+    by: By = "setpoints"
+    gains: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Gains by loop in TOML; read again while the vehicle flies."),
+    ] = None
+    graph: Annotated[
+        str | None,
+        typer.Option(
+            "--graph",
+            metavar="ros1|ros2",
+            help="Gains are parameters of the node volery_go on real ROS, such as ~yaw/kp, also in flight.",
+        ),
+    ] = None
+    seed: Seed = 1
+    speed: Speed = "max"
+    out: Out = None
+
+    def flight(self, height: float) -> GoSettings:
+        """Return the settings of a flight that takes off to *height* m.
+
+        Raises:
+            UsageError: an option is wrong.
+        """
+        from volery.run.go import GoSettings
+
+        return GoSettings(
+            by=self.by, switch=self.settings(), height=height, gains=self.gains, graph=self.graph or ""
+        )
 
 
 @commands.add("quiet", "json", "debug")
 def rotation(
     output: Output,
-    on: On,
+    options: FlightOptions,
     angle: Annotated[
         list[float], typer.Option(help="Heading in degrees, clockwise from north; may be repeated.")
     ],
     hold: Hold = 15.0,
-    by: By = "setpoints",
     height: Height = 5.0,
-    gains: Gains = None,
-    switch: Switch = "6",
-    on_rc_loss: OnRcLoss = "land",
-    on_telemetry_loss: OnTelemetryLoss = "land",
-    seed: Seed = 1,
-    speed: Speed = "max",
-    out: Out = None,
 ) -> int:
     """Take off, turn to one heading after the other, and land."""
     from volery.control.manoeuvres import Rotation
 
-    settings = parse_switch(switch, on_rc_loss, on_telemetry_loss)
-    return _go(
-        output, "rotation", lambda: Rotation(angle, hold), on, by, height, gains, settings, seed, speed, out
-    )
+    return _go(output, "rotation", lambda: Rotation(angle, hold), options, height)
 
 
 @commands.add("quiet", "json", "debug")
 def altitude(
     output: Output,
-    on: On,
+    options: FlightOptions,
     to: Annotated[list[float], typer.Option(help="Height above home in metres; may be repeated.")],
     hold: Hold = 15.0,
-    by: By = "setpoints",
     height: Height = 3.0,
-    gains: Gains = None,
-    switch: Switch = "6",
-    on_rc_loss: OnRcLoss = "land",
-    on_telemetry_loss: OnTelemetryLoss = "land",
-    seed: Seed = 1,
-    speed: Speed = "max",
-    out: Out = None,
 ) -> int:
     """Take off, climb or descend to one height after the other, and land."""
     from volery.control.manoeuvres import Altitude
 
-    settings = parse_switch(switch, on_rc_loss, on_telemetry_loss)
-    return _go(
-        output, "altitude", lambda: Altitude(to, hold), on, by, height, gains, settings, seed, speed, out
-    )
+    return _go(output, "altitude", lambda: Altitude(to, hold), options, height)
 
 
 @commands.add("quiet", "json", "debug")
 def waypoints(
     output: Output,
-    on: On,
+    options: FlightOptions,
     point: Annotated[
         list[str] | None,
         typer.Option(metavar="NORTH,EAST,UP", help="Way point in metres about home; may be repeated."),
@@ -117,15 +149,7 @@ def waypoints(
     ] = 0.1,
     hold: Annotated[float, typer.Option(help="Time within the tolerance before the next point, s.")] = 1.0,
     rounds: Annotated[int, typer.Option(help="How often the sequence is flown.")] = 1,
-    by: By = "setpoints",
     height: Height = 5.0,
-    gains: Gains = None,
-    switch: Switch = "6",
-    on_rc_loss: OnRcLoss = "land",
-    on_telemetry_loss: OnTelemetryLoss = "land",
-    seed: Seed = 1,
-    speed: Speed = "max",
-    out: Out = None,
 ) -> int:
     """Take off, fly to way points one after the other, and land."""
     from volery.control import manoeuvres
@@ -139,31 +163,19 @@ def waypoints(
     def make() -> Manoeuvre:
         return manoeuvres.Waypoints(points, tolerance=tolerance, hold_s=hold, rounds=rounds)
 
-    settings = parse_switch(switch, on_rc_loss, on_telemetry_loss)
-    return _go(output, "waypoints", make, on, by, height, gains, settings, seed, speed, out)
+    return _go(output, "waypoints", make, options, height)
 
 
 @commands.add("quiet", "json", "debug")
 def land(
     output: Output,
-    on: On,
-    by: By = "setpoints",
+    options: FlightOptions,
     height: Height = 10.0,
-    gains: Gains = None,
-    switch: Switch = "6",
-    on_rc_loss: OnRcLoss = "land",
-    on_telemetry_loss: OnTelemetryLoss = "land",
-    seed: Seed = 1,
-    speed: Speed = "max",
-    out: Out = None,
 ) -> int:
     """Land in steps of descent with the heading kept, and disarm; take off first if the vehicle stands."""
     from volery.control.manoeuvres import Altitude
 
-    settings = parse_switch(switch, on_rc_loss, on_telemetry_loss)
-    return _go(
-        output, "land", lambda: Altitude([height], 0.1), on, by, height, gains, settings, seed, speed, out
-    )
+    return _go(output, "land", lambda: Altitude([height], 0.1), options, height)
 
 
 @commands.add("quiet", "json", "debug")
@@ -204,18 +216,6 @@ def cube(
     return OK
 
 
-def parse_switch(text: str, on_rc_loss: str, on_telemetry_loss: str) -> SwitchSettings | None:
-    """Return the settings of the safety switch, or None for ``none``."""
-    from volery.control.safety_switch import SwitchSettings, parse_reaction
-
-    rc, telemetry = parse_reaction(on_rc_loss), parse_reaction(on_telemetry_loss)
-    if text == "none":
-        return None
-    if not text.isdecimal():
-        raise UsageError(f"--switch {text}: give the number of an RC channel, or none")
-    return SwitchSettings(channel=int(text), on_rc_loss=rc, on_telemetry_loss=telemetry)
-
-
 def _point(text: str) -> tuple[float, float, float]:
     try:
         north, east, up = (float(part) for part in text.split(","))
@@ -225,27 +225,22 @@ def _point(text: str) -> tuple[float, float, float]:
 
 
 def _go(
-    output: Output,
-    name: str,
-    make: Callable[[], Manoeuvre],
-    on: str,
-    by: str,
-    height: float,
-    gains: Path | None,
-    switch: SwitchSettings | None,
-    seed: int,
-    speed: str,
-    out: Path | None,
+    output: Output, name: str, make: Callable[[], Manoeuvre], options: FlightOptions, height: float
 ) -> int:
     from volery.cli.run_display import run_folder, run_progress, show_outcome
-    from volery.run.go import GoSettings, go
+    from volery.run.go import go
     from volery.run.result import Options
 
-    pace = parse_speed(speed)
-    settings = GoSettings(by=by, switch=switch, height=height, gains=gains)
-    with run_folder(out, f"go-{name}") as folder, run_progress(output, f"{name} on {on}") as show:
-        options = Options(fidelity="hardware", seed=seed, pace=pace, out=folder, show=show, tell=output.note)
-        run = go(make, on, settings, options)
+    pace = parse_speed(options.speed)
+    settings = options.flight(height)
+    with (
+        run_folder(options.out, f"go-{name}") as folder,
+        run_progress(output, f"{name} on {options.on}") as show,
+    ):
+        how = Options(
+            fidelity="hardware", seed=options.seed, pace=pace, out=folder, show=show, tell=output.note
+        )
+        run = go(make, options.on, settings, how)
     status = show_outcome(output, run)
     output.note(f"volery response {run.folder} judges its loops")
     return status

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isnan
+from math import isfinite, isnan
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +10,7 @@ import typer
 
 from volery.base.files import write_text
 from volery.cli.command import OK, Commands
-from volery.cli.commands.go import By, On, OnRcLoss, OnTelemetryLoss, Switch, parse_switch
+from volery.cli.commands.go import By, On, SwitchOptions
 from volery.cli.console import Output, make_table, number_column
 from volery.cli.options import Out, Seed
 
@@ -22,13 +22,11 @@ def tune(
     output: Output,
     loop: Annotated[str, typer.Argument(metavar="rotation|altitude", help="Loop to tune.")],
     on: On,
+    switch: SwitchOptions,
     gains: Annotated[
         Path, typer.Option(metavar="FILE", help="TOML file to write the gains into, for `volery go --gains`.")
     ] = Path("gains.toml"),
     by: By = "setpoints",
-    switch: Switch = "6",
-    on_rc_loss: OnRcLoss = "land",
-    on_telemetry_loss: OnTelemetryLoss = "land",
     seed: Seed = 1,
     out: Out = None,
 ) -> int:
@@ -39,7 +37,7 @@ def tune(
     from volery.run.result import Options
     from volery.run.tune import tune as tune_loop
 
-    settings = GoSettings(by=by, switch=parse_switch(switch, on_rc_loss, on_telemetry_loss))
+    settings = GoSettings(by=by, switch=switch.settings())
     with run_folder(out, f"tune-{loop}") as folder:
         options = Options(fidelity="hardware", seed=seed, out=folder)
         found = tune_loop(loop, on, settings, options, output.note)
@@ -48,10 +46,11 @@ def tune(
         f"relay: period {wave.period_s:.2f} s, amplitude {wave.amplitude:.3g}, "
         f"ultimate gain {wave.ultimate_gain:.3g}\n"
         f"process: gain {process.gain:.3g}, rate loop {process.frequency:.2f} rad/s with damping "
-        f"{process.damping:.2f}, dead time {process.dead_s:.2f} s, misfit {process.misfit:.3g}"
+        f"{process.damping:.2f}, acceleration {process.acceleration:.3g}, dead time {process.dead_s:.2f} s, "
+        f"misfit {process.misfit:.3g}"
     )
     names = ("kp", "ki", "kd")
-    columns = (*names, "gain margin", "phase margin", "IAE, fitted", "IAE, flown", "over")
+    columns = (*names, "gain margin", "phase margin", "Ms", "IAE, fitted", "IAE, flown", "over")
     table = make_table(
         "gains", *map(number_column, columns), title="IAE per unit of step, held-back scenarios"
     )
@@ -62,6 +61,7 @@ def tune(
             *(f"{float(getattr(one.gains, name)):.3g}" for name in names),
             f"{one.margins.gain:.2f}",
             f"{one.margins.phase:.0f}°",
+            f"{one.margins.sensitivity:.2f}",
             f"{one.modelled:.3f}",
             *flown,
         )
@@ -69,7 +69,9 @@ def tune(
     write_text(gains, as_toml(found.loop.name, found.best, f"volery tune {loop} on {on}"))
     output.give(
         {
-            "process": process._asdict(),
+            "process": {
+                name: value if isfinite(value) else None for name, value in process._asdict().items()
+            },
             "oscillation": wave._asdict(),
             "gains": {
                 one.name: {name: float(getattr(one.gains, name)) for name in (*names, "deceleration")}
