@@ -8,7 +8,7 @@ error alone. Its loops are recorded like those of any flight, with the reference
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, isfinite, nan
 from typing import NamedTuple
 
@@ -97,7 +97,7 @@ def recorded_reference(signals: Sequence[Signal]) -> RecordedReference:
     Raises:
         UsageError: yaw, north, east or altitude is missing, or nothing flies.
     """
-    found = {name: _called(signals, name) for name in ("yaw", "north", "east", "altitude")}
+    found = _poses(signals) or {name: _called(signals, name) for name in ("yaw", "north", "east", "altitude")}
     missing = [name for name, one in found.items() if one is None]
     known = {name: one for name, one in found.items() if one is not None}
     if missing:
@@ -117,6 +117,19 @@ def recorded_reference(signals: Sequence[Signal]) -> RecordedReference:
     part = slice(int(flying[0]), int(flying[-1]) + 1)
     north, east = columns["north"] - columns["north"][0], columns["east"] - columns["east"][0]
     return RecordedReference(times[part], columns["yaw"][part], north[part], east[part], up[part])
+
+
+def _poses(signals: Sequence[Signal]) -> dict[str, Signal | None]:
+    """Return heading and position of the first topic of a rosbag that has both, which are in ROS's ENU."""
+    for yaw in signals:
+        topic, _, name = yaw.name.rpartition(" ")
+        if not topic.startswith("/") or name != "yaw":
+            continue
+        east, north, up = (_called(signals, f"{topic} {axis}") for axis in "xyz")
+        if east is not None and north is not None and up is not None:
+            heading = replace(yaw, measured=np.asarray(wrap(90.0 - yaw.measured, DEGREES)))
+            return {"yaw": heading, "north": north, "east": east, "altitude": up}
+    return {}
 
 
 def _called(signals: Sequence[Signal], name: str) -> Signal | None:
