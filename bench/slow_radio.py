@@ -6,9 +6,12 @@ those of the thesis, at falling rates of the attitude. IAE is a ratio to that ov
 
 from __future__ import annotations
 
+import argparse
 from math import nan
+from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from volery.control.actuation import RcOverride, thesis_scale
 from volery.control.flight import ControlledFlight
@@ -48,17 +51,48 @@ def flown(rate: float, gains: PidGains, *, thesis: bool, link: str) -> tuple[flo
     )
 
 
+LAWS = (("ours", YAW_GAINS, False), ("the thesis's", THESIS_PID, True))
+Row = tuple[float, float, float, float]
+"""Rate in Hz, IAE as a ratio to that at 50 Hz, greatest overshoot as a share, time to 10 % in s."""
+
+
+def draw(tables: dict[str, list[Row]], path: Path) -> None:
+    """Draw IAE, overshoot and settling time over the rate into *path*."""
+    figure = Figure(figsize=(10.0, 3.2), layout="constrained")
+    axes = figure.subplots(1, 3)
+    titles = ("IAE, ratio to 50 Hz", "greatest overshoot, share of the step", "within 10 % after, s")
+    for name, rows in tables.items():
+        rates = [row[0] for row in rows]
+        for axis, title, column in zip(axes, titles, (1, 2, 3), strict=True):
+            axis.semilogx(rates, [row[column] for row in rows], "o-", label=name)
+            axis.set(title=title, xlabel="attitude reports, Hz", ylim=(0.0, None))
+            axis.set_xticks(RATES, [str(rate) for rate in RATES])
+            axis.minorticks_off()
+            axis.grid(alpha=0.3)
+    axes[0].legend(title="gains")
+    figure.savefig(path, dpi=150)
+
+
 def main() -> None:
     """Print one table for each law."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--plot", type=Path, help="file for the figure, such as slow-radio.png")
+    plot = parser.parse_args().plot
     link = "wire=bytes&baud=57600&drop=0.05"
-    for name, gains, thesis in (("ours", YAW_GAINS, False), ("the thesis's", THESIS_PID, True)):
-        best = None
+    tables: dict[str, list[Row]] = {}
+    for name, gains, thesis in LAWS:
+        rows = tables[name] = []
         print(f"{name}: 57600 baud, 5 % of frames lost; reference: 50 Hz")
         for rate in RATES:
             iae, overshoot, settled = flown(rate, gains, thesis=thesis, link=link)
-            best = best or iae
+            best = rows[0][1] if rows else iae
+            rows.append((rate, iae, overshoot, settled))
             state = "never" if np.isnan(settled) else f"{settled:5.2f} s"
-            print(f"  {rate:3d} Hz  IAE {iae / best:5.2f} x  overshoot {overshoot:6.1%}  to 10 %: {state}")
+            ratio = f"IAE {iae / best:5.2f} x"
+            print(f"  {rate:3d} Hz  {ratio}  overshoot {overshoot:6.1%}  to 10 %: {state}", flush=True)
+        tables[name] = [(rate, iae / rows[0][1], over, settled) for rate, iae, over, settled in rows]
+    if plot is not None:
+        draw(tables, plot)
 
 
 if __name__ == "__main__":
