@@ -16,11 +16,10 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
 from volery.ros.messages import lazy_rosbags as rosbags
+from volery.ros.messages.cdr_encoder import CDR_HEADER, FORMATS, encode
 from volery.ros.messages.message import Message
 from volery.ros.messages.packages import ROS1_SPELLING
 from volery.ros.messages.store import message_class, message_name, service, service_name, store
-
-_CDR_HEADER = b"\x00\x01\x00\x00"
 
 
 @cache
@@ -49,15 +48,10 @@ def to_cdr(message: Message) -> bytes:
 
 def copied_to_cdr(message: Message) -> bytes:
     """Encode a message that ``Message.copy`` has returned, without preparing it again."""
-    name = message.__msgtype__
-    codec = _codec(name)
     try:
-        raw = bytearray(4 + codec.getsize_cdr(0, message, store()))
-        raw[0:4] = _CDR_HEADER
-        codec.serialize_cdr_le(memoryview(raw)[4:], 0, message, store())
-    except (struct.error, rosbags.SerdeError, TypeError, ValueError, AttributeError) as error:
-        raise UsageError(f"{name}: {_culprit(message)}: {error}") from error
-    return bytes(raw)
+        return encode(message)
+    except (struct.error, OverflowError, TypeError, ValueError, AttributeError) as error:
+        raise UsageError(f"{message.__msgtype__}: {_culprit(message)}: {error}") from error
 
 
 def cdr_size(message: Message) -> int:
@@ -84,17 +78,13 @@ def _culprit(message: Message) -> str:
 
 
 _UNKNOWN = "a value does not fit its field"
-_FORMATS = {
-    "bool": "?", "byte": "B", "char": "B", "octet": "B", "int8": "b", "uint8": "B", "int16": "h",
-    "uint16": "H", "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
-}  # fmt: skip
 
 
 def _fits(base: str, value: Any) -> bool:
     if base == "string":
         return isinstance(value, str)
     try:
-        struct.pack(f"<{_FORMATS[base]}", value)
+        struct.pack(f"<{FORMATS[base]}", value)
     except (struct.error, OverflowError, TypeError, KeyError):
         return False
     return True
@@ -124,7 +114,7 @@ def from_cdr(name: str, data: bytes | memoryview, *, surplus: bool = False) -> A
     full = message_name(name)
     codec = _codec(full)
     try:
-        if surplus and bytes(data[:2]) == _CDR_HEADER[:2]:
+        if surplus and bytes(data[:2]) == CDR_HEADER[:2]:
             body = memoryview(data)[4:]
             message, _ = codec.deserialize_cdr_le(body, 0, codec.cls, _types_for(full, len(data)))
             return message
