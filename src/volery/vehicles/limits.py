@@ -411,7 +411,6 @@ class BoundsMonitor:
         self._bounds = bounds
         self._ignored = ignored
         self._checked: Position | None = None
-        self._low_since: Ns | None = None
         here = telemetry.position
         self._violated_at_start = (
             set(bounds.violations(here)) if bounds is not None and here is not None else set()

@@ -461,3 +461,28 @@ def test_a_cancelled_task_leaves_its_core_to_the_next(
     virtual.run(S)
     other = [(3, 9, "cpu.0", "other")] if first > second else [(0, 6, "cpu.0", "other")]
     assert slices() == ([(0, 3, "cpu.0", "cancelled")] if first > second else []) + other
+
+
+def test_the_least_that_a_processor_can_have(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu", cores=1, scheduler="round-robin", quantum=1, context_switch=0)
+    compute(virtual, core, "a", at=0, ms=1)
+    virtual.run(S)
+    assert slices() == [(0, 1, "cpu.0", "a")]
+
+
+def test_busy_time_counts_what_ran_alone(virtual: VirtualKernel) -> None:
+    core = Processor(virtual, "cpu", context_switch=MS)
+    compute(virtual, core, "a", at=0, ms=10)
+    virtual.run(S)
+    assert core.busy_ns(virtual.now()) == 11 * MS
+
+
+def test_background_computing_without_a_priority_has_the_least(
+    virtual: VirtualKernel, slices: Slices
+) -> None:
+    core = Processor(virtual, "cpu")
+    node = ExecutionContext("node", core, None)
+    virtual.call_at(0, lambda: core.load(node, 4 * MS))
+    compute(virtual, core, "task", at=1, ms=2, priority=1)
+    virtual.run(S)
+    assert slices() == [(0, 1, "cpu.0", "node"), (1, 3, "cpu.0", "task"), (3, 6, "cpu.0", "node")]

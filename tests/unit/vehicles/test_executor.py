@@ -172,7 +172,7 @@ def test_the_refusal_of_a_command_quotes_the_text_that_follows(rig: Rig) -> None
 
 def test_a_refusal_without_a_text_says_so(rig: Rig) -> None:
     rig.answers(1.0, "400", accepted=False)
-    with pytest.raises(Refused, match="gave no reason$"):
+    with pytest.raises(Refused, match=r"gave no reason$"):
         rig.execute(rig.step(answer="400"))
 
 
