@@ -50,8 +50,7 @@ from volery.base.time import MINUTE, MS, Ns, S, from_seconds, to_seconds
 from volery.kernel.api import Handle, Kernel
 from volery.kernel.task import ExecutionContext, Task
 from volery.trace.events import Operation, Text
-from volery.vehicles.battery_monitor import BatteryMonitor, low_battery
-from volery.vehicles.control_monitors import ThrustMonitor, TrackMonitor, UpsetMonitor
+from volery.vehicles.battery_monitor import low_battery
 from volery.vehicles.driver import (
     Capability,
     Driver,
@@ -64,7 +63,7 @@ from volery.vehicles.driver import (
     Waypoint,
     item_problem,
 )
-from volery.vehicles.escalation import SINKING_M_S, Escalation, Reaction, escalate
+from volery.vehicles.escalation import Escalation, Reaction, escalate
 from volery.vehicles.executor import (
     FLY_MISSION,
     IN_PLACE,
@@ -82,9 +81,9 @@ from volery.vehicles.executor import (
     StepExecutor,
     distance_to,
 )
+from volery.vehicles.flight_monitor import FlightMonitor
 from volery.vehicles.limits import (
     Bounds,
-    BoundsMonitor,
     Fence,
     Limits,
     Path,
@@ -130,8 +129,6 @@ MARGIN_S = 30.0
 
 _MONITORED = (OutOfBounds, OffTrack, LowBattery, PositionLost, ThrustSaturated)
 """Errors of monitors to which the vehicle reacts."""
-JUMPED = 4
-"""Severity of the text that reports a jump of the estimate: a warning, as in syslog."""
 
 Truth = Callable[[], Position]
 """The true position (AMSL) of a simulated vehicle: for recorded errors, never for the operations."""
@@ -194,10 +191,7 @@ class Vehicle(ServicedVehicle):
         driver.telemetry.detects_silence = driver.cycle is None
         self._executor = StepExecutor(kernel, driver, link_timeout)
         self.escalation = Escalation()
-        self._upset = UpsetMonitor(driver.telemetry)
-        self._battery_monitor = BatteryMonitor(driver.telemetry)
-        self._thrust = ThrustMonitor(driver.telemetry)
-        self._track = TrackMonitor(driver.telemetry)
+        self._flight_monitor = FlightMonitor(kernel, driver.telemetry)
         self._truth = truth
         self._supported: frozenset[Capability] = frozenset()  # as known once the vehicle was connected
         self._bounds: Bounds | None = None
@@ -662,8 +656,9 @@ class Vehicle(ServicedVehicle):
                 f"{self.name}: {asked}: its autopilot does not report how full the battery is, so a reserve "
                 f"of {self.limits.reserve:.0%} cannot be kept; set its monitor up, or state no reserve"
             )
-        self._battery_monitor.note(self.kernel.now())
-        shortage = self._battery_monitor.shortage(self.limits)
+        battery = self._flight_monitor.battery
+        battery.note(self.kernel.now())
+        shortage = battery.shortage(self.limits)
         if shortage:
             raise low_battery(self.name, asked, shortage)
 
@@ -772,8 +767,9 @@ class Vehicle(ServicedVehicle):
         if policy.unmonitored:
             self._executor.execute(asked, plan, restarts=restarts)
             return
-        check = self._monitors(policy, goal)
-        upset = None if policy.to_safety else self._upset.check(asked, self.kernel.now())
+        bounds = self._home_bounds() if policy.bounded else self._usable_bounds()
+        check = self._flight_monitor.check_of(policy, self.limits, bounds, goal)
+        upset = None if policy.to_safety else self._flight_monitor.upset.check(asked, self.kernel.now())
         if upset is not None:
             raise upset
         try:
@@ -782,48 +778,6 @@ class Vehicle(ServicedVehicle):
             raise type(error)(self.name, asked, f"{error.what}; {self._react(error)}") from None
         if policy.goes_on:
             self._keep_monitoring(asked, check)
-
-    def _monitors(self, policy: OperationPolicy, goal: Callable[[], Goal] = lambda: NO_GOAL) -> Check:
-        """Return the check of an operation under *policy*, for each telemetry message."""
-        seen, limits = self._driver.telemetry, self.limits
-        bounds = self._home_bounds() if policy.bounded else self._usable_bounds()
-        watched = bounds if policy.bounded else None
-        needs_position = policy.travels or policy.holds_place
-        monitor = BoundsMonitor(seen, watched, policy.ignored, needs_position=needs_position)
-        if not policy.holds_place:
-            self._track.follow(None)
-        is_drone = seen.kind == "drone"
-        began = not (policy.on_track and is_drone)
-
-        def check(operation: str, now: Ns) -> VehicleError | None:
-            nonlocal began
-            if not began and seen.flying and bounds is not None and seen.located:
-                began = True
-                self._track.follow(self._path_to(bounds, goal()))
-            battery = self._battery_monitor.check(operation, now, limits, travels=policy.travels)
-            if policy.to_safety:  # one that sinks lands already
-                return battery if not seen.velocity.up < -SINKING_M_S else None
-            off_track = self._track.check(operation, now, bounds)
-            if self._track.jumped_m:
-                said = f"its estimate of the position has jumped by {self._track.jumped_m:.0f} m"
-                self.kernel.record(Text(now, self.name, JUMPED, said))
-            thrust = self._thrust.check(operation, now) if seen.flying or policy.travels else None
-            return (
-                self._upset.check(operation, now)
-                or battery
-                or thrust
-                or off_track
-                or monitor.check(operation, now)
-            )
-
-        return check
-
-    def _path_to(self, bounds: Bounds, goal: Goal) -> Path | None:
-        """Return the straight path from here to *goal*; ``None`` if either is unknown."""
-        here = self._driver.telemetry.position
-        if here is None or not (isfinite(goal.latitude) and isfinite(goal.amsl)):
-            return None
-        return bounds.path(here, Position(goal.latitude, goal.longitude, AMSL(goal.amsl)))
 
     def _record(self, start: Ns, operation: str, asked: str, end: tuple[str, str], goal: Goal) -> None:
         estimate = distance_to(goal, self._driver.telemetry.position)
@@ -861,8 +815,7 @@ class Vehicle(ServicedVehicle):
         seen = self._driver.telemetry
         if not (seen.flying and seen.armed) or seen.kind != "drone":
             return
-        check = self._monitors(IN_PLACE)
-        self._track.stay(self._usable_bounds())
+        check = self._flight_monitor.check_of(IN_PLACE, self.limits, self._usable_bounds())
         self._keep_monitoring(f"after {asked}", check)
 
     def _keep_monitoring(self, asked: str, check: Check) -> None:
