@@ -402,3 +402,13 @@ def test_items_at_a_place_keep_their_frame(command: int, bench: Any) -> None:
     rig.send("MISSION_REQUEST_INT", target_system=1, target_component=1, seq=1)
     rig.run(0.05)
     assert rig.latest["MISSION_ITEM_INT"]["frame"] == 3
+
+
+@pytest.mark.parametrize("command", [92, 94, 218, 222])
+def test_items_without_effect_do_not_refuse_the_mission(command: int, bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    assert upload(rig, [HOME, item(command, frame=3)]) == 0
+    rig.send("MISSION_REQUEST_INT", target_system=1, target_component=1, seq=1)
+    rig.run(0.05)
+    assert rig.latest["MISSION_ITEM_INT"]["command"] == command

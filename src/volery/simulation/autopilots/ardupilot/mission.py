@@ -61,9 +61,11 @@ NAMES = {
 }
 """Names of the items in the firmware's status texts."""
 
-KEPT_ONLY = frozenset({189, 195, 197, 201, 203, 205, 206, 211, 181, 182, 183, 184, 207, 208, 212})
+KEPT_ONLY = frozenset(
+    {92, 94, 189, 195, 197, 201, 203, 205, 206, 211, 181, 182, 183, 184, 207, 208, 212, 218, 222}
+)
 """Items that are stored and read back without effect: cameras, servos, relays, grippers, fences, regions of
-interest.
+interest, payload places, auxiliary functions and limits of GUIDED.
 """
 
 PLACED = frozenset(
