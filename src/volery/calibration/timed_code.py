@@ -23,6 +23,7 @@ from statistics import median, quantiles
 from time import thread_time_ns
 from types import ModuleType
 
+from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
 from volery.cost import OPERATIONS, STEPS_PER_NS, LibraryTable, StepCounter
 
@@ -342,6 +343,10 @@ class Rounds:
     least: int = 9
     most: int = 31
     within: float = 0.03
+
+    def __post_init__(self) -> None:
+        if not 2 <= self.least <= self.most:
+            raise UsageError(f"rounds {self.least} {self.most}: give two numbers from 2, the lower one first")
 
 
 DEFAULT_ROUNDS = Rounds()
