@@ -66,6 +66,11 @@ class Guidance(Manoeuvre):
         """
         vehicle, tuning, estimate = self.vehicle, self.vehicle.tuning, self.vehicle.estimate
         loops = self._moved_loops()
+        frozen = state_of(vehicle).frozen
+        if frozen is None:
+            loops.plane.frozen = None
+        elif loops.plane.frozen is None:
+            loops.plane.frozen = loops.plane.place, loops.plane.velocity
         for _ in range(self._substeps()):
             if plane_is_velocity:
                 loops.plane.step_at(plane, tuning.speed)
@@ -94,7 +99,8 @@ class Guidance(Manoeuvre):
     def _moved_loops(self) -> GuidanceLoops:
         vehicle, estimate = self.vehicle, self.vehicle.estimate
         late = vehicle.kernel.now() - self._last_step_ns > self.RESTART_AFTER
-        if self._loops is None or late or self._loops.away_from(estimate.position):
+        lost = state_of(vehicle).frozen is not None
+        if self._loops is None or late or (not lost and self._loops.away_from(estimate.position)):
             offset = 0.0 if vehicle.ground.lifted else OFFSET_AT_LIFT_OFF
             self._loops = GuidanceLoops(estimate.position, estimate.velocity, offset)
             self._last_step_ns = vehicle.kernel.now()

@@ -60,6 +60,8 @@ class PlaneLoop:
         self._reference, self._reference_velocity = place, velocity
         self._integral = self._lean = (0.0, 0.0)
         self.accel = (0.0, 0.0)
+        self.frozen: tuple[tuple[float, float], tuple[float, float]] | None = None
+        """Place and velocity that the loops are given instead of the true ones, without a fix."""
 
     def step_to(self, goal: tuple[float, float], speed: float) -> None:
         """Move by one substep towards a point at a limited reference speed."""
@@ -80,10 +82,9 @@ class PlaneLoop:
         vn, ve = self._reference_velocity
         self._reference_velocity = vn, ve = _limited((vn + push[0] * dt, ve + push[1] * dt), speed)
         self._reference = self._reference[0] + vn * dt, self._reference[1] + ve * dt
-        behind = _limited(
-            (self._reference[0] - self.place[0], self._reference[1] - self.place[1]), FARTHEST_BEHIND
-        )
-        slower = vn - self.velocity[0], ve - self.velocity[1]
+        place, velocity = self.frozen or (self.place, self.velocity)
+        behind = _limited((self._reference[0] - place[0], self._reference[1] - place[1]), FARTHEST_BEHIND)
+        slower = vn - velocity[0], ve - velocity[1]
         grown = [i + INTEGRAL_GAIN * e * dt for i, e in zip(self._integral, behind, strict=True)]
         self._integral = _limited((grown[0], grown[1]), MOST_ACCEL)
         lean = _limited(

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from volery.base.frames import Vector
 from volery.base.time import MS, Ns
 from volery.simulation.autopilots.paparazzi.flight_plan import Navigation
 from volery.simulation.autopilots.state_groups import NEVER
@@ -74,6 +75,8 @@ class RotorcraftState:
     radio: RadioControl = field(default_factory=RadioControl)
     last_fix_ns: Ns = NEVER
     """Time of the last 3D fix."""
+    frozen: tuple[Vector, Vector] | None = None
+    """Position and velocity, north, east, down, at the last fix, while there is none."""
     last_uplink_ns: Ns = NEVER
     """Time of the last message from the ground."""
     uplink_messages: int = 0
@@ -121,8 +124,20 @@ def update_fix(vehicle: Vehicle) -> None:
     """Store the time of a valid fix. The first fix sets the estimator's origin."""
     if fix_is_valid(vehicle):
         state_of(vehicle).last_fix_ns = vehicle.kernel.now()
+        state_of(vehicle).frozen = None
         if not vehicle.estimate.position_ok and not vehicle.armed:
             vehicle.flight.set_origin()
+    elif state_of(vehicle).frozen is None:
+        state_of(vehicle).frozen = vehicle.estimate.position, vehicle.estimate.velocity
+
+
+def known_motion(vehicle: Vehicle) -> tuple[Vector, Vector]:
+    """Return position and velocity as the firmware has them: in the plane they keep those of the last fix."""
+    estimate, frozen = vehicle.estimate, state_of(vehicle).frozen
+    if frozen is None:
+        return estimate.position, estimate.velocity
+    (north, east, _), (vn, ve, _) = frozen
+    return (north, east, estimate.position[2]), (vn, ve, estimate.velocity[2])
 
 
 def gps_lost(vehicle: Vehicle) -> bool:

@@ -58,10 +58,10 @@ def to_unsigned(value: float, bits: int = 16) -> int:
 
 def rotorcraft_fp(vehicle: Vehicle) -> Fields:
     """Return ROTORCRAFT_FP: estimated state and target."""
-    estimate = vehicle.estimate
+    estimate, (position, velocity) = vehicle.estimate, rotorcraft_state.known_motion(vehicle)
     fields: Fields = {}
     for axis, metres, speed in zip(
-        ("east", "north", "up"), ned_to_enu(estimate.position), ned_to_enu(estimate.velocity), strict=True
+        ("east", "north", "up"), ned_to_enu(position), ned_to_enu(velocity), strict=True
     ):
         fields[axis] = to_counts(metres, POSITION)
         fields[f"v{axis}"] = to_counts(speed, SPEED)
@@ -230,11 +230,11 @@ def next_waypoint(vehicle: Vehicle) -> Fields:
 
 def ins(vehicle: Vehicle) -> Fields:
     """Return INS: estimated position, velocity and acceleration, north, east, down."""
-    estimate = vehicle.estimate
+    estimate, (position, velocity) = vehicle.estimate, rotorcraft_state.known_motion(vehicle)
     fields: Fields = {}
     for suffix, vector, scale in (
-        ("", estimate.position, POSITION),
-        ("d", estimate.velocity, SPEED),
+        ("", position, POSITION),
+        ("d", velocity, SPEED),
         ("dd", estimate.acceleration, ACCELERATION),
     ):
         for axis, value in zip("xyz", vector, strict=True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import dist
+from math import dist, hypot
 from typing import Any
 
 import pytest
@@ -92,6 +92,23 @@ def test_without_satellites_guided_flies_on(craft: Any) -> None:
     craft.run(6.0)
     assert craft.mode == "GUIDED"
     assert craft.armed
+
+
+def test_without_satellites_the_position_freezes_and_it_flees(craft: Any) -> None:
+    """Recorded: frozen at the last fix, 4.3 m/s after 10 s: the integral of a frozen error leans it further."""
+    craft.guided()
+    craft.guide(0, 0.0, 40.0, -10.0)
+    craft.run(4.0)
+    craft.flight.block_gps()
+    craft.run(2.0)
+    told = craft.last("ROTORCRAFT_FP")
+    craft.run(10.0)
+    still = craft.last("ROTORCRAFT_FP")
+    assert (told["east"], told["north"]) == (still["east"], still["north"])
+    assert hypot(*craft.flight.truth().velocity[:2]) > 3.0
+    craft.flight.block_gps(False)
+    craft.run(2.0)
+    assert craft.last("ROTORCRAFT_FP")["east"] != still["east"]
 
 
 def test_without_satellites_home_becomes_failsafe(craft: Any) -> None:
