@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import FrozenInstanceError, dataclass, field, fields
 from math import isnan, nan
 from typing import Any
 
@@ -16,7 +16,25 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.trace.events import Event, Text
 from volery.vehicles.driver import Repeat, Step
-from volery.vehicles.executor import NO_GOAL, Goal, StepExecutor, distance_to
+from volery.vehicles.executor import (
+    FLY_MISSION,
+    IN_PLACE,
+    LANDING,
+    LAST_RESORT,
+    MANUAL,
+    NO_GOAL,
+    PLAIN,
+    STREAM,
+    TO_SAFETY,
+    TRAVEL,
+    TURN,
+    UNGUARDED,
+    Goal,
+    OperationPolicy,
+    StepExecutor,
+    distance_to,
+)
+from volery.vehicles.limits import FLOOR
 from volery.vehicles.telemetry import Answer, StatusText, Telemetry
 
 
@@ -495,6 +513,40 @@ def test_a_wait_ends_with_its_condition_or_its_time(rig: Rig, spun: bool) -> Non
 
     assert rig.run(script) == pytest.approx(5.0, abs=0.11)
     assert found == [True, False]
+
+
+# -- policies
+
+POLICIES = {
+    "plain": (PLAIN, {"needs_control", "recorded", "manual"}),
+    "unguarded": (UNGUARDED, {"recorded", "manual"}),
+    "turn": (TURN, {"needs_control", "recorded", "bounded"}),
+    "travel": (TRAVEL, {"needs_control", "recorded", "bounded", "travels", "on_track"}),
+    "fly a mission": (FLY_MISSION, {"needs_control", "recorded", "bounded", "travels", "ignored"}),
+    "set-points": (STREAM, {"needs_control", "bounded", "travels", "goes_on"}),
+    "sticks": (MANUAL, {"needs_control", "recorded", "bounded", "goes_on", "manual"}),
+    "between two calls": (IN_PLACE, {"needs_control", "recorded", "holds_place"}),
+    "to safety": (TO_SAFETY, {"needs_control", "recorded", "to_safety"}),
+    "landing": (LANDING, {"needs_control", "recorded", "to_safety", "unmonitored"}),
+    "last resort": (LAST_RESORT, {"recorded", "to_safety", "unmonitored"}),
+}
+"""What holds of each kind of operation: by these words a vehicle is refused, aborted or left alone."""
+
+
+@pytest.mark.parametrize("kind", POLICIES)
+def test_what_holds_of_a_kind_of_operation(kind: str) -> None:
+    policy, holds = POLICIES[kind]
+    assert {one.name for one in fields(policy) if getattr(policy, one.name)} == holds
+
+
+def test_a_mission_lands_so_only_the_floor_is_left_out() -> None:
+    assert frozenset({FLOOR}) == FLY_MISSION.ignored
+
+
+def test_policies_do_not_change() -> None:
+    with pytest.raises(FrozenInstanceError):
+        TRAVEL.bounded = False  # type: ignore[misc]
+    assert OperationPolicy() == OperationPolicy(needs_control=True, recorded=True)
 
 
 # -- what is said

@@ -35,6 +35,16 @@ def test_info(bag: Path) -> None:
     assert "std_msgs/msg/String" in run("bag", "info", bag).output
 
 
+@pytest.mark.parametrize("topic", ["/a[/b]", "/a[red]b", "/[link=x]y[/link]"])
+def test_the_name_of_a_topic_is_no_markup(tmp_path: Path, topic: str) -> None:
+    path = tmp_path / "marked.bag"
+    with create_bag(path) as made:
+        made.write(topic, 0, messages.new("std_msgs/Int32", data=1))
+    done = run("bag", "info", path)
+    assert done.exit_code == 0
+    assert topic in "".join(done.output.split())
+
+
 def test_converted_to_the_other_format_and_back(bag: Path, tmp_path: Path) -> None:
     assert run("bag", "convert", bag, tmp_path / "walk", "--topic", "/steps").exit_code == 0
     assert run("bag", "convert", tmp_path / "walk", tmp_path / "again.bag").exit_code == 0

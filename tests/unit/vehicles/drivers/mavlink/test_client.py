@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 
 from volery.base.errors import CapabilityError, LinkGarbled, UsageError
-from volery.base.time import S
+from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
 from volery.links.in_process_link import in_process_pair
+from volery.links.link import Frame
 from volery.vehicles import Rover
 from volery.vehicles.drivers.ardupilot import open_driver
 from volery.vehicles.drivers.ardupilot.modes import on_link_loss
@@ -103,6 +104,23 @@ def test_a_px4_is_named(bench: Make) -> None:
     at.kernel.every(S, beat)
     with pytest.raises(LinkGarbled, match="a PX4 answers here, not an ArduPilot"):
         at.fly(lambda drone: drone.wait_connected(within=5))
+
+
+@pytest.mark.parametrize(("system", "component"), [(7, 1), (1, 190)])
+def test_frames_of_another_component_are_nothing_to_us(bench: Make, system: int, component: int) -> None:
+    at = bench()
+    at.kernel.run(2 * S)
+    seen = at.vehicle._driver.telemetry
+    before, link = seen.position, at.autopilot.link
+    away = {"lat": 470000000, "lon": 80000000, "alt": 500000, "relative_alt": 10000, "hdg": 0}
+    rest = dict.fromkeys(("time_boot_ms", "vx", "vy", "vz"), 0)
+    link.send(Frame("GLOBAL_POSITION_INT", away | rest, system, component))
+    at.autopilot.mute = True
+    at.kernel.run(2100 * MS)
+    assert seen.position == before
+    link.send(Frame("GLOBAL_POSITION_INT", away | rest, 1, 1))
+    at.kernel.run(2200 * MS)
+    assert seen.position != before
 
 
 def test_options_are_checked() -> None:
