@@ -57,18 +57,18 @@ def flight(drones: int) -> tuple[float, float, float]:
     ]
 
     def counted(
-        self: in_process_link.InProcess, frame: object, send: object = in_process_link.InProcess.send
+        self: in_process_link.InProcessLink, frame: object, send: object = in_process_link.InProcessLink.send
     ) -> None:
         stretch.frames += 1
         send(self, frame)
 
-    in_process_link.InProcess.send, original = counted, in_process_link.InProcess.send
+    in_process_link.InProcessLink.send, original = counted, in_process_link.InProcessLink.send
     try:
         with tempfile.TemporaryDirectory() as folder:
             run = volery.fly(stretch.fly, urls, volery.Options(seed=1, out=Path(folder)))
             size = (Path(folder) / "trace.mcap").stat().st_size / 1e6
     finally:
-        in_process_link.InProcess.send = original
+        in_process_link.InProcessLink.send = original
     assert run.completed, run.record.outcome.reason
     computing = max(stretch.computing) - min(stretch.computing)
     return stretch.factor(), stretch.frames / computing, size / run.record.sim_s * 3600
