@@ -17,8 +17,6 @@ from volery.base.errors import UsageError, VehicleError
 from volery.vehicles.limits import is_number
 from volery.vehicles.services import Parameter, Services
 
-LONGEST_NAME = 16
-"""Characters in the name of a parameter, by MAVLink."""
 LARGEST_FILE = 4_000_000
 QGC, PLAIN = ".params", (".param", ".parm")
 SYSTEM, COMPONENT = 1, 1
@@ -57,7 +55,7 @@ class Parameters:
         Raises:
             NotArrived: the autopilot does not answer, as for a name that it does not have.
         """
-        return self._services.read_parameter(self._checked(name)).value
+        return self._services.read_parameter(self._services.parameter_name(name)).value
 
     def set(self, name: str, value: float) -> None:
         """Set one parameter and return when the autopilot reports the value.
@@ -69,7 +67,7 @@ class Parameters:
         """
         if not is_number(value):
             raise UsageError(f"{self._name}: {name} = {value!r}: a parameter is a finite number")
-        self._services.write_parameter(self._checked(name), float(value))
+        self._services.write_parameter(self._services.parameter_name(name), float(value))
 
     def all(self) -> dict[str, float]:
         """Return all parameters by name, in the autopilot's order."""
@@ -129,13 +127,6 @@ class Parameters:
         there = file if isinstance(file, Mapping) else read_parameter_file(file)
         return [one for one in differences(self.all(), there) if one.there is not None]
 
-    def _checked(self, name: str) -> str:
-        if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9_]{1,16}", name):
-            raise UsageError(
-                f"{self._name}: {name!r} is no name of a parameter: {LONGEST_NAME} letters, digits, _"
-            )
-        return name.upper()
-
 
 def differences(here: Mapping[str, float], there: Mapping[str, float]) -> list[Difference]:
     """Return the parameters that differ by more than a 32-bit float does, in alphabetical order."""
@@ -175,7 +166,7 @@ def read_parameter_file(file: str | Path) -> dict[str, float]:
             found[name] = float(value)
         except ValueError:
             raise UsageError(f"{path}:{number}: {value!r} is no value of {name!r}") from None
-        if not isfinite(found[name]) or not re.fullmatch(r"[A-Za-z0-9_]{1,16}", name):
+        if not isfinite(found[name]) or not re.fullmatch(r"[A-Za-z_][\w.\[\]>-]*", name):
             raise UsageError(f"{path}:{number}: {line.strip()!r} is no parameter and its value")
     if not found:
         raise UsageError(f"{path}: there is no parameter in it")

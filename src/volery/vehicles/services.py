@@ -6,9 +6,11 @@ built on it: ``Parameters``, ``OnboardPlan``, ``OnboardLogs`` and ``Payload``. A
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
+from volery.base.errors import UsageError
 from volery.base.time import Ns
 
 
@@ -23,6 +25,8 @@ class Item(NamedTuple):
     z: float
 
 
+LONGEST_NAME = 16
+"""Characters in the name of a parameter, by MAVLink."""
 MISSION, FENCE, RALLY = 0, 1, 2
 """MAV_MISSION_TYPE of the three lists that an autopilot keeps."""
 
@@ -43,12 +47,22 @@ class LogEntry(NamedTuple):
     utc: int
 
 
+def mavlink_parameter_name(vehicle: str, name: str) -> str:
+    """Return a name in capitals; raise ``UsageError`` if no parameter of MAVLink can have it."""
+    if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9_]{1,16}", name):
+        raise UsageError(f"{vehicle}: {name!r} is no name of a parameter: {LONGEST_NAME} letters, digits, _")
+    return name.upper()
+
+
 class Services(Protocol):
     """Services of one autopilot. Every method blocks; without an answer it raises ``NotArrived``."""
 
     @property
     def home_first(self) -> bool:
         """Whether item 0 of its mission is home, as in ArduPilot."""
+
+    def parameter_name(self, name: str) -> str:
+        """Return the autopilot's spelling of a name; raise ``UsageError`` if it is none."""
 
     def read_parameter(self, name: str) -> Parameter:
         """Read one parameter."""

@@ -18,7 +18,7 @@ from volery.kernel.api import Action, Kernel
 from volery.links.mavlink_messages import constant, entry_name
 from volery.ros.graph import Node, QoS, ServiceError
 from volery.ros.messages import new, request
-from volery.vehicles.services import Item, LogEntry, Parameter
+from volery.vehicles.services import Item, LogEntry, Parameter, mavlink_parameter_name
 from volery.vehicles.telemetry import Telemetry
 
 ANSWERED_WITHIN: Ns = 15 * S
@@ -143,6 +143,10 @@ class MavrosServices:
             raise Refused(self._name, asked, f"{result} to {command}{why}")
 
     # -- parameters
+
+    def parameter_name(self, name: str) -> str:
+        """See ``Services``."""
+        return mavlink_parameter_name(self._name, name)
 
     def _as_parameter(self, name: str, value: float) -> Parameter:
         return Parameter(name, float(value), INT32 if isinstance(value, int) else REAL32)

@@ -17,7 +17,7 @@ from volery.kernel.waiting import Lock, Signal
 from volery.links.link import Frame
 from volery.links.mavlink_messages import constant, entry_name, from_bytewise, to_bytewise
 from volery.vehicles.rtcm import correction_parts
-from volery.vehicles.services import Item, LogEntry, Parameter
+from volery.vehicles.services import Item, LogEntry, Parameter, mavlink_parameter_name
 from volery.vehicles.telemetry import Telemetry
 
 TRIES = 5
@@ -152,6 +152,10 @@ class MavlinkServices:
         self._ask(asked, send, acknowledged, within=within or ANSWERED_WITHIN, again=2 * S)
 
     # -- parameters
+
+    def parameter_name(self, name: str) -> str:
+        """See ``Services``."""
+        return mavlink_parameter_name(self._name, name)
 
     def _parameter(self, frame: Frame) -> Parameter | None:
         if frame.name != "PARAM_VALUE":

@@ -245,7 +245,7 @@ class PaparazziBackend:
         if last < 0:
             return
         for name in sorted(self._unchecked):
-            self._send("GET_SETTING", index=self._settings[name].number, ac_id=self._system)
+            self.request_setting(self._settings[name])
         if now - last > SILENT_AFTER and not self._silent:
             self._silent = True
             detail = self._link.problem() or "the aircraft is not received"
@@ -300,7 +300,15 @@ class PaparazziBackend:
     def set_setting(self, name: str, value: float) -> None:
         """Write a setting, if its number has been checked."""
         if self.decoder.settings_checked:
-            self._send("SETTING", index=self._settings[name].number, ac_id=self._system, value=value)
+            self.write_setting(self._settings[name], value)
+
+    def write_setting(self, setting: Setting, value: float) -> None:
+        """Write any setting; it is answered by its value."""
+        self._send("SETTING", index=setting.number, ac_id=self._system, value=value)
+
+    def request_setting(self, setting: Setting) -> None:
+        """Request the value of a setting."""
+        self._send("GET_SETTING", index=setting.number, ac_id=self._system)
 
     def set_mode(self, mode: str) -> None:
         """Change the mode: directly, and as the meaning of the third position of a mode switch."""

@@ -24,6 +24,7 @@ from volery.vehicles.driver import Acceleration, AttitudeTarget, Capability, Mis
 from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
 from volery.vehicles.drivers.paparazzi.decoder import ATTITUDE_MODE, FAILSAFE, GUIDED, HEIGHT_MODE
 from volery.vehicles.drivers.paparazzi.sequences import PaparazziSteps
+from volery.vehicles.drivers.paparazzi.services import PaparazziServices
 from volery.vehicles.drivers.paparazzi.takeoff_and_landing import LIFTED_M, Blocks, TakeoffAndLanding
 from volery.vehicles.drivers.steps import (
     DRONE_KIND,
@@ -62,7 +63,6 @@ class Paparazzi:
     Raises ``UsageError`` if the aircraft's flight plan does not have *blocks*.
     """
 
-    services = None
     landing_modes = frozenset({FAILSAFE})
     cycle: Action | None = None
 
@@ -70,6 +70,7 @@ class Paparazzi:
         self.name = backend.telemetry.name
         self.telemetry = backend.telemetry
         self._backend = backend
+        self.services = PaparazziServices(kernel, backend)
         self._steps = PaparazziSteps(kernel, backend)
         self._setpoints = self._steps.setpoints
         self.problem = backend.problem
