@@ -222,7 +222,7 @@ def _is_place(command: Command) -> bool:
 
 
 def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
-    """Handle DO_REPOSITION (COMMAND_INT only); flag 1 allows a change to GUIDED."""
+    """Handle DO_REPOSITION (COMMAND_INT only): flag 1 allows a change to GUIDED; a copter ignores the speed."""
     if not command.is_int:
         return UNSUPPORTED
     if not _is_place(command):
@@ -232,7 +232,7 @@ def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
             return DENIED
         if not change_mode(vehicle, guided):
             return FAILED
-    if command.param1 > 0.0:
+    if command.param1 > 0.0 and not vehicle.flies:
         vehicle.commanded.speed = command.param1
     yaw = None if isnan(command.param4) or not vehicle.flies else command.param4
     return ACCEPTED if go_to(vehicle, command.frame, (command.x, command.y, command.z), yaw) else FAILED
