@@ -87,7 +87,11 @@ def _command_line_function(
     signature = inspect.signature(function, eval_str=True)
     keyword = inspect.Parameter.KEYWORD_ONLY
     stated = [one.replace(kind=keyword) for one in signature.parameters.values() if one.name != "output"]
-    groups = {one.name: one.annotation for one in stated if is_dataclass(one.annotation)}
+    groups = {
+        one.name: one.annotation
+        for one in stated
+        if isinstance(one.annotation, type) and is_dataclass(one.annotation)
+    }
     members = {name: inspect.signature(group, eval_str=True).parameters for name, group in groups.items()}
     own = [one for one in stated if one.name not in groups]
     own += [member.replace(kind=keyword) for shared in members.values() for member in shared.values()]
