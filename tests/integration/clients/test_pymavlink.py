@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -188,3 +189,18 @@ def test_a_client_that_returns_finds_its_streams(
     again.wait_armed()
     assert again.mode("LAND") == 0
     again.wait_armed(False)
+
+
+def test_all_parameters_are_read_as_one_file(tower: Any, tmp_path: Path) -> None:
+    """By MAVLink FTP, as ground stations read them where the autopilot states the capability."""
+    from pymavlink.mavftp import MAVFTP
+
+    tower.meet()
+    client = MAVFTP(tower.connection, 1, 1)
+    file = tmp_path / "all.param"
+    client.cmd_getparams([str(file)])
+    client.process_ftp_reply("getparams", timeout=60)
+    lines = file.read_text(encoding="utf-8").splitlines()
+    assert len(lines) == COUNT_OF_PARAMETERS
+    values = dict(line.replace(",", " ").split()[:2] for line in lines)
+    assert float(values["WPNAV_SPEED"]) == 1000.0

@@ -97,7 +97,7 @@ def questions(version: Builder) -> dict[str, QuestionHandler]:
     return {
         "AUTOPILOT_VERSION_REQUEST": on_version,
         "FENCE_FETCH_POINT": on_fence_fetch,
-        "FILE_TRANSFER_PROTOCOL": onboard_files.on_file_transfer,
+        "FILE_TRANSFER_PROTOCOL": onboard_files.on_file_transfer_with_parameters,
         "LOG_REQUEST_LIST": on_log_list,
         "RALLY_FETCH_POINT": on_rally_fetch,
         "TERRAIN_CHECK": on_terrain_check,
