@@ -222,7 +222,7 @@ def _is_place(command: Command) -> bool:
 
 
 def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
-    """Handle DO_REPOSITION (COMMAND_INT only): flag 1 allows a change to GUIDED; a copter ignores the speed."""
+    """Handle DO_REPOSITION (COMMAND_INT only): flag 1 allows a change to GUIDED; copters ignore the speed."""
     if not command.is_int:
         return UNSUPPORTED
     if not _is_place(command):
