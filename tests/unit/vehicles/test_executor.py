@@ -161,10 +161,13 @@ def test_steps_follow_each_other_and_skippable_ones_that_are_done_are_not_sent(r
 
 
 def test_a_skipped_step_takes_the_mode_as_commanded(rig: Rig) -> None:
-    rig.executor.commanded = ""
-    rig.execute(rig.step(done=lambda _: True, skippable=True, enters="GUIDED"))
+    rig.seen.mode = "AUTO"
+    rig.execute(rig.step(done=lambda _: True, skippable=True, enters="AUTO"))
     assert rig.sent == []
     assert rig.executor.is_ours()
+    assert rig.executor.commanded == "AUTO"
+    rig.seen.mode = "LOITER"
+    assert not rig.executor.is_ours()
 
 
 def test_a_command_is_repeated_until_it_is_answered(rig: Rig) -> None:
