@@ -24,8 +24,10 @@ mean that it receives nothing either.
 ENTERED_WITHIN: Ns = 7 * S
 
 MANUAL_CONTROL_PERIOD: Ns = 50 * MS
-SETTLED: Ns = 500 * MS
-"""Time after which centred manual control no longer counts as moving."""
+SETTLED: Ns = 1 * S
+"""Time after which centred manual control no longer counts as moving. PX4 filters the movement with 0.3 s of
+its own clock: after 0.5 s a PX4 1.14 that lagged behind left AUTO.LAND for POSCTL.
+"""
 
 STILL = Setpoint(Velocity(0.0, 0.0, 0.0))
 CENTRED = ManualControl()
