@@ -11,7 +11,7 @@ import pytest
 from volery.base.errors import ComponentError, Deadlock, UsageError
 from volery.base.time import MS, S
 from volery.kernel.interrupts import Watchdog
-from volery.kernel.task import ExecutionContext, Scope, Task
+from volery.kernel.task import Cancelled, ExecutionContext, Scope, Task
 from volery.kernel.virtual import Pacer, VirtualKernel
 from volery.kernel.waiting import Event, Queue, sleep
 
@@ -418,3 +418,41 @@ def test_with_a_pace_a_lone_task_waits_for_the_wall_too(monkeypatch: pytest.Monk
     kernel.run(S)
     kernel.close()
     assert {MS, 2 * MS, 3 * MS} <= set(waits)
+
+
+def test_with_a_pace_the_time_of_each_step_of_a_script_is_not_made_good(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rests: list[int] = []
+    rest = Pacer.rest
+
+    def resting(pacer: Pacer) -> None:
+        rests.append(kernel.now())
+        rest(pacer)
+
+    kernel = VirtualKernel(pace=1e6)
+    with kernel.adopt("script"):
+        sleep(kernel, S)
+        monkeypatch.setattr(Pacer, "rest", resting)
+        sleep(kernel, S)
+        sleep(kernel, S)
+    assert rests == [S, 2 * S]
+    kernel.close()
+
+
+def test_the_reason_of_a_close_reaches_its_tasks(virtual: VirtualKernel, spawn: Spawn) -> None:
+    seen: list[str] = []
+
+    def body() -> None:
+        try:
+            virtual.park()
+        except Cancelled as error:
+            seen.append(str(error))
+            raise
+
+    spawn(body, "waiting")
+    with pytest.raises(Deadlock):
+        virtual.run(S)
+    assert virtual.close("power off") == []
+    assert seen == ["power off"]
+    assert virtual.root.cancelled == "power off"
