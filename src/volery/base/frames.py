@@ -171,6 +171,8 @@ class LocalFrame:
     _axes: tuple[Vector, Vector, Vector] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        for name in ("latitude", "longitude", "amsl"):  # compiled, a float is one; plain, it may be an int
+            object.__setattr__(self, name, float(getattr(self, name)))
         lat, lon = radians(self.latitude), radians(self.longitude)
         axes = (
             (-sin(lon), cos(lon), 0.0),

@@ -138,3 +138,9 @@ def test_a_frame_is_a_value() -> None:
     frame.to_enu(37.0, -3.0, 640.0)
     assert frame == LocalFrame(37.0, -3.0, 640.0)
     assert hash(frame) == hash(LocalFrame(37.0, -3.0, 640.0))
+
+
+def test_a_frame_given_in_integers_is_that_of_floats() -> None:
+    frame = LocalFrame(46, -104, 900)
+    assert repr(frame) == "LocalFrame(latitude=46.0, longitude=-104.0, amsl=900.0)"
+    assert frame == LocalFrame(46.0, -104.0, 900.0)
