@@ -360,7 +360,7 @@ def core_law(machine: Machine, isa: str, taken: Mapping[str, Timing], queues: Qu
         cpu="x86-64" if isa == "x86_64" else "generic",
         provenance="measured",
         source=f"volery calibrate processor on {machine.description}",
-        validity=" and ".join((*queues.assumed(), "the prediction of branches")) + " are assumed",
+        validity=f"assumed: {', '.join((*queues.assumed(), 'the prediction of branches'))}",
         least_mhz=mhz * 0.5,
         greatest_mhz=mhz,
         width=_pipes(min(taken[WIDTH].cycles, taken[FREE + "increment"].cycles)),

@@ -334,4 +334,7 @@ def _core_table(law: CoreLaw) -> Table:
         for level, cache in enumerate(memory.caches, 1):
             shown.add_row(f"load from cache {level}, {cache.bytes >> 10} KiB", f"{cache.latency:g}", "")
         shown.add_row("load from memory", f"{memory.latency_ns:g} ns", f"{memory.bytes_per_ns:g} GB/s")
+    shown.add_row(f"reorder buffer, {law.window} entries", "", "")
+    for queue in law.queues:
+        shown.add_row(f"issue queue of {', '.join(queue.pipes)}, {queue.entries} entries", "", "")
     return shown
