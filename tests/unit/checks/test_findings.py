@@ -93,7 +93,8 @@ def test_a_symbolic_link_does_not_lead_out_of_the_folder(bench):
 def test_a_language_without_a_compiler_is_a_warning(bench, monkeypatch):
     (bench.folder / "code" / "pilot.cpp").write_text("int main() {}\n")
     bench.change("language: python\n    path: code/pilot.py", "language: c++\n    path: code/pilot.cpp")
-    monkeypatch.setattr("volery.checks.system_rules.has_compiler", lambda: False)
+    for module in ("volery.checks.system_rules", "volery.run.assembly.cpp"):
+        monkeypatch.setattr(f"{module}.has_compiler", lambda: False)
     (one,) = bench.check().findings
     assert (one.rule.code, one.rule.level) == ("V703", "warning")
     assert "no C++ compiler is installed" in one.what
