@@ -1,11 +1,9 @@
-"""The safety switch over links without MAVLink: MAVROS, a DJI SDK node, Paparazzi."""
+"""The safety switch over links without MAVLink: MAVROS and a DJI SDK node."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
-
-import pytest
 
 from rigs.airstrip import Airstrip
 from rigs.missions import carried_out
@@ -18,7 +16,6 @@ from volery.control.safety_switch import Authority, SwitchSettings
 from volery.kernel.task import ExecutionContext
 from volery.ros.graph import EmbeddedGraph
 from volery.run.assembly.vehicles import VehicleSettings, open_vehicles
-from volery.simulation.autopilots.paparazzi.rotorcraft_state import StickFrame, state_of
 from volery.trace.events import Text
 from volery.vehicles import Drone
 from volery.vehicles.drivers.mavros import MAVROS
@@ -90,12 +87,11 @@ def test_over_mavros_the_switch_takes_over() -> None:
     assert at.autopilot.vehicle.mode.name != "GUIDED"
 
 
-def simulated(name: str, mission: Callable[[Any, Drone], Any], prepare: Callable[[Any], None]) -> Any:
+def simulated(name: str, mission: Callable[[Any, Drone], Any]) -> Any:
     opened = open_vehicles({name: f"sim:{name}?start=warm"}, {name: Drone}, VehicleSettings())
     drone, fleet = opened.vehicles[0], opened.fleet
     assert fleet is not None
     assert isinstance(drone, Drone)
-    prepare(fleet.autopilots[name].vehicle)
     try:
 
         def body() -> Any:
@@ -115,23 +111,6 @@ def test_a_dji_mode_switch_is_channel_5() -> None:
 
         return takeover(drone.kernel, drone, 5, move)
 
-    authority, said = simulated("dji", mission, lambda _: None)
+    authority, said = simulated("dji", mission)
     assert authority is Authority.MANUAL
     assert "the switch is at 1000 us: manual takeover" in said
-
-
-@pytest.mark.parametrize(("mode", "expected"), [(-9600, Authority.MANUAL), (9600, Authority.AUTONOMOUS)])
-def test_a_paparazzi_mode_switch_is_channel_5(mode: int, expected: Authority) -> None:
-    sticks = [StickFrame(throttle=4800)]
-
-    def transmit(vehicle: Any) -> None:
-        vehicle.kernel.every(50 * MS, lambda: state_of(vehicle).radio.receive(vehicle, sticks[0]))
-
-    def mission(vehicle: Any, drone: Drone) -> tuple[Authority, str]:
-        def move() -> None:
-            sticks[0] = sticks[0]._replace(mode=mode)
-
-        return takeover(drone.kernel, drone, 5, move)
-
-    authority, _ = simulated("paparazzi", mission, transmit)
-    assert authority is expected

@@ -160,3 +160,13 @@ def test_no_message_does_harm(frames: list[Frame]) -> None:
     listener.kernel.run(listener.kernel.now() + 3 * S)
     assert listener.driver.problem() is None or str(listener.driver.problem())
     assert isinstance(listener.driver.on_link_loss(), str)
+
+
+def test_the_mode_switch_of_the_transmitter_is_channel_5(listener: Listener) -> None:
+    sticks = {"roll": 9600, "pitch": -4800, "yaw": 0, "throttle": 9600, "kill": 9600}
+    for mode, pulse in ((9600, 1500), (0, 1000), (-9600, 1000)):
+        listener.hear("ROTORCRAFT_RADIO_CONTROL", **sticks, mode=mode, status=0)
+        assert tuple(listener.seen.rc) == (2000, 1250, 2000, 1500, pulse, 2000)
+        assert listener.seen.rc_ns >= 0
+    listener.hear("ROTORCRAFT_RADIO_CONTROL", **sticks, mode=9600, status=1)
+    assert set(listener.seen.rc) == {0}  # the transmitter is lost
