@@ -42,7 +42,7 @@ class CheckedModel:
 
 
 def check(path: Path | ModelBuilder, vocabulary: Vocabulary, overrides: Iterable[str] = ()) -> CheckedModel:
-    """Check a model with each of its allocations and scenarios, load its Python components, compile those in C++.
+    """Check a model with each allocation and scenario; load its Python components, compile those in C++.
 
     Args:
         path: The model's file or its folder, or a model that was built in Python.

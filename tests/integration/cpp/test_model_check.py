@@ -42,7 +42,7 @@ run: {duration: 1 s}
 """
 FILES = {
     "right.cpp": "class Right {\npublic:\n    double length(int posts) { return posts; }\n};\n",
-    "no_operation.cpp": "// no\nclass NoOperation {\npublic:\n    double width(int posts) { return posts; }\n};\n",
+    "no_operation.cpp": "// no\nclass NoOperation {\npublic:\n    int width(int at) { return at; }\n};\n",
     "no_run.cpp": "struct NoRun {};\n",
     "other.cpp": "struct Here {};\n",
     "broken.cpp": "struct Broken {\n    int x = nothing;\n};\n",

@@ -32,7 +32,7 @@ Format = Annotated[str, typer.Option("--format", metavar="text|json|sarif", help
 
 @commands.add("quiet", "debug")
 def check(output: Output, model: Model, overrides: Overrides = None, format_: Format = "text") -> int:
-    """Check a model with each of its allocations and scenarios, load its Python components, compile those in C++.
+    """Check a model with each allocation and scenario; load its Python components, compile those in C++.
 
     The model may be a .uml file. The exit status is 2 if a finding keeps the model from running, else 0.
     """
