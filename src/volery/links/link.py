@@ -61,7 +61,7 @@ class ByteLink(Protocol):
 class SelectiveLink(Protocol):
     """A link whose receiver states which messages it uses, so that the sender need not make the others.
 
-    It spares a simulation the telemetry that nobody reads. A sender may still send what is not wanted.
+    It spares a simulation the telemetry that is not read. A sender may still send what is not wanted.
     """
 
     def select(self, wanted: Callable[[str], bool]) -> None:
