@@ -29,6 +29,7 @@ LOOK: Ns = 5 * MS
 GREATEST = 1.0
 """Greatest speed at touch-down, m/s."""
 LIMIT_S = 120.0
+THROTTLE = 3
 
 
 class Seen(NamedTuple):
@@ -62,8 +63,9 @@ PHASES: Mapping[str, Phase] = {
 LINKS = {
     "good": "",
     "57600 baud, 2 % lost": "&wire=bytes&baud=57600&drop=0.02&flip=1e-5",
-    "lost": "&wire=bytes&parameters=FS_GCS_ENABLE:5",
+    "lost": "&wire=bytes&parameters=FS_GCS_ENABLE:5,FS_OPTIONS:0,RC_OVERRIDE_TIME:1",
 }
+"""By RC override the mode is a pilot's, in which FS_OPTIONS=16, the default, does not land."""
 
 
 class Landed(NamedTuple):
@@ -108,6 +110,8 @@ def landed(by: str, phase: Phase, link: str, cut_at: float | None = None) -> Lan
         body, now = truth(), kernel.now() / S
         height = body.position[2] - body.ground
         highest = max(highest, height)
+        if height > 1.0:
+            switch[THROTTLE - 1] = 1500  # where a pilot has it in altitude hold
         if not vehicle.armed:
             armed_at = now
         else:
