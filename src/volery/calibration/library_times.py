@@ -1,4 +1,4 @@
-"""Measurement of the times of library calls: the points of ``cost/libraries.yaml``.
+"""Measurement of the times of library calls: the points of ``cost/libraries.json``.
 
 Each call is timed alone in a loop, at several sizes, in CPU time of the thread; the least of several batches
 counts, because other programs only add to it. Within a program the data and the code of numpy's calls are

@@ -2,7 +2,7 @@
 
 Law: time of a call = a function of its size, interpolated between measured points on logarithmic axes; each
 entry states what its size is. It depends on nothing else, so that the same run has the same times. Left out
-are types, strides and whether the data lie in a cache; that is its error. The points in ``libraries.yaml``
+are types, strides and whether the data lie in a cache; that is its error. The points in ``libraries.json``
 are in nanoseconds of the machine of ``operation_table``; ``CodeLaw`` scales them to other processors.
 
 Calls are found when they happen: in a file that imports one of the libraries every call, operator and
@@ -11,6 +11,7 @@ subscript passes through ``LibraryCalls``, which looks at the function and at it
 
 from __future__ import annotations
 
+import json
 import operator
 import sys
 from bisect import bisect_right
@@ -22,7 +23,6 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from volery.base.installed import require_extra
 from volery.cost.figures import WithProvenance
 from volery.cost.python_operations import STEPS_PER_NS
 
@@ -87,15 +87,19 @@ class LibraryTable(WithProvenance):
         """Libraries that have an entry."""
         return frozenset(name.partition(".")[0] for name in self.calls)
 
+    def as_text(self) -> str:
+        """Return the table as JSON, a line for each function."""
+        head = self.model_dump(exclude={"calls"}, exclude_defaults=True)
+        rows = [f"    {json.dumps(name)}: {one.model_dump_json()}" for name, one in self.calls.items()]
+        lines = [f"  {json.dumps(name)}: {json.dumps(value)}," for name, value in head.items()]
+        return "\n".join(["{", *lines, '  "calls": {', ",\n".join(rows), "  }", "}", ""])
+
 
 @cache
 def library_table() -> LibraryTable:
     """Return the table that comes with volery."""
-    text = files("volery.cost").joinpath("libraries.yaml").read_text(encoding="utf-8")
-    require_extra("model", "the table of library calls")
-    from ruamel.yaml import YAML
-
-    return LibraryTable.model_validate(YAML(typ="safe").load(text))
+    text = files("volery.cost").joinpath("libraries.json").read_text(encoding="utf-8")
+    return LibraryTable.model_validate_json(text)
 
 
 def _array_elements(value: Any) -> int:

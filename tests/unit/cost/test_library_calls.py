@@ -9,7 +9,7 @@ from types import ModuleType
 import pytest
 
 from volery.calibration.timed_code import timed_program
-from volery.cost import STEPS_PER_NS, StepCounter, library_table, operation_table
+from volery.cost import STEPS_PER_NS, LibraryTable, StepCounter, library_table, operation_table
 from volery.cost.library_calls import LibraryCall, call_size
 
 PROGRAMS = Path(__file__).parents[3] / "bench" / "library_programs"
@@ -96,3 +96,7 @@ def test_the_law_between_and_beyond_its_points() -> None:
     assert call_size("text", ("abc", b"12345"), 1) == 5
     with pytest.raises(ValueError, match="size 'length'; there is elements"):
         LibraryCall(size="length", points={1: 1.0})
+
+
+def test_a_table_is_written_as_it_is_read() -> None:
+    assert LibraryTable.model_validate_json(library_table().as_text()) == library_table()

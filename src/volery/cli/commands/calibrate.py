@@ -274,13 +274,10 @@ def libraries(
         table = measure_table(
             machine.description, DEFAULT_ROUNDS, lambda name, number: update(number, 800, name)
         )
-    plain = table.model_dump(exclude={"calls"})
-    plain["calls"] = {
-        name: {"size": one.size, "points": dict(one.points)} for name, one in table.calls.items()
-    }
-    _write_yaml(
-        file, plain, "Times of calls of compiled libraries by size, ns: by `volery calibrate libraries`."
-    )
+    try:
+        file.write_text(table.as_text(), encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"{file} cannot be written: {error.strerror}") from error
     output.note(
         f"{file}: {len(table.calls)} functions; in programs numpy takes {table.in_context:.2f} times as long"
     )
