@@ -734,7 +734,7 @@ class Vehicle(ServicedVehicle):
                     self._in_progress = None
                 if policy.recorded or outcome != "ok":
                     self._record(start, operation, asked, (outcome, said), goal())
-                if self._monitor is None and not policy.unmonitored:
+                if self._monitor is None and not policy.unmonitored and self._straying is None:
                     self._monitor_in_place(asked)
 
     def _abort_other(
@@ -823,8 +823,12 @@ class Vehicle(ServicedVehicle):
         if self._driver.cycle is not None:
             return
 
+        waited = False
+
         def look() -> None:
-            if self._in_progress is not None:
+            nonlocal waited
+            if not waited or self._in_progress is not None:  # never twice at one time
+                waited = True
                 return
             error = check(asked, self.kernel.now())
             if error is None:
@@ -854,6 +858,8 @@ class Vehicle(ServicedVehicle):
                 lambda: self._reaction_steps(reaction),
                 policy=TO_SAFETY if reaction is Reaction.HOLD else LANDING,
             )
+            if isinstance(error, PositionLost) and reaction is Reaction.HOLD:
+                raise error  # it drifts all the same
 
         unread = self._bounds_error is not None  # else a call has raised it meanwhile
         try:
@@ -862,6 +868,7 @@ class Vehicle(ServicedVehicle):
             self._straying = None
             if unread:
                 self._bounds_error = error
+            self._monitor_in_place("a reaction")
 
     def _raise_bounds_error(self) -> None:
         error, self._bounds_error = self._bounds_error, None
