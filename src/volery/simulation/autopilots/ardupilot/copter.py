@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache, partial
-from math import acos, cos, degrees, hypot, sin
+from math import acos, cos, degrees, hypot, radians, sin
 
 from volery.base.frames import Vector
 from volery.base.time import MS, S, from_seconds, to_seconds
@@ -257,13 +257,16 @@ def _angle(a: Vector, b: Vector) -> float:
 def _check_crash(vehicle: Vehicle) -> None:
     """Disarm a vehicle that leans far from its target for two seconds, as after a roll-over."""
     estimate, now = vehicle.estimate, vehicle.kernel.now()
+    roll, pitch, _ = estimate.attitude
+    if cos(roll) * cos(pitch) >= cos(radians(CRASH_LEAN)):
+        vehicle.failsafes.crashing_since = NEVER
+        return
     axis = _down_axis(*estimate.attitude)
     error = _angle(axis, _down_axis(*estimate.target_attitude))
     accel = hypot(*estimate.acceleration)
     crashing = (
         vehicle.parameters["FS_CRASH_CHECK"] > 0.0
         and vehicle.mode.name not in UNCHECKED
-        and _angle(axis, (0.0, 0.0, 1.0)) > CRASH_LEAN
         and error > CRASH_ERROR
         and accel < CRASH_ACCEL
         and hypot(*estimate.velocity) < CRASH_SPEED
