@@ -230,8 +230,6 @@ WATCHED: Ns = 100 * MS
 LOST_S = 30.0
 """Time between the death of a program and the start of the next one, s."""
 DOWN_WITHIN_S = 300.0
-SETTLES_S = 2.0
-"""Time in which an airframe without thrust falls onto its legs, or over, s."""
 
 NEAR_M = 5.0
 """Largest distance from the goal, by truth, at which an operation may return."""
@@ -460,7 +458,6 @@ class _Trying:
         while self._seen.armed[-1] and waited < DOWN_WITHIN_S:
             stage.sleep(1.0)
             waited += 1.0
-        stage.sleep(SETTLES_S)
 
     def _demand_done(self) -> None:
         """Demand that a completed operation is complete by the vehicle's true state."""
@@ -488,8 +485,6 @@ class _Trying:
             most = most_lean(self._stage.flight.spec, self._fault)
             demand(landing.lean_deg < most, f"it touched down leaning {landing.lean_deg:.0f} degrees")
             demand(landing.battery > 0.0, "its battery was empty at touch-down")
-            stands = lean(self._seen.states[-1])
-            demand(stands < UPRIGHT_DEG, f"it lies on the ground, leaning {stands:.0f} degrees")
         if self._taken_over:
             self._demand_not_fought()
 
