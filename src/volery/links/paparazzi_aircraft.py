@@ -168,7 +168,8 @@ def read_aircraft(path: Path) -> PaparazziAircraft:
     for file in _documents(path):
         if file.stat().st_size > MAX_FILE_SIZE:
             raise UsageError(f"{file}: larger than {MAX_FILE_SIZE} bytes: not a file of an aircraft")
-        aircraft = _with(aircraft, _root(file.read_bytes(), str(file)), str(file))
+        root = _root(file.read_bytes(), str(file), recover=file.name == CONFIGURATION.name)
+        aircraft = _with(aircraft, root, str(file))
     lacks = " and ".join(
         what
         for what, found in (("settings", aircraft.settings), ("flight plan", aircraft.blocks))
@@ -191,14 +192,22 @@ def _documents(path: Path) -> list[Path]:
     raise UsageError(f"{path}: no XML of an aircraft there; give a folder var/aircrafts/NAME or a file of it")
 
 
-def _root(document: bytes, name: str) -> Any:
+def _root(document: bytes, name: str, *, recover: bool = False) -> Any:
+    """Return the root element; with *recover* an unescaped ``&`` of C code is skipped."""
     parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, dtd_validation=False, huge_tree=False
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        dtd_validation=False,
+        huge_tree=False,
+        recover=recover,
     )
     try:
         root = etree.fromstring(document, parser)
     except etree.XMLSyntaxError as error:
         raise ModelError(f"not XML: {error.msg}", where=Location(name, error.lineno or 0)) from None
+    if root is None:
+        raise ModelError("not XML", where=Location(name, 0))
     subset = root.getroottree().docinfo.internalDTD
     if subset is not None and any(subset.iterentities()):
         raise ModelError("entities are not read", where=Location(name, 1))

@@ -83,6 +83,20 @@ def test_the_configuration_lies_one_folder_deeper(tmp_path: Path) -> None:
     assert read_aircraft(tmp_path).system == 202
 
 
+def test_a_configuration_with_c_code_as_the_generator_writes_it(tmp_path: Path) -> None:
+    call = '<call fun="run(flying(), &stabilization.rc_sp, &thrust_sp)"/>'
+    conf = f'<aircraft ac_id="202" name="Bee"><airframe>{call}</airframe></aircraft>'
+    aircraft = read_aircraft(folder(tmp_path, settings=SETTINGS, flight_plan=PLAN, conf_aircraft=conf))
+    assert (aircraft.name, aircraft.system) == ("Bee", 202)
+    assert aircraft.setting("kill_throttle").number == 1
+
+
+def test_a_configuration_that_is_no_xml_is_an_error(tmp_path: Path) -> None:
+    made = folder(tmp_path, settings=SETTINGS, flight_plan=PLAN, conf_aircraft="\x01 nothing")
+    with pytest.raises(ModelError, match=r"conf_aircraft\.xml.*not XML"):
+        read_aircraft(made)
+
+
 @pytest.mark.parametrize(
     "attributes",
     [
