@@ -159,6 +159,10 @@ _MANIFEST = """<?xml version="1.0"?>
 """
 
 
+ROS2_ONLY = "rcl_interfaces/"
+"""Beginning of the types that no installation of ROS 1 has."""
+
+
 def write_package(package: str, folder: Path) -> Path:
     """Write an interface package and return its folder.
 
@@ -212,6 +216,9 @@ def _write_services(made: Path, names: list[str]) -> None:
     modules = []
     for name in names:
         kind = ros1_service(name)
+        nested = [inner for half in (kind.request, kind.response) for inner, _ in _inner(half)]
+        if not name.startswith(ROS2_ONLY) and any(inner.startswith(ROS2_ONLY) for inner in nested):
+            continue  # a module that imports it would fail, and with it those of the whole package
         label = kind.name.partition("/")[2]
         halves = f"{_own(kind.request)}---\n{_own(kind.response)}"
         _write(made / "srv", f"{label}.srv", halves)
