@@ -133,7 +133,7 @@ class OffTrack(VehicleError):
 
 
 class ThrustSaturated(VehicleError):
-    """The vehicle is at full thrust and does not climb: it is overloaded, or a motor or the battery is weak."""
+    """The vehicle does not climb at full thrust: it is overloaded, or a motor or the battery is weak."""
 
 
 class LowBattery(VehicleError):

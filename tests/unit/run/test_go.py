@@ -26,7 +26,7 @@ def test_the_telemetry_of_a_loop_is_requested_unless_stated() -> None:
 
 def test_a_flight_records_its_loops(tmp_path: Path) -> None:
     run = go(
-        lambda: Rotation([45.0], 5.0),
+        lambda: Rotation([45.0], 10.0),  # the real one settles in 4 to 8 s
         "sim:px4?start=warm",
         GoSettings(by="rc"),
         Options(out=tmp_path / "run"),

@@ -4,8 +4,8 @@ Battery: Thevenin's circuit without its RC branch (Tremblay and Dessaint, World 
 (2009), call it the static part).
 
 * V = OCV(s) - R I, P = V I, hence I = (OCV - sqrt(OCV^2 - 4 R P)) / (2 R).
-* OCV(s), s = fraction left: piecewise linear, within 0.1 V of the measured cell of Chen and Rincon-Mora, IEEE
-  Trans. Energy Conversion 21 (2006), eq. 2, from 5 % on; that cell was charged to 4.1 V, this one to 4.2 V.
+* OCV(s), s = fraction left: piecewise linear, within 0.1 V of the measured cell of Chen and Rincon-Mora,
+  IEEE Trans. Energy Conversion 21 (2006), eq. 2, from 5 % on; that cell was charged to 4.1 V, this to 4.2 V.
   Valid from 0 to 40 degrees C, at currents up to about 20 C. Voltage recovers at once after a load; ageing and
   self-discharge are not modelled.
 * Beyond the battery's largest power (OCV^2 / 4R) the current stays at OCV / 2R: the battery browns out.
@@ -107,18 +107,18 @@ def cell_voltage(left: float) -> float:
     Below zero the cell breaks down.
     """
     if left >= 0.9:
-        return 4.06 + (min(left, 1.0) - 0.9) * 1.4
-    if left >= 0.5:
-        return 3.84 + (left - 0.5) * 0.55
-    if left >= 0.2:
-        return 3.73 + (left - 0.2) * (11.0 / 30.0)
-    if left >= 0.1:
-        return 3.67 + (left - 0.1) * 0.6
-    if left >= 0.05:
-        return 3.52 + (left - 0.05) * 3.0
-    if left >= 0.0:
-        return 3.0 + left * 10.4
-    return max(0.0, 3.0 + left * 60.0)
+        volts = 4.06 + (min(left, 1.0) - 0.9) * 1.4
+    elif left >= 0.5:
+        volts = 3.84 + (left - 0.5) * 0.55
+    elif left >= 0.2:
+        volts = 3.73 + (left - 0.2) * (11.0 / 30.0)
+    elif left >= 0.1:
+        volts = 3.67 + (left - 0.1) * 0.6
+    elif left >= 0.05:
+        volts = 3.52 + (left - 0.05) * 3.0
+    else:
+        volts = 3.0 + left * (10.4 if left >= 0.0 else 60.0)
+    return max(0.0, volts)
 
 
 @numeric

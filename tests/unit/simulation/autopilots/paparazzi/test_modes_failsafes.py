@@ -95,7 +95,7 @@ def test_without_satellites_guided_flies_on(craft: Any) -> None:
 
 
 def test_without_satellites_the_position_freezes_and_it_flees(craft: Any) -> None:
-    """Recorded: frozen at the last fix, 4.3 m/s after 10 s: the integral of a frozen error leans it further."""
+    """Recorded: frozen at the last fix, 4.3 m/s after 10 s, as the integral of a frozen error grows."""
     craft.guided()
     craft.guide(0, 0.0, 40.0, -10.0)
     craft.run(4.0)
