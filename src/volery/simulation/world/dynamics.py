@@ -6,8 +6,8 @@ Battery: Thevenin's circuit without its RC branch (Tremblay and Dessaint, World 
 * V = OCV(s) - R I, P = V I, hence I = (OCV - sqrt(OCV^2 - 4 R P)) / (2 R).
 * OCV(s), s = fraction left: piecewise linear, within 0.1 V of the measured cell of Chen and Rincon-Mora,
   IEEE Trans. Energy Conversion 21 (2006), eq. 2, from 5 % on; that cell was charged to 4.1 V, this to 4.2 V.
-  Valid from 0 to 40 degrees C, at currents up to about 20 C. Voltage recovers at once after a load; ageing and
-  self-discharge are not modelled.
+  Valid from 0 to 40 degrees C, at currents up to about 20 C. Voltage recovers at once after a load; ageing
+  and self-discharge are not modelled.
 * Beyond the battery's largest power (OCV^2 / 4R) the current stays at OCV / 2R: the battery browns out.
 
 Multirotor: a rigid body under four rotors, drag, gravity and the ground.
