@@ -17,7 +17,7 @@ from volery.base.time import MS, S
 from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter, Parameters, Tuning, load
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.guided_flight import Turn
-from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, Stabilize
+from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.manoeuvres.rover_driving import (
     DriveTo,
@@ -34,6 +34,7 @@ from volery.simulation.autopilots.px4 import commands, event_interface, mission,
 from volery.simulation.autopilots.px4.failsafes import on_step
 from volery.simulation.autopilots.px4.firmware import own_parameters, px4_firmware, px4_mavlink
 from volery.simulation.autopilots.px4.flight_modes import (
+    AltitudeControl,
     Descent,
     Hold,
     Orbit,
@@ -230,7 +231,7 @@ def _orbit(vehicle: Vehicle) -> Manoeuvre:
 COPTER_MODES = modes.mode_table(
     {
         modes.MANUAL: Stabilize,
-        modes.ALTCTL: AltitudeHold,
+        modes.ALTCTL: AltitudeControl,
         modes.POSCTL: PositionControl,
         modes.ORBIT: _orbit,
         modes.ACRO: Stabilize,

@@ -12,8 +12,9 @@ from math import atan2, cos, dist, hypot, pi, sin
 from volery.base.frames import Vector
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
+from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ManualFlight
 from volery.simulation.autopilots.manoeuvres.to_point import Land, ToPoint, bearing
+from volery.simulation.autopilots.manual_control import StickPositions
 from volery.simulation.autopilots.px4.position_control import Cruise, PositionLoops
 from volery.simulation.autopilots.state_groups import NEVER, Home
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
@@ -226,7 +227,7 @@ SINK_BLIND = 0.7
 """MPC_LAND_SPEED: sink rate in POSCTL without sticks [m/s]."""
 
 EXPO = 0.6
-"""MPC_XY_MAN_EXPO, MPC_Z_MAN_EXPO."""
+"""MPC_XY_MAN_EXPO, MPC_Z_MAN_EXPO, MPC_YAW_EXPO."""
 
 STICK_SPEED_SHARE = 0.78
 """Share of MPC_VEL_MANUAL that a held stick reaches, as recorded."""
@@ -240,6 +241,16 @@ def apply_expo(stick: float, dead: float) -> float:
     along = (size - dead) / (1.0 - dead)
     shaped = EXPO * along**3 + (1.0 - EXPO) * along
     return shaped if stick > 0.0 else -shaped
+
+
+class AltitudeControl(AltitudeHold):
+    """ALTCTL: as ``AltitudeHold``; the yaw stick has a dead zone and an expo curve."""
+
+    @property
+    def pilot(self) -> StickPositions:
+        """The stick positions now, the yaw as PX4 shapes it."""
+        sticks = super().pilot
+        return sticks._replace(yaw=apply_expo(sticks.yaw, self.vehicle.parameters["MPC_HOLD_DZ"]))
 
 
 class BlindDescent(Manoeuvre):

@@ -27,7 +27,13 @@ from volery.vehicles.drivers.paparazzi.decoder import (
     TAKEOFF_BLOCK,
 )
 from volery.vehicles.drivers.paparazzi.sequences import ARMING, PaparazziSteps
-from volery.vehicles.drivers.steps import AT_REST_M_S, NEAR_UP_M, disarmed_step, horizontal_distance
+from volery.vehicles.drivers.steps import (
+    AT_REST_M_S,
+    NEAR_UP_M,
+    disarmed_step,
+    horizontal_distance,
+    immediate_step,
+)
 from volery.vehicles.telemetry import Telemetry
 
 BLOCK_WITHIN: Ns = 15 * S
@@ -158,11 +164,11 @@ class TakeoffAndLanding:
         steps = self._steps
         steps.yaw = None
         spot: list[tuple[float, float]] = []
+        # on the ground: until GUIDED is entered, which lost frames delay, the plan flies on to its next block
+        note_spot = immediate_step("note where it stands", lambda: spot.append(steps.spot()))
 
         def send() -> None:
-            if not spot:
-                spot.append(steps.spot())
-            self._backend.send_setpoint(Setpoint(*spot[0], -height, steps.heading()))
+            self._backend.send_setpoint(Setpoint(*spot[-1], -height, steps.heading()))
 
         straight_up = Step(
             ask=f"climb to {height:g} m",
@@ -175,10 +181,10 @@ class TakeoffAndLanding:
             fails=steps.decoder.lacks_position,
         )
         if self._by_plan():
-            enter = (steps.locate(), steps.check_settings(), steps.change_mode(NAV))
+            enter = (steps.locate(), note_spot, steps.check_settings(), steps.change_mode(NAV))
             return (*enter, self._start_block(), self._takeoff_block(within), *steps.guided(), straight_up)
         start = replace(steps.start_motors(), mode=GUIDED)
-        return (steps.locate(), *steps.guided(), start, straight_up)
+        return (steps.locate(), note_spot, *steps.guided(), start, straight_up)
 
     def _start_block(self) -> Step:
         return Step(

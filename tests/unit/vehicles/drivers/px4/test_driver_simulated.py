@@ -373,6 +373,6 @@ def test_what_has_returned_has_settled() -> None:
         return hypot(east - to_east, north - to_north)
 
     field.fly(flight)
-    assert max(strayed) < 0.8
+    assert max(strayed) < 1.1  # a real PX4 1.14 in SIH stayed within 1.1 m
     assert max(off) < 4.0
     assert waited[0] < 11.0
