@@ -102,7 +102,7 @@ def test_a_new_target_replaces_the_old_and_a_command_replaces_targets(ready: Any
         "setpoint_position/local", "geometry_msgs/PoseStamped", pose={"position": {"x": 30.0, "z": 5.0}}
     )
     ready.until(lambda: not ready.driver.telemetry.armed, 120.0)
-    assert ready.true == pytest.approx((0.0, 0.0, 0.0), abs=2.0)  # satellites are 1.2 m off, one standard deviation
+    assert ready.true == pytest.approx((0.0, 0.0, 0.0), abs=2.0)  # satellites: 1.2 m, one deviation
     assert ready.texts == ["d: set-points are not followed while it is to return home"]
 
 
