@@ -192,7 +192,7 @@ def test_a_file_that_is_no_mission(mission, says, tmp_path):
         ("sim:ardupilot?home=91,0,0", "latitude 91.0 is off the globe"),
         ("sim:ardupilot?drop=0.1", "wire=bytes"),
         ("sim:ardupilot?wire=bytes&drop=2", "drop=2.0"),
-        ("sim:ardupilot?sensors=laser", "consumer or rtk"),
+        ("sim:ardupilot?sensors=laser", "consumer, rtk or sih"),
         ("mavros+graph:///drone_1", "components of a model"),
     ],
 )

@@ -125,7 +125,7 @@ def test_an_endless_loop_is_named_with_its_line(tmp_path, monkeypatch, fidelity,
     assert_brought_down(run.folder)
 
 
-FULL = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))"
+FULL = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))"
 """A file that reaches this size cannot be written on: as on a full disk, but for the words."""
 
 
