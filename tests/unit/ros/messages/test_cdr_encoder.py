@@ -31,7 +31,7 @@ def values(base: str) -> some.SearchStrategy[Any]:
     if base.startswith("float"):
         return some.floats(width=32, allow_nan=False)
     bits = LIMITS[base]
-    return some.integers(-(2**bits) if base.startswith(("int", "byte")) else 0, 2**bits - 1)
+    return some.integers(-(2**bits) if base.startswith("int") else 0, 2**bits - 1)  # a byte has no sign
 
 
 def of_field(field: Field) -> some.SearchStrategy[Any]:
