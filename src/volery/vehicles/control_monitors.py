@@ -21,6 +21,8 @@ FALLING_M_S = 8.0
 """Sink rate that no autopilot commands by itself, m/s."""
 OVERTURNED_DEG = 70.0
 OVERTURNED_FOR: Ns = 300 * MS
+UNCHECKED_FOR: Ns = S
+"""Time without a check after which what was noticed before does not count."""
 _UPSET_TEXTS = ("thrust loss", "crash: disarm", "motor failure", "attitude failure", "failure detected")
 
 
@@ -58,7 +60,7 @@ class UpsetMonitor:
         """
         seen, before = self._telemetry, self._checked
         self._checked = now
-        if now - before > OVERTURNED_FOR:
+        if now - before > UNCHECKED_FOR:
             self._tilted_since = None
         if not (seen.flying and seen.armed) or seen.kind != "drone" or seen.stale:
             self._tilted_since = None

@@ -37,8 +37,11 @@ CLOCK_TOLERANCE = 0.25
 LINK_TIMEOUT: Ns = 5 * S
 """Time without a message after which the link counts as lost: five missed heartbeats."""
 
+MONITOR_PERIOD: Ns = 200 * MS
+"""Shortest time between two checks of an operation, which are made at telemetry messages."""
+
 Check = Callable[[str, Ns], VehicleError | None]
-"""``check(operation, now)`` runs at each telemetry message and returns an error to end the step."""
+"""``check(operation, now)`` runs each ``MONITOR_PERIOD`` and returns an error to end the step."""
 
 
 def _no_check(_operation: str, _now: Ns) -> None:
@@ -149,7 +152,7 @@ class StepExecutor:
             asked: the operation, for error messages.
             plan: returns the steps; called again for each restart.
             restarts: how often to start again after the sequence was undone before lift-off.
-            check: may end the operation at any telemetry message.
+            check: may end the operation.
 
         Raises:
             Refused: the autopilot refused; its own text is quoted.
@@ -337,6 +340,7 @@ class _StepRun:
         self._was_armed = self._telemetry.armed
         self._taken = ""  # how another station, a pilot or a failsafe has changed it
         self._stopped: VehicleError | None = None  # error returned by *check*
+        self._check_due: Ns = self._began
         self._repeated = False
 
     def run(self) -> str:
@@ -409,8 +413,10 @@ class _StepRun:
         if not self._repeated and self._is_refused():
             return True
         self._detect_takeover()
-        if not self._taken:
-            self._stopped = self._stopped or self._check(self._asked, self._kernel.now()) or self._failed()
+        now = self._kernel.now()
+        if not self._taken and self._stopped is None and now >= self._check_due:
+            self._check_due = now + MONITOR_PERIOD
+            self._stopped = self._check(self._asked, now) or self._failed()
         return bool(self._taken) or self._stopped is not None
 
     def _over_or_late(self) -> bool:

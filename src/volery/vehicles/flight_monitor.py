@@ -1,4 +1,4 @@
-"""All monitors of one vehicle as one check, which runs at each telemetry message and between two calls.
+"""All monitors of one vehicle as one check, which runs five times a second, also between two calls.
 
 Which of them count depends on the policy of the operation. The first error in this order ends it: control is
 lost, the battery is low, the thrust is at its limit, the vehicle is off its track, out of its bounds, or has

@@ -71,6 +71,7 @@ from volery.vehicles.executor import (
     LAST_RESORT,
     LINK_TIMEOUT,
     MANUAL,
+    MONITOR_PERIOD,
     NO_GOAL,
     PLAIN,
     TO_SAFETY,
@@ -120,7 +121,6 @@ ON_LINK_LOSS = "if this program stops sending"
 
 MANUAL_CONTROL_FRESH: Ns = S
 """Manual flight does not begin with an older sample of manual control."""
-BOUNDS_PERIOD: Ns = 200 * MS
 
 SLOWEST_TRAVEL = 2.5
 """Speed over ground, m/s, that a time-out assumes where no speed is stated."""
@@ -819,7 +819,7 @@ class Vehicle(ServicedVehicle):
         self._keep_monitoring(f"after {asked}", check)
 
     def _keep_monitoring(self, asked: str, check: Check) -> None:
-        """Check each 200 ms; a node's loop that is not run receives nothing that could be checked."""
+        """Check each ``MONITOR_PERIOD``, unless telemetry arrives in a node's own loop, which may not be run."""
         if self._driver.cycle is not None:
             return
 
@@ -846,7 +846,7 @@ class Vehicle(ServicedVehicle):
             self.kernel.spawn(lambda: self._react_in_place(found), name, ExecutionContext(name))
 
         with self.kernel.guard:
-            self._monitor = handle = self.kernel.every(BOUNDS_PERIOD, look)
+            self._monitor = handle = self.kernel.every(MONITOR_PERIOD, look)
 
     def _react_in_place(self, error: VehicleError) -> None:
         self._straying = error

@@ -99,6 +99,8 @@ class EmbeddedPublisher:
         self._recorded = node.graph.records(topic.name)
         self._checked = not node.graph.unrecorded  # whether messages are encoded, as real ROS does
         self._sized = False  # whether the size of a message matters otherwise
+        self._spacing: Ns = 0  # shortest of the subscriptions', on a graph that takes the place of a link
+        self._due: Ns = 0  # when the next message will be used
         self._open = True
         topic.publishers.append(self)
         for subscription in topic.subscriptions:
@@ -120,6 +122,7 @@ class EmbeddedPublisher:
             connection = Connection(subscription, _over(route, reliable, subscription))
             self._sized = True
         self._connections.append(connection)
+        self._set_spacing()
         if other is not node:
             node.charge_background("accept")
             other.charge_background("connect")
@@ -130,6 +133,12 @@ class EmbeddedPublisher:
     def disconnect(self, subscription: SubscriptionEnd) -> None:
         """Stop sending to a subscription."""
         self._connections = [one for one in self._connections if one.to is not subscription]
+        self._set_spacing()
+
+    def _set_spacing(self) -> None:
+        graph, self._due = self.node.graph, 0
+        if graph.unrecorded and not graph.as_bytes:
+            self._spacing = min((one.to.qos.spacing for one in self._connections), default=0)
 
     def publish(self, message: Any) -> None:
         """Send a copy of `message` as it is when the call has been served."""
@@ -161,6 +170,7 @@ class EmbeddedPublisher:
                 node.kernel.record(Published(sent, self.topic, self.type, node.name, data))
         elif self._sized or self._checked:
             size = cdr_size(content)
+        self._due = sent + self._spacing
         if self._latches:
             self._latched.append((content.copy(), sent, size))
         single = len(connections) == 1
@@ -171,6 +181,10 @@ class EmbeddedPublisher:
         """Return the number of subscriptions it is connected to."""
         with self.node.kernel:
             return len(self._connections)
+
+    def awaited(self) -> bool:
+        """Return whether a message is to be sent now; see ``QoS.spacing``."""
+        return self.node.kernel.now() >= self._due
 
     def close(self) -> None:
         """Stop publishing."""

@@ -42,11 +42,14 @@ class QoS:
             subscribers, a subscription until its callback has run.
         reliability: ``reliable``, ``best_effort`` or ``best_available``.
         durability: ``volatile``, ``transient_local`` or ``best_available``.
+        spacing: A subscription uses no more than one message in this time, ns. Nodes of ROS send all; a graph
+            that takes the place of a link leaves the others out (``Publisher.awaited``).
     """
 
     depth: int | None = 10
     reliability: str = RELIABLE
     durability: str = VOLATILE
+    spacing: Ns = 0
 
     def __post_init__(self) -> None:
         if self.reliability not in _RELIABILITY:
@@ -133,6 +136,9 @@ class Publisher(Protocol):
 
     def subscribers(self) -> int:
         """Return the number of subscriptions it is connected to."""
+
+    def awaited(self) -> bool:
+        """Return whether a message is to be sent now; False only where no subscription would use it."""
 
     def close(self) -> None:
         """Stop publishing."""

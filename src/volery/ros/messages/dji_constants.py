@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 from typing import NamedTuple
 
 OLD_NAMES, NEW_NAMES = "dji_sdk", "dji_osdk_ros"
@@ -94,7 +94,7 @@ class M100Status(IntEnum):
     FINISHED_LANDING = 5
 
 
-class Flag(IntFlag):
+class Flag(IntEnum):
     """Control flag of a set-point: meaning and frame of its four numbers."""
 
     STABLE = 0x01

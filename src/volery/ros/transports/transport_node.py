@@ -89,6 +89,10 @@ class TransportPublisher:
         with self.node.kernel:
             return self._publisher.connected() if self._open else 0
 
+    def awaited(self) -> bool:
+        """Return True: each message is sent."""
+        return True
+
     def close(self) -> None:
         """Stop publishing."""
         if self._open:

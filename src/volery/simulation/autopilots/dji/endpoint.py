@@ -1,6 +1,7 @@
 """The ROS node of a DJI aircraft (``dji_sdk`` 3.8 or the vehicle node of ``dji_osdk_ros``) and its topics.
 
-Only topics with subscribers are built and published, which saves hundreds of messages a second.
+Only topics with subscribers are built and published, which saves hundreds of messages a second; where the
+graph takes the place of a link, only messages that a subscriber uses.
 """
 
 from __future__ import annotations
@@ -246,7 +247,11 @@ class _TopicGroup:
         if not self._subscribed or not self._endpoint.is_active:
             return
         stamp, controller = self._endpoint.stamp(), self._endpoint.controller
-        built = [(publisher, topic.build(controller, stamp)) for topic, publisher in self._subscribed]
+        built = [
+            (publisher, topic.build(controller, stamp))
+            for topic, publisher in self._subscribed
+            if publisher.awaited()
+        ]
         self._endpoint.publish([one for one in built if one[1] is not None])
 
 

@@ -17,7 +17,7 @@ from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal, sleep
-from volery.ros.graph import Node, ServiceError, Work
+from volery.ros.graph import AS_OFFERED, Node, ServiceError, Work
 from volery.ros.messages.dji_constants import (
     M100,
     AuthorityAck,
@@ -45,6 +45,9 @@ QUIET: Ns = 200 * MS
 """Time after the last set-point from which none is on its way; a later one would end a task."""
 CHECK_PERIOD: Ns = S
 SILENT_AFTER: Ns = 3 * S
+POSITION = "gps_position"
+STATE = replace(AS_OFFERED, spacing=100 * MS)
+"""QoS of all topics but the position, from which each set-point is computed."""
 KEPT = 1000
 """Messages that may wait to be processed; older ones are dropped."""
 
@@ -113,7 +116,8 @@ class DjiBackend:
         self._spinner = node.group()
         inbox = node.group(self._take)
         for topic, (kind, handler) in self.decoder.topics(interface.package).items():
-            node.subscribe(f"{interface.namespace}/{topic}", kind, handler, group=inbox)
+            qos = AS_OFFERED if topic == POSITION else STATE
+            node.subscribe(f"{interface.namespace}/{topic}", kind, handler, qos, inbox)
         self._spawn(self._run, "DJI node")
         self._spawn(self._identify, "greeting")
         self._watch = kernel.every(CHECK_PERIOD, self._detect_silence)
