@@ -200,7 +200,7 @@ def _ulog(path: Path, wanted: set[str]) -> Tables:
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         try:
             log = ULog(str(path), sorted(wanted) or None, disable_str_exceptions=True)
-        except (ULogException, *_DAMAGE) as error:
+        except (ULogException, OSError, *_DAMAGE) as error:  # it seeks to before the file
             raise UsageError(f"{path} is a damaged ULog: {error}") from error
     tables: Tables = {}
     for data in sorted(log.data_list, key=lambda one: (one.name, one.multi_id)):

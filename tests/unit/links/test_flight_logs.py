@@ -100,6 +100,13 @@ def test_a_format_that_does_not_exist_ends_the_log_there(copter: Path) -> None:
         read_flight_log(copter, ["NONE"])
 
 
+SEEKS_BEFORE_THE_FILE = (
+    b"ULog\x01\x12\x35\x01@B\xd0\xd0\x0f" + bytes(5) + b"(\0B" + bytes(5) + b"\x80" + bytes(10)
+)
+SEEKS_BEFORE_THE_FILE += b"\xff" + bytes(4)
+"""Found by fuzzing: flags with the offset of appended data at -2^31."""
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [
@@ -107,6 +114,7 @@ def test_a_format_that_does_not_exist_ends_the_log_there(copter: Path) -> None:
         (b"time,yaw\n0.0,1.0\n", "no flight log"),
         (b"ULog\x01\x12\x35\x01" + bytes(8), "holds no message|damaged ULog"),
         (b"\xa3\x95\x80", "holds no message"),
+        (SEEKS_BEFORE_THE_FILE, "damaged ULog"),
     ],
 )
 def test_what_is_no_log_is_refused_by_name(tmp_path: Path, content: bytes, said: str) -> None:

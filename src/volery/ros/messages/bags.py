@@ -409,7 +409,7 @@ def _learn(topic: str, name: str, text: str, unreadable: dict[str, str], *, idl:
     try:
         parsed = parse(text) if idl else parse(text, name)
         store().register({key: what for key, what in parsed.items() if key not in store().fielddefs})
-    except (RecursionError, *DAMAGE) as error:
+    except (RecursionError, SyntaxError, *DAMAGE) as error:  # classes are made of source code
         unreadable[topic] = f"its type {name} is not known and not defined in the recording: {error}"
 
 

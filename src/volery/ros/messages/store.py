@@ -102,6 +102,8 @@ def _register(into: rosbags.Typestore, texts: dict[str, str]) -> None:
         into.register(parsed)
     except rosbags.TypesysError as error:
         raise UsageError(str(error)) from error
+    except SyntaxError as error:  # classes are made of source code
+        raise UsageError(f"{', '.join(parsed)}: not a name of a type or a field: {error}") from error
 
 
 def _inner_type(what: Any) -> str:

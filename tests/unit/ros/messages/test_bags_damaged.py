@@ -16,6 +16,7 @@ from volery.base.errors import UsageError
 from volery.ros.messages import bags
 from volery.ros.messages import new as message_of
 from volery.ros.messages.bags import create_bag, decompressed, open_bag
+from volery.ros.messages.store import define
 
 CHUNK = 700
 MESSAGES = 60
@@ -152,3 +153,12 @@ def test_a_type_that_contains_itself_is_named(tmp_path: Path) -> None:
     bag = open_bag(file)
     assert list(bag.messages()) == []
     assert "/words" in str(bag.damage) or "/words" in bag.unreadable
+
+
+def test_a_type_whose_name_begins_with_a_digit_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "digit.mcap"
+    recorded(file, CompressionType.NONE, kind="5_msgs/msg/Word")
+    bag = open_bag(file)
+    assert "5_msgs/msg/Word is not known" in bag.unreadable["/words"]
+    with pytest.raises(UsageError, match="5_msgs/msg/Word: not a name"):
+        define("5_msgs/msg/Word", "string data\n")
