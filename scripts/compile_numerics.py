@@ -32,7 +32,7 @@ from volery.simulation.world.body_step import advance_bodies
 ENTRY_POINTS = (advance_flights, advance_bodies, execute_blocks)
 
 ERROR_PATHS = """
-/* What numba's code calls where it raises an error. The entry point then returns 0, and Python raises. */
+/* What numba's code calls where it raises an error; none does, since a division by zero gives an infinity. */
 #define NOTHING(name) __attribute__((visibility("hidden"))) void *name(void) { return 0; }
 #define NO_ERROR(name) __attribute__((visibility("hidden"))) void *name;
 NOTHING(NRT_Free) NOTHING(NRT_MemInfo_call_dtor) NOTHING(PyBytes_FromStringAndSize) NOTHING(PyErr_Clear)
@@ -43,8 +43,16 @@ NO_ERROR(PyExc_RuntimeError) NO_ERROR(PyExc_StopIteration) NO_ERROR(PyExc_System
 """
 
 
-def compiled(entry: NumericCode) -> bytes:
-    """Return an entry point as a relocatable object. Arrays become a pointer and their sizes."""
+ENTRY = """
+typedef union {{ long long integer; double number; }} word;
+extern __attribute__((visibility("hidden"))) long long {name}_on({types});
+long long {name}(const word *block) {{ return {name}_on({words}); }}
+"""
+"""The exported function: it takes its arguments from a block of words, since a call of one is cheaper."""
+
+
+def compiled(entry: NumericCode) -> tuple[bytes, str]:
+    """Return an entry point as a relocatable object, and the C source of the function that is exported."""
     parameters, values = [], []
     kinds: list[Any] = []
     for index, argument in enumerate(entry.arguments):
@@ -54,14 +62,33 @@ def compiled(entry: NumericCode) -> bytes:
         values.append(f"carray(a{index}, ({', '.join(sizes)},))" if sizes else f"a{index}")
         number = getattr(types, kind)
         kinds += [types.CPointer(number) if dimensions else number, *[types.int64] * dimensions]
+    numbers = [kind == types.float64 for kind in kinds]
+    source = ENTRY.format(
+        name=entry.name,
+        types=", ".join("double" if number else "long long" for number in numbers),
+        words=", ".join(
+            f"block[{at}].{'number' if number else 'integer'}" for at, number in enumerate(numbers)
+        ),
+    )
     scope: dict[str, Any] = {"carray": carray, "entry": entry.by_numba(cache=False)}
     exec(f"def call({', '.join(parameters)}):\n    return entry({', '.join(values)})\n", scope)
     made = cfunc(types.int64(*kinds))(scope["call"])
-    text = str(made._library._final_module).replace(made._wrapper_name, entry.name)
+    name = f"{entry.name}_on"
+    text = str(made._library._final_module).replace(made._wrapper_name, name)
+    return _optimised(llvm.parse_assembly(text), name), source
+
+
+def _optimised(module: Any, entry: str) -> bytes:
+    """Optimise once more with all functions but one private to the module: that permits to inline them."""
     target = llvm.Target.from_default_triple().create_target_machine(
         "generic", "", opt=3, reloc="pic", codemodel="small"
     )
-    code: bytes = target.emit_object(llvm.parse_assembly(text))
+    for function in module.functions:
+        if not function.is_declaration and function.name != entry:
+            function.linkage = "internal"
+    passes = llvm.create_pass_builder(target, llvm.create_pipeline_tuning_options(speed_level=3))
+    passes.getModulePassManager().run(module, passes)
+    code: bytes = target.emit_object(module)
     return code
 
 
@@ -76,12 +103,13 @@ def build(entry: NumericCode, linker: str) -> None:
         return
     with tempfile.TemporaryDirectory() as place:
         file = Path(place) / "code.o"
-        file.write_bytes(compiled(entry))
-        errors = Path(place) / "errors.c"
-        errors.write_text(ERROR_PATHS)
+        code, source = compiled(entry)
+        file.write_bytes(code)
+        frame = Path(place) / "frame.c"
+        frame.write_text(ERROR_PATHS + source)
         made = Path(place) / "code.so"
         options = ["-shared", "-fPIC", "-s", "-Wl,--no-undefined", "-fno-builtin", "-o", str(made)]
-        subprocess.run([linker, *options, str(file), str(errors), "-lm"], check=True)
+        subprocess.run([linker, *options, str(file), str(frame), "-lm"], check=True)
         shutil.move(made, entry.library)
     print(f"{entry.library.name}: {entry.library.stat().st_size} bytes")
 

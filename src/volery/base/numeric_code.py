@@ -12,6 +12,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import platform
+import struct
 from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -49,8 +50,8 @@ class NumericCode:
     Args:
         name: Name of the entry point, unique in volery.
         compose: Returns the Python function, given the digest of its sources. The function must use the
-            digest as a free variable, because numba's cache sees only the source file of the function itself;
-            it returns 1, so that 0 reports an error of the object code.
+            digest as a free variable, because numba's cache sees only the source file of the function itself.
+            It returns 1, or 0 where a result is not a finite number: a division by zero gives an infinity.
         sources: Source files of everything that is compiled, constants included.
         arguments: Types of the arguments, in numba's notation, such as ``float64[:,::1]`` and ``int64``.
     """
@@ -80,26 +81,18 @@ class NumericCode:
     def bind(self, *arguments: Any) -> Callable[[], None]:
         """Return a function that executes on these arguments.
 
-        Arrays must be contiguous and stay where they are; their contents may change between two calls.
+        Arrays must be contiguous and stay where they are; their contents may change between two calls. The
+        returned function raises ``ArithmeticError`` where a result is not finite.
 
         Raises:
             UsageError: An array has another type or another layout than declared.
         """
         for declared, value in zip(self.arguments, arguments, strict=True):
             _check(self.name, declared, value)
-        return self._bound_to_object_code(arguments) if self.shipped else self._bound_to_numba(arguments)
-
-    def _bound_to_numba(self, arguments: Sequence[Any]) -> Callable[[], None]:
-        function = self._compiled
-
-        def call() -> None:
-            function(*arguments)
-
-        return call
-
-    def _bound_to_object_code(self, arguments: Sequence[Any]) -> Callable[[], None]:
-        function = self._loaded
-        values = [value for argument in arguments for value in _flattened(argument)]
+        if self.shipped:
+            function, values = self._loaded, (_packed(self.arguments, arguments),)
+        else:
+            function, values = self._compiled, arguments
 
         def call(held: Sequence[Any] = arguments) -> None:  # holds the arrays while their addresses are used
             if not function(*values):
@@ -111,7 +104,6 @@ class NumericCode:
     def _loaded(self) -> Callable[..., int]:
         function = ctypes.CDLL(str(self.library))[self.name]
         function.restype = ctypes.c_int64
-        function.argtypes = [kind for argument in self.arguments for kind in _c_types(argument)]
         return function
 
     @cached_property
@@ -123,7 +115,7 @@ class NumericCode:
         from numba import njit  # noqa: PLC0415  # takes 0.4 s, and only the lack of object code needs it
 
         entry = _linked(self._function, {}, njit)
-        return njit(f"int64({', '.join(self.arguments)})", cache=cache)(entry)
+        return njit(f"int64({', '.join(self.arguments)})", cache=cache, error_model="numpy")(entry)
 
 
 def _linked(function: Callable[..., Any], known: dict[Any, Any], njit: Callable[..., Any]) -> FunctionType:
@@ -134,7 +126,7 @@ def _linked(function: Callable[..., Any], known: dict[Any, Any], njit: Callable[
         value = scope.get(name)
         if isinstance(value, FunctionType) and value in _numeric:
             if value not in known:
-                known[value] = njit(_linked(value, known, njit))
+                known[value] = njit(_linked(value, known, njit), error_model="numpy")
             scope[name] = known[value]
     return FunctionType(source.__code__, scope, source.__name__, source.__defaults__, source.__closure__)
 
@@ -158,12 +150,12 @@ def _check(name: str, declared: str, value: Any) -> None:
             raise UsageError(f"{name}: an argument must be a contiguous array {declared}")
 
 
-def _c_types(argument: str) -> list[Any]:
-    kind, dimensions = parsed(argument)
-    if dimensions:
-        return [ctypes.c_void_p, *[ctypes.c_int64] * dimensions]
-    return [ctypes.c_double if kind == "float64" else ctypes.c_int64]
-
-
-def _flattened(argument: Any) -> list[Any]:
-    return [argument.ctypes.data, *argument.shape] if isinstance(argument, np.ndarray) else [argument]
+def _packed(declared: Sequence[str], arguments: Sequence[Any]) -> ctypes.Array[ctypes.c_char]:
+    """Return the block of words from which object code reads its arguments: of an array address and sizes."""
+    block = b""
+    for kind, value in zip(declared, arguments, strict=True):
+        if isinstance(value, np.ndarray):
+            block += struct.pack(f"{1 + value.ndim}q", value.ctypes.data, *value.shape)
+        else:
+            block += struct.pack("d" if kind == "float64" else "q", value)
+    return ctypes.create_string_buffer(block, len(block))

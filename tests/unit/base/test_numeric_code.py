@@ -23,11 +23,13 @@ def _scaled(value, factor):
 
 def _compose(digest):
     def scale_rows(rows, counts, factor):
+        finite = True
         for row in range(rows.shape[0]):
             for column in range(rows.shape[1]):
                 rows[row, column] = _scaled(rows[row, column], factor)
+                finite = finite and rows[row, column] - rows[row, column] == 0.0
             counts[row] += 1
-        return 1 if digest else 0
+        return 1 if digest and finite else 0
 
     return scale_rows
 
@@ -62,6 +64,8 @@ def test_without_object_code_numba_executes_it(tmp_path, monkeypatch):
     assert np.array_equal(values, expected)
     call()
     assert counts.tolist() == [2, 2, 2, 2]
+    with pytest.raises(ArithmeticError, match="scale_rows"):
+        entry().bind(values, counts, 0.0)()
 
 
 def test_object_code_gives_the_bits_of_numba_and_reports_invalid_arithmetic(object_code):

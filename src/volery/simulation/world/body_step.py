@@ -24,7 +24,8 @@ from volery.simulation.world.dynamics import (
 from volery.simulation.world.environment_models import GUST_EVERY, advance_gust, ground_height
 from volery.simulation.world.sensors import sample_sensors
 from volery.simulation.world.state_layout import (
-    ADVANCE_ARGUMENTS,
+    ACTIVE_STEPS,
+    BODIES_ARGUMENTS,
     INTEGRATED,
     MULTIROTOR,
     P_FEET,
@@ -44,6 +45,7 @@ from volery.simulation.world.state_layout import (
     S_POSITION,
     S_RATES,
     S_RESTING,
+    S_ROTORS,
     S_SPECIFIC_FORCE,
     S_STARTED,
     S_VELOCITY,
@@ -73,6 +75,7 @@ def world_sources() -> list[Path]:
 _STILL_SPEED = 0.02  # [m/s]
 _STILL_RATE = 0.05  # [rad/s]
 _LIGHT = 0.7  # fraction of the weight: with less thrust a landed body stays where it is
+_STANDING_ROTOR = 1e-6  # [rad/s] below which a rotor stands: it would slow down for ever, in denormal numbers
 
 
 @numeric
@@ -148,6 +151,9 @@ def _settle_multirotor(row: Array) -> None:
         for axis in range(3):
             row[S_VELOCITY + axis] = 0.0
             row[S_RATES + axis] = 0.0
+        for i in range(4):
+            if row[S_ROTORS + i] < _STANDING_ROTOR:
+                row[S_ROTORS + i] = 0.0
 
 
 @numeric
@@ -242,24 +248,43 @@ def start_body(bodies: Bodies, body: int, row: Array) -> None:
     row[S_STARTED] = 1.0
 
 
+@numeric
+def goal_of(bodies: Bodies, body: int) -> int:
+    """Return the grid step to advance a body to: its own if it has not been read for a while."""
+    goal = bodies.span[2]
+    return int(goal if goal - bodies.read[body] < ACTIVE_STEPS else bodies.reached[body])
+
+
+@numeric
+def is_finite(row: Array) -> bool:
+    """Return whether the integrated state consists of finite numbers."""
+    total = 0.0
+    for i in range(INTEGRATED):
+        total += row[i] - row[i]
+    return total == 0.0
+
+
 def _compose(digest: str) -> Callable[..., int]:
-    def advance_bodies(
+    def advance_bodies(  # noqa: PLR0917  # the arrays of Bodies
         rows: Array, keys: NDArray[np.uint64], reached: NDArray[np.int64], heights: Array, grid: Array,
-        goals: NDArray[np.int64],
+        read: NDArray[np.int64], span: NDArray[np.int64],
     ) -> int:  # fmt: skip
-        bodies = Bodies(rows, keys, reached, heights, grid)
-        for body in range(goals.shape[0]):
-            row = bodies.rows[body]
+        bodies = Bodies(rows, keys, reached, heights, grid, read, span)
+        finite = True
+        for body in range(span[0], span[1]):
+            row = rows[body]
             if row[S_STARTED] == 0.0:
                 start_body(bodies, body, row)
-            while bodies.reached[body] < goals[body]:
+            goal = goal_of(bodies, body)
+            while reached[body] < goal:
                 for i in range(4):
                     row[W_THROTTLE + i] = row[U_THROTTLE + i]
                 step_body(bodies, body, row)
-        return 1 if digest else 0
+            finite = finite and is_finite(row)
+        return 1 if digest and finite else 0
 
     return advance_bodies
 
 
-advance_bodies = NumericCode("advance_bodies", _compose, world_sources(), ADVANCE_ARGUMENTS)
-"""Advance each body to its goal step with the motor commands in its inputs, without an autopilot."""
+advance_bodies = NumericCode("advance_bodies", _compose, world_sources(), BODIES_ARGUMENTS)
+"""Advance the bodies of the span with the motor commands in their inputs, without an autopilot."""

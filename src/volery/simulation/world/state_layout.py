@@ -217,12 +217,17 @@ WORLD = WORLD_LAYOUT.end
 """Number of columns of the world; the flight stack's columns begin here."""
 
 
+ACTIVE_STEPS = 500
+"""A body that was read within this many grid steps is advanced together with the others."""
+
+
 class Bodies(NamedTuple):
     """All arrays that the compiled step reads and writes.
 
     ``rows`` (bodies, WORLD + the flight stack's columns); ``keys`` (bodies) of the noise; ``reached``
     (bodies): grid step of each row; ``heights`` (posts north, posts east) and ``grid`` (west edge, south
-    edge, spacing) of the terrain, in metres.
+    edge, spacing) of the terrain, in metres; ``read`` (bodies): grid step at which each was last read;
+    ``span``: first body to advance, the body after the last one, and the grid step to advance to.
     """
 
     rows: Array
@@ -230,9 +235,12 @@ class Bodies(NamedTuple):
     reached: NDArray[np.int64]
     heights: Array
     grid: Array
+    read: NDArray[np.int64]
+    span: NDArray[np.int64]
 
 
-ADVANCE_ARGUMENTS = (
-    "float64[:,::1]", "uint64[::1]", "int64[::1]", "float64[:,::1]", "float64[::1]", "int64[::1]",
+BODIES_ARGUMENTS = (
+    "float64[:,::1]", "uint64[::1]", "int64[::1]", "float64[:,::1]", "float64[::1]",
+    "int64[::1]", "int64[::1]",
 )  # fmt: skip
-"""Types of the arguments of a compiled step: the arrays of ``Bodies``, then the goal step of each body."""
+"""Types of the arguments of a compiled step: the arrays of ``Bodies``."""

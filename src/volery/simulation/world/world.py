@@ -23,6 +23,7 @@ from volery.simulation.world.body_step import advance_bodies
 from volery.simulation.world.environment_models import Terrain, Wind
 from volery.simulation.world.sensors import Measurement, MountedSensor, SensorInput, added_sensor
 from volery.simulation.world.state_layout import (
+    ACTIVE_STEPS,
     P_CAPACITY,
     S_AMPS,
     S_ATTITUDE,
@@ -53,9 +54,6 @@ from volery.simulation.world.state_layout import (
 
 STEP: Ns = 2 * MS
 """Grid step: 500 Hz."""
-
-_ACTIVE_STEPS = 500
-"""A body that was read within this many steps is advanced together with the others, in one compiled call."""
 
 
 class Truth(NamedTuple):
@@ -125,6 +123,8 @@ def _initial_arrays(
         reached=np.zeros(len(specs), dtype=np.int64),
         heights=heights,
         grid=grid,
+        read=np.full(len(specs), -ACTIVE_STEPS, dtype=np.int64),
+        span=np.array((0, len(specs), 0), dtype=np.int64),
     )
 
 
@@ -165,31 +165,34 @@ class World:
         if not count:
             raise UsageError("a world without bodies; give at least one")
         self.arrays = _initial_arrays(self.specs, seed, frame, wind or Wind(), terrain or Terrain(), columns)
-        self._pending: list[deque[_PendingInput]] = [deque() for _ in self.specs]
-        self._last_read = [-_ACTIVE_STEPS] * count
-        self._goals = np.zeros(count, dtype=np.int64)
-        self._advance = advance.bind(*self.arrays, self._goals)
+        self._reached = self.arrays.reached.data
+        self._read = self.arrays.read.data
+        self._span = self.arrays.span.data
+        self._advance = advance.bind(*self.arrays)
+        self._pending: dict[int, deque[_PendingInput]] = {}
         self._mounted = {
             body: {name: MountedSensor(added_sensor(name), seed, body) for name in spec.added_sensors}
             for body, spec in enumerate(self.specs)
             if spec.added_sensors
         }
         self._advance()
-        self._sample_mounted()
+        for body in self._mounted:
+            self._sample_mounted(body)
         self.advances = 0
         """Number of calls of the compiled step."""
 
     def advance_to_now(self, body: int) -> int:
         """Advance *body* to the present and return its grid step; its row may then be read, not kept."""
         step = self.now() // STEP
-        self._last_read[body] = step
-        if self.arrays.reached[body] < step:
+        self._read[body] = step
+        if self._reached[body] < step:
             self._catch_up(step)
         return step
 
     def set_input(self, body: int, column: int, *values: float) -> None:
         """Set inputs of *body*, from *column* of its row on, with effect from the next grid step."""
-        self._pending[body].append(_PendingInput(self.now() // STEP + 1, column, values))
+        pending = self._pending.setdefault(body, deque())
+        pending.append(_PendingInput(self.now() // STEP + 1, column, values))
 
     def payload_power(self, body: int, watts: float) -> None:
         """Set the electrical power of the computers on *body* [W], from the next grid step on."""
@@ -249,42 +252,47 @@ class World:
         return mounted[sensor].last
 
     def _catch_up(self, step: int) -> None:
-        """Advance every active body to *step*, with stops where an input or a sample of it is due."""
-        active = [body for body, read in enumerate(self._last_read) if step - read < _ACTIVE_STEPS]
+        """Advance every active body to *step*: those with stops one by one, then all in one call."""
+        for body in [*self._pending, *(self._mounted.keys() - self._pending.keys())]:
+            if step - self._read[body] < ACTIVE_STEPS:
+                self._catch_up_by_stops(body, step)
+        self._advance_span(0, len(self.specs), step)
+
+    def _catch_up_by_stops(self, body: int, step: int) -> None:
+        """Advance *body* to its last stop up to *step*; at a stop an input or a sample of it is due."""
         while True:
-            stopped = False
-            for body in active:
-                self._apply_inputs(body)
-                pending = self._pending[body]
-                goal = step
-                if pending and pending[0].step <= step:
-                    goal, stopped = pending[0].step, True
-                if body in self._mounted:
-                    sample = min(sensor.next_step for sensor in self._mounted[body].values())
-                    if sample < goal:
-                        goal, stopped = sample, True
-                self._goals[body] = goal
-            self._advance()
-            self.advances += 1
-            self._sample_mounted()
-            if not stopped:
+            stops = [sensor.next_step for sensor in self._mounted.get(body, {}).values()]
+            if body in self._pending:
+                stops.append(self._pending[body][0].step)
+            stop = min(stops, default=step + 1)
+            if stop > step:
                 return
+            self._advance_span(body, body + 1, stop)
+            self._sample_mounted(body)
+            self._apply_inputs(body)
+
+    def _advance_span(self, first: int, end: int, step: int) -> None:
+        """Advance the active ones of the bodies from *first* to before *end* in one compiled call."""
+        self._span[0], self._span[1], self._span[2] = first, end, step
+        self._advance()
+        self.advances += 1
 
     def _apply_inputs(self, body: int) -> None:
         """Apply the inputs that are due at the step that *body* has reached."""
-        pending = self._pending[body]
-        reached = int(self.arrays.reached[body])
+        pending = self._pending.get(body)
+        reached = self._reached[body]
         while pending and pending[0].step <= reached:
             _, column, values = pending.popleft()
             self.arrays.rows[body, column : column + len(values)] = values
+            if not pending:
+                del self._pending[body]
 
-    def _sample_mounted(self) -> None:
-        """Take the samples of added sensors that are due at the steps reached."""
-        for body, mounted in self._mounted.items():
-            reached = int(self.arrays.reached[body])
-            for sensor in mounted.values():
-                if sensor.next_step == reached:
-                    sensor.sample(self._sensor_input(body, reached))
+    def _sample_mounted(self, body: int) -> None:
+        """Take the samples of the added sensors of *body* that are due at the step reached."""
+        reached = self._reached[body]
+        for sensor in self._mounted.get(body, {}).values():
+            if sensor.next_step == reached:
+                sensor.sample(self._sensor_input(body, reached))
 
     def _sensor_input(self, body: int, step: int) -> SensorInput:
         row = self.arrays.rows[body].tolist()

@@ -108,6 +108,26 @@ def test_a_resting_body_does_not_move_or_turn(clock, frame):
     assert after.on_ground
 
 
+def test_the_rotors_of_a_landed_body_come_to_a_stop(clock, frame):
+    world = World(clock, [Multirotor()], frame=frame)
+    world.set_input(0, U_THROTTLE, 0.1, 0.1, 0.1, 0.1)
+    clock.wait(2)
+    assert world.truth(0).rotors[0] > 10.0
+    world.set_input(0, U_THROTTLE, 0.0, 0.0, 0.0, 0.0)
+    clock.wait(5)
+    assert world.truth(0).rotors == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_a_state_that_is_not_a_number_is_reported(clock, frame):
+    world = World(clock, SPECS, frame=frame)
+    world.set_input(2, U_THROTTLE, math.nan, 0.1, 0.1, 0.1)
+    world.set_input(0, U_THROTTLE, 0.1, 0.1, 0.1, 0.1)
+    clock.wait(0.1)
+    world.truth(0)
+    with pytest.raises(ArithmeticError, match="invalid arithmetic"):
+        world.truth(2)
+
+
 def test_wind_carries_a_body_with_drag(clock, frame, ideal_battery):
     spec = Multirotor(sensors="perfect", battery=ideal_battery)
     world = World(clock, [spec], frame=frame, wind=Wind(east=5.0, north=-2.0))

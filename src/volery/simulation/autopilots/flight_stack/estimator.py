@@ -83,7 +83,7 @@ _STALE = 1.0  # [s] after which a fix no longer holds the tilt
 
 
 @numeric
-def _euler(row: Array) -> None:
+def estimate_angles(row: Array) -> None:
     """Compute roll, pitch and yaw of the estimated quaternion."""
     w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
     sine = min(max(2.0 * (w * y - z * x), -1.0), 1.0)
@@ -380,7 +380,7 @@ def initialise_estimate(row: Array) -> None:
         _align(row)
         row[K_BARO_OFFSET] = row[M_BARO]
         _reset_covariance(row, 2, _variance(row, P_BARO_ERROR), 0.01)
-    _euler(row)
+    estimate_angles(row)
 
 
 @numeric
@@ -392,4 +392,3 @@ def update_estimate(row: Array, k: int) -> None:
         _predict(row)
         if k % FUSE_EVERY == 0:
             _fuse(row)
-    _euler(row)

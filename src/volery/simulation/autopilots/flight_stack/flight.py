@@ -26,7 +26,11 @@ from volery.simulation.autopilots.flight_stack.control_loops import (
     guide_rover,
     run_attitude_loops,
 )
-from volery.simulation.autopilots.flight_stack.estimator import initialise_estimate, update_estimate
+from volery.simulation.autopilots.flight_stack.estimator import (
+    estimate_angles,
+    initialise_estimate,
+    update_estimate,
+)
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_AIDED,
     C_CONTROL,
@@ -46,11 +50,17 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
 )
 from volery.simulation.autopilots.flight_stack.guidance import GUIDE_EVERY, guide_multirotor
 from volery.simulation.world.body_specs import BodySpec, Multirotor
-from volery.simulation.world.body_step import start_body, step_body, world_sources
+from volery.simulation.world.body_step import (
+    goal_of,
+    is_finite,
+    start_body,
+    step_body,
+    world_sources,
+)
 from volery.simulation.world.environment_models import Terrain, Wind
 from volery.simulation.world.sensors import Measurement, Sigma, declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
-    ADVANCE_ARGUMENTS,
+    BODIES_ARGUMENTS,
     M_GYRO,
     MULTIROTOR,
     P_CELLS,
@@ -105,28 +115,34 @@ def _control(row: Array, k: int) -> None:
 
 
 def _compose(digest: str) -> Callable[..., int]:
-    def advance_flights(
+    def advance_flights(  # noqa: PLR0917  # the arrays of Bodies
         rows: Array, keys: NDArray[np.uint64], reached: NDArray[np.int64], heights: Array, grid: Array,
-        goals: NDArray[np.int64],
+        read: NDArray[np.int64], span: NDArray[np.int64],
     ) -> int:  # fmt: skip
-        bodies = Bodies(rows, keys, reached, heights, grid)
-        for body in range(goals.shape[0]):
-            row = bodies.rows[body]
+        bodies = Bodies(rows, keys, reached, heights, grid, read, span)
+        finite = True
+        for body in range(span[0], span[1]):
+            row = rows[body]
             if row[S_STARTED] == 0.0:
                 start_body(bodies, body, row)
                 _boot(row)
-            while bodies.reached[body] < goals[body]:
-                _control(row, bodies.reached[body])
+            goal = goal_of(bodies, body)
+            while reached[body] < goal:
+                _control(row, reached[body])
                 step_body(bodies, body, row)
-                update_estimate(row, bodies.reached[body])
-        return 1 if digest else 0
+                k = reached[body]
+                update_estimate(row, k)
+                if k % GUIDE_EVERY == 0 or k == goal:  # for guidance, and for those who read
+                    estimate_angles(row)
+            finite = finite and is_finite(row)
+        return 1 if digest and finite else 0
 
     return advance_flights
 
 
 _SOURCES = (*world_sources(), *Path(__file__).parent.glob("*.py"))
-advance_flights = NumericCode("advance_flights", _compose, _SOURCES, ADVANCE_ARGUMENTS)
-"""Advance each body to its goal step under the set-points in its row."""
+advance_flights = NumericCode("advance_flights", _compose, _SOURCES, BODIES_ARGUMENTS)
+"""Advance the bodies of the span under the set-points in their rows."""
 
 
 @dataclass(frozen=True, slots=True)
