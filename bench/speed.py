@@ -80,7 +80,7 @@ def script(checkout: Path, source: str, *arguments: str) -> Measured:
 
 def command(checkout: Path, *arguments: str, cache: str | None = None) -> Measured:
     """Run the command line and return the CPU seconds of it and its children."""
-    environment = dict(os.environ)
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     if cache is not None:
         environment |= {"NUMBA_CACHE_DIR": cache, "XDG_CACHE_HOME": cache}
     program = [str(checkout / ".venv/bin/volery"), *arguments]

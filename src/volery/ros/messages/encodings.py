@@ -54,12 +54,24 @@ def copied_to_cdr(message: Message) -> bytes:
         raise UsageError(f"{message.__msgtype__}: {_culprit(message)}: {error}") from error
 
 
+@cache
+def _fixed_size(name: str) -> int:
+    """Return the size of the encoding of a type without strings and sequences; 0 for another type."""
+    for _, (kind, detail) in store().fielddefs[name][1]:
+        if kind == rosbags.Nodetype.NAME:
+            varies = not _fixed_size(str(detail))
+        elif kind == rosbags.Nodetype.BASE:
+            varies = detail[0] == "string"
+        else:
+            varies = True
+        if varies:
+            return 0
+    return len(encode(message_class(name)()))
+
+
 def cdr_size(message: Message) -> int:
-    """Return the number of bytes that ``to_cdr`` would give."""
-    codec = _codec(message.__msgtype__)
-    if codec.size_cdr:
-        return 4 + codec.size_cdr
-    return 4 + codec.getsize_cdr(0, message, store())
+    """Return the number of bytes that ``copied_to_cdr`` gives."""
+    return _fixed_size(message.__msgtype__) or len(copied_to_cdr(message))
 
 
 def _culprit(message: Message) -> str:
