@@ -384,6 +384,18 @@ def test_it_has_no_current_sensor(bench: Any) -> None:
     assert rig.latest["BATTERY_STATUS"]["current_consumed"] == 0
 
 
+def test_the_receiver_is_present_once_the_estimator_uses_it(bench: Any) -> None:
+    """Seen on PX4 1.14: clients that wait for a global position by this bit arm 2 s later."""
+    rig = bench(warm=False)
+    present, enabled = "onboard_control_sensors_present", "onboard_control_sensors_enabled"
+    rig.run(5.0)
+    assert "GLOBAL_POSITION_INT" not in rig.latest
+    assert not (rig.latest["SYS_STATUS"][present] | rig.latest["SYS_STATUS"][enabled]) & 0x20
+    rig.run(5.0)
+    assert "GLOBAL_POSITION_INT" in rig.latest
+    assert rig.latest["SYS_STATUS"][present] & rig.latest["SYS_STATUS"][enabled] & 0x20
+
+
 def in_posctl(rig: Any) -> None:
     rig.ready()
     rig.sticks()

@@ -355,14 +355,16 @@ def heartbeat(vehicle: Vehicle, kind: int) -> Fields:
 def sys_status(vehicle: Vehicle) -> Fields:
     """Return SYS_STATUS."""
     estimate = vehicle.estimate
-    healthy = HEALTHY
+    present, enabled, healthy = PRESENT, ENABLED, HEALTHY
     if commander_of(vehicle).armable or vehicle.armed:
         healthy |= PREARM
+    if not vehicle.has_position:  # PX4 states a receiver as present only while the estimator uses it
+        present, enabled = present & ~GPS, enabled & ~GPS
     if estimate.fix_type == 0:
-        healthy &= ~GPS
+        healthy, enabled = healthy & ~GPS, enabled | GPS
     return {
-        "onboard_control_sensors_present": PRESENT,
-        "onboard_control_sensors_enabled": ENABLED,
+        "onboard_control_sensors_present": present,
+        "onboard_control_sensors_enabled": enabled,
         "onboard_control_sensors_health": healthy,
         "load": 100,
         "voltage_battery": to_uint16(estimate.battery_volts * 1000.0),
