@@ -3,9 +3,11 @@
 Costs that were taken from a trace are kept in the user's cache under the key of the program, which stands
 for the code and the core.
 
-The trace has cache misses by the number of the access among those of its basic block in the intermediate
-code. The machine code of the block has as many loads and stores, or fewer (two at once) or more (spilled
-registers): a load is assigned to the load at the same share of the way through the block, a store likewise.
+The trace has the accesses to memory by their number in the intermediate code, which the instructions of the
+machine code have as well. An instruction that ran takes address and cache level of its access at the same
+position of the trace, or at the last position before: code may have been moved out of its block. Spilled
+registers and constants have no number: they hit the first cache, and the core model identifies them by the
+text of their address.
 """
 
 from __future__ import annotations
@@ -13,7 +15,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -23,58 +24,81 @@ from volery.cost.code_laws import CoreLaw
 from volery.cost.native import core_model
 from volery.cost.native.compilation import Program, compile_program
 from volery.cost.native.instruction_tables import InstructionTables, instruction_tables
-from volery.cost.native.instrumented_run import BlockTrace
-from volery.cost.native.llvm_ir import access_counts
+from volery.cost.native.instrumented_run import ADDRESS, AHEAD, LEVEL, NUMBER, POSITION, BlockTrace
+from volery.cost.native.llvm_ir import access_blocks
 from volery.cost.native.machine_code import End
 from volery.cost.native.path_reconstruction import ExecutedPath, MachineCode, reconstruct_path
 from volery.cost.pricing import STEPS_PER_CYCLE
 
-Row = tuple[int, int]
-"""(step of the path, row of the table of instructions)."""
+Array = np.ndarray[Any, np.dtype[Any]]
 
 
-def cache_misses(path: ExecutedPath, tables: InstructionTables, access_counts: Sequence[int]) -> Array:
-    """Return the misses as rows (step, row of the table of instructions, level, fetched ahead), in order.
+def access_numbers(program: Program) -> Array:
+    """Return the number of the access of each row of the table of instructions; -1 for none."""
+    first: dict[str, int] = {}
+    for number, block in enumerate(access_blocks(program.text)):
+        first.setdefault(program.blocks[block].function, number)
+    return np.array(
+        [
+            first[block.function] + one.access - 1 if one.access and block.function in first else -1
+            for block in program.machine_blocks
+            for one in block.instructions
+        ],
+        dtype=np.int64,
+    )
+
+
+@dataclass(frozen=True)
+class ExecutedAccesses:
+    """Accesses of the instructions that ran.
+
+    Attributes:
+        addresses: Address by instruction that ran, -1 where it is not known or there is none.
+        misses: Rows (step of the path, row of the table of instructions, level, fetched ahead), in order, of
+            the accesses that the first cache did not serve.
+    """
+
+    addresses: Array
+    misses: Array
+
+
+def executed_accesses(path: ExecutedPath, tables: InstructionTables, numbers: Array) -> ExecutedAccesses:
+    """Assign the accesses of the trace to the instructions that ran.
 
     Args:
         path: What ran.
         tables: The program's instructions.
-        access_counts: Accesses of each basic block in the intermediate code.
+        numbers: Number of the access of each instruction in the tables, -1 for none.
     """
-    found: list[tuple[int, int, int, int]] = []
-    steps = sorted(
-        (step for step, position in enumerate(path.positions) if position in path.accesses),
-        key=lambda step: (path.positions[step], step),
+    blocks = np.array(path.blocks, dtype=np.int64)
+    lengths = np.diff(tables.first)[blocks]
+    steps = np.repeat(np.arange(len(blocks)), lengths)
+    rows = (
+        np.arange(lengths.sum())
+        - np.repeat(np.cumsum(lengths) - lengths, lengths)
+        + tables.first[blocks][steps]
     )
-    for position, steps_here in groupby(steps, key=lambda step: path.positions[step]):
-        own = list(steps_here)
-        rows = [
-            (step, row)
-            for step in own
-            for row in range(tables.first[path.blocks[step]], tables.first[path.blocks[step] + 1])
-        ]
-        loads = _rows_with(rows, tables, core_model.LOAD)
-        stores = _rows_with(rows, tables, core_model.STORE)
-        count = max(1, access_counts[path.owners[own[0]]])
-        for access in path.accesses[position]:
-            candidates = stores if access.store else loads
-            if candidates:
-                step, row = candidates[min(access.number * len(candidates) // count, len(candidates) - 1)]
-                found.append((step, row, access.level, int(access.ahead)))
-    return np.array(sorted(found), dtype=np.int64).reshape(-1, 4)
+    addresses = np.full(len(rows), -1, dtype=np.int64)
+    loads_or_stores = np.any(tables.table[:, [core_model.LOAD, core_model.STORE]] >= 0, axis=1)
+    accesses = (numbers >= 0) & loads_or_stores & (tables.table[:, core_model.KIND] == core_model.PLAIN)
+    places = np.flatnonzero(accesses[rows]) if len(path.accesses) else np.zeros(0, dtype=np.int64)
+    if not len(places):
+        return ExecutedAccesses(addresses, np.zeros((0, 4), dtype=np.int64))
+    positions = np.array(path.positions, dtype=np.int64)[steps[places]]
+    wanted = numbers[rows[places]]
+    scale = max(int(positions.max()), int(path.accesses[:, POSITION].max())) + 2
+    keys = path.accesses[:, NUMBER] * scale + path.accesses[:, POSITION]
+    order = np.argsort(keys, kind="stable")
+    at = np.searchsorted(keys[order], wanted * scale + positions, side="right") - 1
+    at = np.where((at < 0) | (path.accesses[order[at], NUMBER] != wanted), at + 1, at)
+    at = np.minimum(at, len(order) - 1)
+    known = path.accesses[order[at], NUMBER] == wanted
+    found, places = path.accesses[order[at[known]]], places[known]
+    addresses[places] = found[:, ADDRESS]
+    missing = found[:, LEVEL] > 0
+    misses = [steps[places], rows[places], found[:, LEVEL], found[:, AHEAD]]
+    return ExecutedAccesses(addresses, np.stack(misses, axis=1)[missing])
 
-
-def _rows_with(rows: Sequence[Row], tables: InstructionTables, column: int) -> list[Row]:
-    """Return the rows of ordinary instructions that load, or that store."""
-    table = tables.table
-    return [
-        (step, row)
-        for step, row in rows
-        if table[row, column] >= 0 and table[row, core_model.KIND] == core_model.PLAIN
-    ]
-
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 REPEATS = 16
 LINE_BYTES = 64.0
@@ -142,11 +166,13 @@ def traced_costs(program: Program, trace: BlockTrace) -> tuple[BlockCosts, Execu
     """
     code = MachineCode(program.blocks, program.machine_blocks)
     tables = instruction_tables(program.machine_blocks, program.law, program.defined)
-    path = reconstruct_path(code, trace)
+    path = reconstruct_path(code, trace.at_their_blocks(access_blocks(program.text)))
+    accesses = executed_accesses(path, tables, access_numbers(program))
     sequence = ExecutionSequence(
         np.array(path.blocks, dtype=np.int64),
         np.array(path.taken, dtype=np.int8),
-        cache_misses(path, tables, access_counts(program.text)),
+        accesses.misses,
+        accesses.addresses,
     )
     cycles, stalled = execute(tables, sequence)
     size = len(program.blocks)
@@ -171,11 +197,15 @@ def traced_costs(program: Program, trace: BlockTrace) -> tuple[BlockCosts, Execu
 
 @dataclass(frozen=True)
 class ExecutionSequence:
-    """What ran: machine blocks in order, whether the branch of each was taken, and ``cache_misses``."""
+    """What ran: machine blocks in order, whether the branch of each was taken, misses and addresses.
+
+    Misses and addresses are those of ``ExecutedAccesses``; without addresses none is known.
+    """
 
     blocks: Array
     taken: Array
     misses: Array = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int64))
+    addresses: Array | None = None
 
 
 def execute(
@@ -194,10 +224,13 @@ def execute(
     Returns:
         Cycles of each machine block, and the part lost to a misprediction before it.
     """
+    addresses = sequence.addresses
+    if addresses is None:
+        addresses = np.full(int(np.diff(tables.first)[sequence.blocks].sum()), -1, dtype=np.int64)
     last = tables.levels[-1:] if memory_cycles is None else np.array(memory_cycles[:1])
     return core_model.run(
         sequence.blocks, sequence.taken, tables.first, tables.table, tables.operations, tables.capacity,
-        tables.core, tables.slots, tables.library, tables.histories, sequence.misses,
+        tables.core, tables.slots, tables.library, tables.histories, sequence.misses, addresses,
         np.concatenate([tables.levels, last]), 0.0 if memory_cycles is None else memory_cycles[1],
         tables.entries,
     )  # fmt: skip

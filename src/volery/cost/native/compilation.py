@@ -29,7 +29,14 @@ from tempfile import TemporaryDirectory
 
 from volery.base.errors import UsageError
 from volery.cost.code_laws import CoreLaw
-from volery.cost.native.llvm_ir import BasicBlock, basic_blocks, retarget, with_counters, with_trace_calls
+from volery.cost.native.llvm_ir import (
+    BasicBlock,
+    basic_blocks,
+    retarget,
+    with_access_columns,
+    with_counters,
+    with_trace_calls,
+)
 from volery.cost.native.machine_code import MachineBlock, machine_blocks
 
 HOST_ISA = "x86_64"
@@ -267,7 +274,7 @@ counters tell how often an edge was taken."""
 PROMOTE = "function(loop-mssa(licm))"
 """Pass after the insertion of counters: those of a loop stay in registers while it runs."""
 
-METHOD = "3"
+METHOD = "4"
 """Version of the method that finds costs; a new version makes kept costs invalid."""
 
 C_SUFFIXES = {".c"}
@@ -293,7 +300,9 @@ class Program:
         """Assembly for the core."""
         options = ["-O2", f"-mcpu={self.law.cpu}", "-relocation-model=pic"]
         notation = ["-x86-asm-syntax=intel"] if self.law.isa == "x86_64" else []
-        return run_tool([llvm_toolchain().llc, *options, *notation, "-o", "-"], self.text)
+        return run_tool(
+            [llvm_toolchain().llc, *options, *notation, "-o", "-"], with_access_columns(self.text)
+        )
 
     @cached_property
     def machine_blocks(self) -> tuple[MachineBlock, ...]:

@@ -2,19 +2,21 @@
 
 Instructions enter the reorder buffer in order, ``width`` slots a cycle. An operation waits in the issue queue
 of its pipes until its operands are available and a pipe is free, the oldest first; nothing enters while the
-queue that the next instruction needs is full. Instructions retire in order. A store is identified by the text
-of its address and the versions of the registers in it: a load of the same address is forwarded from it, and a
-load of parts of several stores waits until they have retired. Computed jumps are predicted by their last
-target with the same history. After a misprediction nothing enters until the branch is done and ``refill``
-cycles have passed. A library call occupies the front end for its cycles, and its result is available after
-its latency. An access hits the first cache, or is served by the level in the trace. Memory delivers one line
-at a time: a prefetched line is available as soon as memory can deliver it, any other after the latency as
-well.
+queue that the next instruction needs is full. Instructions retire in order. A store is identified by its
+address in the trace, or, where that is not known, by the text of the address and the versions of the
+registers in it: a load of the same address is forwarded from it, and a load of parts of several stores waits
+until they have retired. Computed jumps are predicted by their last target with the same history. After a
+misprediction nothing enters until the branch is done and ``refill`` cycles have passed. A library call
+occupies the front end for its cycles and the reorder buffer by the instructions of that time, and its result
+is available after its latency. An access hits the first cache, or is served by the level in the trace. Memory
+delivers one line at a time: a prefetched line is available as soon as memory can deliver it, any other after
+the latency as well.
 
 Branches are predicted by a simplified TAGE (Seznec and Michaud, JILP 8, 2006): a table of counters by branch,
 and tagged tables by branch and by ever longer histories of taken branches. The longest history with an entry
-for the branch decides. A misprediction allocates an entry with a longer history. The predictor starts empty:
-the training of a real one by other code is not modelled.
+for the branch decides. A misprediction allocates an entry with a longer history. In the beginning the table
+by branch holds the direction that each branch takes more often, as after earlier activations; the tagged
+tables are empty, as if other code had evicted their entries.
 """
 
 from __future__ import annotations
@@ -31,6 +33,8 @@ BITS = 12
 TABLE_SIZE = 1 << BITS
 TAG_BITS = 11
 FIRST_HISTORY = 4
+FOOTPRINT = 16
+"""Bits by which a taken branch changes the history (Yavarzadeh et al., Half&Half, IEEE S&P 2023)."""
 RECORD = 1024
 
 # columns of an entry of a tagged table
@@ -43,9 +47,8 @@ def history_lengths(tables: int, longest: int) -> Array:
     return np.round(FIRST_HISTORY * (2 * longest / FIRST_HISTORY) ** steps).astype(np.int64)
 
 
-def new_predictor(tables: int) -> tuple[Array, Array, Array, Array, Array]:
-    """Return an empty predictor: base counters, tagged entries, history, folded histories, position."""
-    base = np.zeros(TABLE_SIZE, dtype=np.int64)
+def new_predictor(tables: int, base: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Return a predictor without tagged entries: counters, entries, history, folded histories, position."""
     tagged = np.zeros((tables, TABLE_SIZE, 3), dtype=np.int64)
     tagged[:, :, TAG] = -1
     return (
@@ -58,9 +61,9 @@ def new_predictor(tables: int) -> tuple[Array, Array, Array, Array, Array]:
 
 
 @numeric
-def _fold(folded: int, new: int, old: int, length: int, bits: int) -> int:
-    folded = (folded << 1) | new
-    folded ^= old << (length % bits)
+def _fold(folded: int, old: int, length: int, bits: int) -> int:
+    """Return a folded history one bit later: a zero enters, the oldest bit leaves."""
+    folded = (folded << 1) ^ (old << (length % bits))
     folded ^= folded >> bits
     return folded & ((1 << bits) - 1)
 
@@ -69,17 +72,24 @@ def _fold(folded: int, new: int, old: int, length: int, bits: int) -> int:
 def record_taken(
     state: tuple[Array, Array, Array, Array, Array], lengths: Array, place: int, target: int
 ) -> None:
-    """Append a taken branch to the history: two bits of its address and its target."""
+    """Append a taken branch to the history: it moves by two bits, and all bits of the footprint are added."""
     _, _, record, folds, position = state
-    mark = place * 3 ^ target * 7 ^ (place >> 2)
-    for bit in (mark & 1, (mark >> 1) & 1):
+    mixed = (place * 40503 + target * 30345) & 0xFFFFFFFF
+    footprint = (mixed ^ (mixed >> FOOTPRINT)) & ((1 << FOOTPRINT) - 1)
+    for _ in range(2):
         at = position[0]
         for table in range(len(lengths)):
             old = record[(at - lengths[table]) % RECORD]
-            folds[table, 0] = _fold(folds[table, 0], bit, old, lengths[table], BITS)
-            folds[table, 1] = _fold(folds[table, 1], bit, old, lengths[table], TAG_BITS)
-        record[at % RECORD] = bit
+            folds[table, 0] = _fold(folds[table, 0], old, lengths[table], BITS)
+            folds[table, 1] = _fold(folds[table, 1], old, lengths[table], TAG_BITS)
+        record[at % RECORD] = 0
         position[0] = at + 1
+    for age in range(FOOTPRINT):
+        record[(position[0] - 1 - age) % RECORD] ^= (footprint >> age) & 1
+    for table in range(len(lengths)):
+        within = footprint & ((1 << min(FOOTPRINT, lengths[table])) - 1)
+        folds[table, 0] ^= (within ^ (within >> BITS)) & ((1 << BITS) - 1)
+        folds[table, 1] ^= (within ^ (within >> TAG_BITS)) & ((1 << TAG_BITS) - 1)
 
 
 @numeric
@@ -162,6 +172,10 @@ LATENCY, KIND_OF, GROUP, QUEUE = range(4)
 WIDTH, WINDOW, REFILL, FORWARD = range(4)
 # columns of the table of cache misses
 STEP, ROW, LEVEL, AHEAD = range(4)
+IN_TRACE = np.int64(-1)
+"""Identity of addresses of the trace; the displacement is the address."""
+IN_A_CALL = 0.5
+"""Instructions of a library call by cycle and by width: they occupy the reorder buffer until it retires."""
 LINES_AHEAD = 4.0
 """Distance of the prefetcher, lines."""
 
@@ -229,10 +243,10 @@ def _occupy(queues: Array, operation: Array, until: float) -> None:
 
 @numeric
 def _record_store(
-    keys: Array, times: Array, key: np.int64, one: Array, number: int, done: float, leaves: float
+    keys: Array, times: Array, key: np.int64, where: int, size: int, number: int, done: float, leaves: float
 ) -> None:
     """Record a store by chunks of memory: when its data are available, and when it retires."""
-    for chunk in range(one[DISPLACEMENT] // CHUNK, (one[DISPLACEMENT] + one[SIZE] - 1) // CHUNK + 1):
+    for chunk in range(where // CHUNK, (where + size - 1) // CHUNK + 1):
         mixed = key * 31 + chunk * 2654435761
         at = (mixed >> 9) % PLACES
         keys[at, 0] = mixed
@@ -242,10 +256,12 @@ def _record_store(
 
 
 @numeric
-def _forward(keys: Array, times: Array, key: np.int64, one: Array, start: float, forward: float) -> float:
+def _forward(
+    keys: Array, times: Array, key: np.int64, where: int, size: int, start: float, forward: float
+) -> float:
     """Return when a load has the data of pending stores; parts of several stores must retire first."""
     ready, source, whole = 0.0, -1, True
-    for chunk in range(one[DISPLACEMENT] // CHUNK, (one[DISPLACEMENT] + one[SIZE] - 1) // CHUNK + 1):
+    for chunk in range(where // CHUNK, (where + size - 1) // CHUNK + 1):
         mixed = key * 31 + chunk * 2654435761
         at = (mixed >> 9) % PLACES
         if keys[at, 0] != mixed or times[at, 1] < start:
@@ -357,7 +373,7 @@ def _predict(
 
 _ARGUMENTS = (
     "int64[::1]", "int8[::1]", "int64[::1]", "int64[:,::1]", "float64[:,::1]", "float64[::1]", "float64[::1]",
-    "float64[::1]", "float64[:,::1]", "int64[::1]", "int64[:,::1]", "float64[::1]", "float64",
+    "float64[::1]", "float64[:,::1]", "int64[::1]", "int64[:,::1]", "int64[::1]", "float64[::1]", "float64",
     "float64[::1]", "float64[::1]", "float64[:,::1]",
     "float64[::1]", "int64[::1]", "float64[:,:,::1]", "float64[::1]", "int64[:,::1]", "float64[:,::1]",
     "int64[::1]", "int64[::1]", "int64[:,:,::1]", "int64[::1]", "int64[:,::1]", "int64[::1]",
@@ -368,15 +384,15 @@ _ARGUMENTS = (
 def _compose(digest: str) -> Callable[..., int]:
     def execute_blocks(
         blocks: Array, taken: Array, first: Array, table: Array, operations: Array, capacity: Array,
-        core: Array, slots: Array, library: Array, histories: Array, misses: Array, levels: Array,
-        line: float, cost: Array, stalled: Array, queues: Array,
+        core: Array, slots: Array, library: Array, histories: Array, misses: Array, addresses: Array,
+        levels: Array, line: float, cost: Array, stalled: Array, queues: Array,
         ready: Array, version: Array, used: Array, leaves: Array, stored_key: Array, stored: Array,
         targets: Array, base: Array, tagged: Array, record: Array, folds: Array, position: Array,
     ) -> int:  # fmt: skip
         predictor = (base, tagged, record, folds, position)
         count = len(blocks)
         window = len(leaves)
-        enters, resumes, retired, clock, number, changes = 0.0, 0.0, 0.0, 0.0, 0, 0
+        enters, resumes, retired, clock, number, entry, changes = 0.0, 0.0, 0.0, 0.0, 0, 0, 0
         next_miss, free = 0, 0.0
         for step in range(count):
             block = blocks[step]
@@ -384,7 +400,7 @@ def _compose(digest: str) -> Callable[..., int]:
             enters = max(enters, resumes)
             for row in range(first[block], first[block + 1]):
                 one = table[row]
-                enters = max(enters + slots[row] / core[WIDTH], leaves[number % window])
+                enters = max(enters + slots[row] / core[WIDTH], leaves[entry % window])
                 if one[KIND] == LIBRARY:
                     done = max(enters, ready[0], ready[1]) + library[row, 1]
                     enters += library[row, 0]
@@ -393,7 +409,10 @@ def _compose(digest: str) -> Callable[..., int]:
                     enters = max(enters, _queued_until(queues, operations, one))
                     at = _available(one[FIRST_ADDRESS:FIRST_WRITE], ready, enters)
                     done = _available(one[FIRST_READ:FIRST_ADDRESS], ready, enters)
-                    place = _address(one, version) if one[PLACE] != 0 else np.int64(0)
+                    place, where = IN_TRACE, addresses[number]
+                    if where < 0:
+                        place = _address(one, version) if one[PLACE] != 0 else np.int64(0)
+                        where = one[DISPLACEMENT]
                     last_miss = _end_of_misses(misses, next_miss, step, row)
                     if one[LOAD] >= 0:
                         operation = operations[one[LOAD]]
@@ -401,8 +420,11 @@ def _compose(digest: str) -> Callable[..., int]:
                         _occupy(queues, operation, starts)
                         arrives, free = _fetch_lines(misses, next_miss, last_miss, levels, line, at, free)
                         done = max(done, starts + operation[LATENCY], arrives)
-                        if one[PLACE] != 0:
-                            done = max(done, _forward(stored_key, stored, place, one, at, core[FORWARD]))
+                        if place != 0:
+                            forwarded = _forward(
+                                stored_key, stored, place, where, one[SIZE], at, core[FORWARD]
+                            )
+                            done = max(done, forwarded)
                     else:
                         free = _send_lines(misses, next_miss, last_miss, levels, line, at, free)
                     next_miss = last_miss
@@ -415,12 +437,18 @@ def _compose(digest: str) -> Callable[..., int]:
                         starts = _issue(used, capacity, operations[one[STORE]], at, 1.0)
                         _occupy(queues, operations[one[STORE]], starts)
                         done = max(done, starts)
-                        if one[PLACE] != 0:
-                            _record_store(stored_key, stored, place, one, number, done, max(done, retired))
+                        if place != 0:
+                            leave = max(done, retired)
+                            _record_store(stored_key, stored, place, where, one[SIZE], number, done, leave)
                     changes = _write_registers(one[FIRST_WRITE:FIRST_BUMP], ready, version, done, changes)
                     changes = _write_registers(one[FIRST_BUMP:COLUMNS], ready, version, at + 1.0, changes)
                 retired = max(retired, done)
-                leaves[number % window] = retired
+                inside = 1
+                if one[KIND] == LIBRARY:
+                    inside = max(1, min(window, int(IN_A_CALL * core[WIDTH] * library[row, 0])))
+                for _ in range(inside):
+                    leaves[entry % window] = retired
+                    entry += 1
                 number += 1
                 if one[KIND] == PLAIN or one[KIND] == LIBRARY or step + 1 == count:
                     continue
@@ -443,12 +471,22 @@ def _empty_queues(entries: Array) -> Array:
     return queues
 
 
+def _base_counters(blocks: Array, taken: Array, first: Array, table: Array) -> Array:
+    """Return the counters of branches for the direction that each takes more often in a run."""
+    rows = first[blocks + 1] - 1
+    branches = table[rows, KIND] == CONDITIONAL
+    places = rows[branches] % TABLE_SIZE
+    balance = np.bincount(places, weights=2.0 * taken[branches] - 1.0, minlength=TABLE_SIZE)
+    return np.where(balance > 0.0, 1, np.where(balance < 0.0, -2, 0))
+
+
 execute_blocks = NumericCode("execute_blocks", _compose, (Path(__file__),), _ARGUMENTS)
 
 
 def run(
     blocks: Array, taken: Array, first: Array, table: Array, operations: Array, capacity: Array, core: Array,
-    slots: Array, library: Array, histories: Array, misses: Array, levels: Array, line: float, entries: Array,
+    slots: Array, library: Array, histories: Array, misses: Array, addresses: Array, levels: Array,
+    line: float, entries: Array,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Execute machine blocks.
 
@@ -464,6 +502,7 @@ def run(
         library: Cycles and latency of a library call by row.
         histories: Lengths of the branch predictor's histories.
         misses: Accesses that the first cache does not serve, in order.
+        addresses: Address of each instruction that runs, -1 where it is not known.
         levels: Latency of each level, cycles.
         line: Cycles in which memory delivers a line, 0 where it is a level like the others.
         entries: Entries of each issue queue.
@@ -485,6 +524,7 @@ def run(
         library,
         histories,
         misses,
+        addresses,
         levels,
     )
     arrays = [
@@ -497,6 +537,6 @@ def run(
         np.full((len(capacity), SLOT_CYCLES, 2), -1.0),
         np.zeros(int(core[WINDOW])),
         np.zeros((PLACES, 2), dtype=np.int64), np.zeros((PLACES, 2)), np.full(PLACES, -1, dtype=np.int64),
-        *new_predictor(len(histories)),
+        *new_predictor(len(histories), _base_counters(*arrays[:4])),
     )()  # fmt: skip
     return cost, stalled

@@ -1,7 +1,7 @@
 """Runs of an instrumented program on this machine: counts of its blocks, and traces.
 
-A trace has the blocks that were entered, the values of switches, and the accesses to memory that the first
-cache did not serve. The runtime in ``runtime/`` is linked with the program and writes both.
+A trace has the blocks that were entered, the values of switches, and the accesses to memory. The runtime in
+``runtime/`` is linked with the program and writes both.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from collections.abc import Container, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,20 +25,15 @@ from volery.cost.native.compilation import Program, llvm_toolchain, run_tool
 _SWITCHED, _ACCESSED = 1 << 31, 1 << 30
 
 
-class Access(NamedTuple):
-    """An access to memory that the first cache did not serve.
+Array = np.ndarray[Any, np.dtype[Any]]
 
-    Attributes:
-        number: Number of the access in its block.
-        store: Whether it is a store.
-        level: Level that served it: 1 for the second cache.
-        ahead: Whether it was prefetched.
-    """
+# columns of the table of accesses
+POSITION, NUMBER, LEVEL, AHEAD, ADDRESS = range(5)
 
-    number: int
-    store: bool
-    level: int
-    ahead: bool
+
+def no_accesses() -> Array:
+    """Return an empty table of accesses."""
+    return np.zeros((0, 5), dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -49,26 +44,30 @@ class BlockTrace:
         blocks: Numbers of the blocks in the order in which they were entered.
         switches: Value of a switch before the block at a position was entered, by position.
         edges: Edge block that ``only`` has removed before a position, by position.
-        accesses: Cache misses of the block at a position, by position.
+        accesses: Accesses to memory, one a row: position of the block entered last, number of the access in
+            the program, level that served it (0 for the first cache), whether it was prefetched, and address.
+            Pages have numbers in the order of their first access.
     """
 
     blocks: list[int]
     switches: dict[int, int] = field(default_factory=dict)
     edges: dict[int, int] = field(default_factory=dict)
-    accesses: dict[int, list[Access]] = field(default_factory=dict)
+    accesses: Array = field(default_factory=no_accesses, compare=False)
 
     def then(self, other: BlockTrace) -> BlockTrace:
         """Return this trace followed by another."""
         first = len(self.blocks)
+        moved = other.accesses + np.array([first, 0, 0, 0, 0])
         return BlockTrace(
             self.blocks + other.blocks,
             self.switches | {first + place: value for place, value in other.switches.items()},
-            accesses=self.accesses | {first + place: found for place, found in other.accesses.items()},
+            accesses=np.concatenate([self.accesses, moved]),
         )
 
     def until(self, length: int) -> BlockTrace:
         """Return the first ``length`` blocks."""
-        return replace(self, blocks=self.blocks[:length])
+        accesses = self.accesses[self.accesses[:, POSITION] < length]
+        return replace(self, blocks=self.blocks[:length], accesses=accesses)
 
     def only(self, wanted: Container[int]) -> BlockTrace:
         """Remove all but the ``wanted`` blocks.
@@ -79,7 +78,7 @@ class BlockTrace:
         kept: list[int] = []
         switches: dict[int, int] = {}
         edges: dict[int, int] = {}
-        accesses: dict[int, list[Access]] = {}
+        new_positions = np.zeros(len(self.blocks), dtype=np.int64)
         for place, block in enumerate(self.blocks):
             if place in self.switches:
                 switches.setdefault(len(kept), self.switches[place])
@@ -87,9 +86,25 @@ class BlockTrace:
                 kept.append(block)
             else:
                 edges.setdefault(len(kept), block)
-            if place in self.accesses and kept:
-                accesses.setdefault(len(kept) - 1, []).extend(self.accesses[place])
+            new_positions[place] = len(kept) - 1
+        accesses = self.accesses.copy()
+        accesses[:, POSITION] = new_positions[accesses[:, POSITION]]
         return BlockTrace(kept, switches, edges, accesses)
+
+    def at_their_blocks(self, access_blocks: Sequence[int]) -> BlockTrace:
+        """Return the trace with each access at the last entry of its own block.
+
+        Args:
+            access_blocks: Block of each access of the program.
+        """
+        blocks, accesses = np.array(self.blocks, dtype=np.int64), self.accesses.copy()
+        own = np.array(access_blocks, dtype=np.int64)[accesses[:, NUMBER]]
+        for block in np.unique(own[blocks[accesses[:, POSITION]] != own]):
+            entries, rows = np.flatnonzero(blocks == block), np.flatnonzero(own == block)
+            last = np.searchsorted(entries, accesses[rows, POSITION], side="right") - 1
+            known = rows[last >= 0]
+            accesses[known, POSITION] = entries[last[last >= 0]]
+        return replace(self, accesses=accesses)
 
 
 def read_trace(file: Path) -> BlockTrace:
@@ -97,27 +112,20 @@ def read_trace(file: Path) -> BlockTrace:
     return trace_of(np.fromfile(file, dtype=np.uint32))
 
 
-def _access(word: int) -> Access:
-    """Decode an access as ``caches.c`` encodes it."""
-    return Access(word >> 5, bool(word >> 4 & 1), word & 7, bool(word & 8))
-
-
 def trace_of(words: np.ndarray[Any, np.dtype[np.uint32]]) -> BlockTrace:
-    """Decode a trace; records before the first block are dropped."""
-    blocks: list[int] = []
-    switches: dict[int, int] = {}
-    accesses: dict[int, list[Access]] = {}
-    for word in words.tolist():
-        if word < _ACCESSED:
-            blocks.append(word)
-        elif word >= _SWITCHED:  # 31 bits with their sign
-            switches[len(blocks)] = ((word & (_SWITCHED - 1)) ^ (1 << 30)) - (1 << 30)
-        elif blocks:
-            accesses.setdefault(len(blocks) - 1, []).append(_access(word - _ACCESSED))
-    return BlockTrace(blocks, switches, accesses=accesses)
+    """Decode a trace as ``runtime.c`` encodes it; records before the first block are dropped."""
+    words = words.astype(np.int64)
+    is_block, is_access = words < _ACCESSED, (words >= _ACCESSED) & (words < _SWITCHED)
+    entered = np.cumsum(is_block)
+    switches = {
+        int(place): ((int(word) & (_SWITCHED - 1)) ^ (1 << 30)) - (1 << 30)  # 31 bits with their sign
+        for place, word in zip(entered[words >= _SWITCHED], words[words >= _SWITCHED], strict=True)
+    }
+    what, where = (words[is_access][first::2] - _ACCESSED for first in (0, 1))
+    what, position = what[: len(where)], entered[is_access][::2][: len(where)] - 1
+    accesses = np.stack([position, what >> 5, what & 7, what >> 3 & 1, where], axis=1)
+    return BlockTrace(words[is_block].tolist(), switches, accesses=accesses[position >= 0])
 
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 RUN_LIMIT_S = 120.0
 WINDOW = 4096

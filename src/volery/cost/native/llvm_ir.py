@@ -9,10 +9,11 @@ optimisation.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
-from volery.cost.native.machine_code import split_operands
+from volery.cost.native.machine_code import NO_LINE, split_operands
 
 COUNTERS = "volery_counters"
 LENGTH = "volery_counters_length"
@@ -33,6 +34,12 @@ _BULK_ACCESS = re.compile(
     r"^\s+(?:tail |musttail |notail )?call void @llvm\.mem(?:cpy|move|set)\.[^(]*\((.*)\)"
 )
 _EXPRESSION = re.compile(r"(?:getelementptr|inttoptr) .*\)")
+_LOCATION = re.compile(r"^!(\d+) = (?:distinct )?!DILocation\((.*)\)$", re.MULTILINE)
+_NODE = re.compile(r"^!(\d+) = ", re.MULTILINE)
+_DEBUG = re.compile(r",? !dbg !(\d+)")
+_LOCAL = re.compile(r'%(?:"[^"]*"|[-\w.$]+)')
+_PASSES_ON = re.compile(r"(?:[sz]ext|trunc|fpext|fptrunc|[sui]+tofp|bitcast|insertelement|shufflevector) ")
+_MOST_COLUMNS = (1 << 16) - 1
 _NAME = re.compile(r'[%@](?:"[^"]*"|[-\w.$]+)|\bnull\b|\bpoison\b|\bundef\b')
 
 
@@ -50,15 +57,10 @@ def is_access(line: str) -> bool:
     return _LOAD.match(line) is not None or _STORE.match(line) is not None
 
 
-def with_access_calls(lines: Iterator[str], begins: Callable[[str], bool]) -> Iterator[str]:
-    """Yield the lines with a call of ``volery_access`` before each access to memory.
-
-    Accesses are numbered from the line for which ``begins`` is true, the beginning of a block.
-    """
+def with_access_calls(lines: Iterable[str]) -> Iterator[str]:
+    """Yield the lines with a call of ``volery_access`` before each access to memory, numbered in order."""
     number = 0
     for line in lines:
-        if begins(line):
-            number = 0
         if is_access(line):
             store = _STORE.match(line) is not None
             yield f"  call void @{ACCESS}(ptr {_address(line)}, i32 {2 * number + store})\n"
@@ -121,15 +123,72 @@ def critical_edges(text: str) -> dict[int, int]:
     return {numbers[function, name]: number for number, function, name in heads}
 
 
-def access_counts(text: str) -> list[int]:
-    """Return the number of accesses to memory of each block."""
+def access_blocks(text: str) -> list[int]:
+    """Return the number of the basic block of each access to memory."""
     found: list[int] = []
+    number = -1
     for line, block in _lines(text):
-        if block is not None:
-            found.append(0)
-        elif found and is_access(line):
-            found[-1] += 1
+        number += block is not None
+        if block is None and is_access(line):
+            found.append(number)
     return found
+
+
+def with_access_columns(text: str) -> str:
+    """Return the code with the number of an access in its function, from 1 on, as the column of its location.
+
+    The column also marks what uses a loaded value first, if nothing else does: the code generator can make
+    one instruction of both. The lines stay.
+    """
+    nodes = dict(_LOCATION.findall(text))
+    free = max((int(number) for number in _NODE.findall(text)), default=0) + 1
+    out: list[str] = []
+    added: list[str] = []
+    function: list[str] = []
+    for line in text.splitlines():
+        if line.startswith("define "):
+            function = [line]
+        elif function:
+            function.append(line)
+        else:
+            out.append(line)
+        if line == "}":
+            out += _numbered(function, nodes, free + len(added), added)
+            function = []
+    return "\n".join([*out, *added]) + "\n"
+
+
+def _numbered(function: list[str], nodes: dict[str, str], free: int, added: list[str]) -> Iterator[str]:
+    """Yield the lines of a function with new locations, which are appended to ``added``."""
+    subprogram = _DEBUG.search(function[0])
+    if subprogram is None:
+        yield from function
+        return
+    uses = Counter(name for line in function for name in _LOCAL.findall(line))
+    loaded: dict[str, int] = {}  # by the names of values that are used once, in this block
+    number = 0
+    for line in function:
+        if _LABEL.match(line):
+            loaded = {}
+        name, _, computed = line.strip().partition(" = ") if line.startswith("  %") else ("", "", line)
+        of = next((loaded.pop(used) for used in reversed(_LOCAL.findall(computed)) if used in loaded), 0)
+        if is_access(line):
+            number += 1
+            of = number
+        location = _DEBUG.search(line)
+        if of == 0 or of > _MOST_COLUMNS or not (location or is_access(line)):
+            yield line
+            continue
+        if name and uses[name] == 2 and (is_access(line) or _PASSES_ON.match(computed)):
+            loaded[name] = of
+        body = nodes.get(location[1], "") if location else ""
+        if not body or "line: 0" in body:
+            body = f"line: {NO_LINE}, scope: !{subprogram[1]}"
+        body = re.sub(r", column: \d+", "", body).replace(", ", f", column: {of}, ", 1)
+        mark = f", !dbg !{free}"
+        added.append(f"!{free} = !DILocation({body})")
+        free += 1
+        yield _DEBUG.sub("", line) + mark
 
 
 def with_counters(text: str) -> str:
@@ -156,10 +215,10 @@ def with_trace_calls(text: str) -> str:
     These are ``volery_trace(number)`` at the beginning of each block, ``volery_switch(value)`` before each
     switch and the calls of ``with_access_calls``.
     """
-    entered = f"  call void @{TRACE}("
-    lines = _instrumented(text, lambda number: f"{entered}i32 {number})\n").splitlines(keepends=True)
+    traced = _instrumented(text, lambda number: f"  call void @{TRACE}(i32 {number})\n")
+    lines = traced.splitlines(keepends=True)
     switches = (one for number, line in enumerate(lines) for one in (_switch_call(number, line), line))
-    whole = "".join(with_access_calls(switches, lambda line: line.startswith(entered)))
+    whole = "".join(with_access_calls(switches))
     return whole + f"\ndeclare void @{TRACE}(i32)\ndeclare void @{SWITCH}(i32)\n{DECLARED}"
 
 

@@ -24,11 +24,16 @@ _OPENING, _CLOSING = frozenset("([{"), frozenset(")]}")
 _FUNCTION = re.compile(r'^("[^"]+"|[\w.$]+):\s+(?:#|//) @')
 _LABEL = re.compile(r"^(?:(\.LBB\d+_\d+):|(?:#|//) %bb\.\d+:)(.*)$")
 _CAME_FROM = re.compile(r'(?:#|//) %("[^"]+"|[^\s"]+)')
-_LOCATION = re.compile(r"^\t\.loc\t(\d+) (\d+)")
+_LOCATION = re.compile(r"^\t\.loc\t(\d+) (\d+)(?: (\d+))?")
+_SPILL = re.compile(r"-byte (?:Folded )?(?:Spill|Reload)")
+_CONSTANT = re.compile(r"\.L(?:CPI|JTI)")
 _FILE = re.compile(r'^\t\.file\t(\d+) (?:"([^"]*)" )?"([^"]*)"')
 _ALIGN = re.compile(r"^\t\.p2align\t(\d+)(?:, [^,]*, (\d+))?")
 _COMMENT = re.compile(r"\s+(?:#|//) .*$|\s+//.*$")
 _DIRECT = re.compile(r"^[.\w$]+(?:@PLT)?$")
+
+NO_LINE = 1 << 24
+"""Line of a location that has a column only."""
 
 _JUMPS = {"jmp", "b"}
 _CALLS = {"call", "bl", "blr"}
@@ -112,11 +117,20 @@ class End(Enum):
 
 @dataclass(frozen=True)
 class Instruction:
-    """One line of assembly; ``source`` is its source line (``file:line``), empty if there is none."""
+    """One line of assembly.
+
+    Attributes:
+        mnemonic: Its name.
+        operands: Its operands.
+        source: Its source line, ``file:line``; empty if there is none.
+        access: Number of its access to memory among those of its function in the intermediate code, from 1
+            on; 0 if it has none or it is one of the code generator's own.
+    """
 
     mnemonic: str
     operands: tuple[str, ...]
     source: str
+    access: int = 0
 
 
 @dataclass
@@ -155,7 +169,7 @@ def machine_blocks(text: str, bytes_each: int = 0) -> list[MachineBlock]:
     """
     found: list[MachineBlock] = []
     files: dict[str, str] = {}
-    function, source, offset = "", "", 0
+    function, source, access, offset = "", "", 0, 0
     for line in text.splitlines():
         if named := _FILE.match(line):
             files[named[1]] = (
@@ -171,11 +185,14 @@ def machine_blocks(text: str, bytes_each: int = 0) -> list[MachineBlock]:
             came = _CAME_FROM.search(label[2])
             found.append(MachineBlock(function, label[1] or "", came[1].strip('"') if came else None))
         elif location := _LOCATION.match(line):
-            source = f"{files.get(location[1], '?')}:{location[2]}" if location[2] != "0" else ""
+            known = 0 < int(location[2]) < NO_LINE
+            source = f"{files.get(location[1], '?')}:{location[2]}" if known else ""
+            access = int(location[3] or 0)
         elif bytes_each and (aligned := _ALIGN.match(line)):
             offset += _pad(found, aligned, offset, bytes_each)
         elif line.startswith("\t") and line[1:2] not in ".#/" and found:
-            _append(found, _instruction(line, source))
+            own = _SPILL.search(line) or _CONSTANT.search(line)
+            _append(found, _instruction(line, source, 0 if own else access))
             offset += bytes_each
     return found
 
@@ -201,14 +218,14 @@ def _append(found: list[MachineBlock], one: Instruction) -> None:
     last.end, last.target = _ending(one)
 
 
-def _instruction(line: str, source: str) -> Instruction:
+def _instruction(line: str, source: str, access: int) -> Instruction:
     mnemonic, _, rest = _COMMENT.sub("", line).strip().partition("\t")
     if mnemonic in ("lock", "rep", "rep;", "notrack"):
         mnemonic, _, rest = rest.partition("\t")
     prefix, _, after = mnemonic.partition(" ")
     if prefix in ("lock", "rep", "notrack", "data16"):
         mnemonic = after
-    return Instruction(mnemonic.strip(), tuple(split_operands(rest)), source)
+    return Instruction(mnemonic.strip(), tuple(split_operands(rest)), source, access)
 
 
 def _ending(one: Instruction) -> tuple[End, str]:

@@ -6,8 +6,8 @@ first. So code that the code generator has merged, split, duplicated or moved is
 paths of a switch may lead to the same block: its value is traced and followed through the comparisons that
 the code generator made of it.
 
-Debug information was rejected as the link between the two codes: it has lines, not blocks, and optimisation
-loses it where it matters most.
+Debug information was rejected as the link between the blocks of the two codes: optimisation loses it where it
+matters most. It links single accesses to memory (``llvm_ir.with_access_columns``).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from operator import eq, ge, gt, le, lt, ne
 from typing import NamedTuple
 
-from volery.cost.native.instrumented_run import Access, BlockTrace
+from volery.cost.native.instrumented_run import Array, BlockTrace, no_accesses
 from volery.cost.native.llvm_ir import BasicBlock
 from volery.cost.native.machine_code import End, Instruction, MachineBlock
 
@@ -188,7 +188,7 @@ class ExecutedPath:
         taken: Whether its branch was taken.
         positions: Position of its basic block in the trace.
         lost: Jumps that could not be followed.
-        accesses: Cache misses by position.
+        accesses: Accesses to memory, as in the trace.
     """
 
     blocks: list[int] = field(default_factory=list)
@@ -197,7 +197,7 @@ class ExecutedPath:
     taken: list[int] = field(default_factory=list)
     positions: list[int] = field(default_factory=list)
     lost: int = 0
-    accesses: dict[int, list[Access]] = field(default_factory=dict)
+    accesses: Array = field(default_factory=no_accesses)
 
 
 class MachineCode:

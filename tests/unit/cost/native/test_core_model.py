@@ -61,6 +61,74 @@ def test_a_load_after_a_store_to_the_same_address_is_forwarded():
     assert elsewhere < through / 2
 
 
+def through_memory(addresses: tuple[int, int]) -> float:
+    """Cycles of one pass that stores a sum and loads it by another register; addresses are known."""
+    lines = ("addsd xmm0, xmm1", "movsd qword ptr [rbx], xmm0", "movsd xmm0, qword ptr [rcx + 8]")
+    ran = np.zeros(REPEATS, dtype=np.int64)
+    took, _ = execute(
+        instruction_tables([piece(*lines)], LAW, frozenset()),
+        ExecutionSequence(
+            ran, np.zeros(REPEATS, dtype=np.int8), addresses=np.tile([-1, *addresses], REPEATS)
+        ),
+    )
+    return float(took.sum()) / REPEATS
+
+
+def test_a_store_is_found_by_its_address_however_it_is_written():
+    chain = LAW.operations["fp_add"].latency + LAW.forward
+    assert through_memory((640, 640)) == pytest.approx(chain, abs=2.5)
+    assert through_memory((640, 704)) < chain / 2
+
+
+def test_a_load_of_parts_of_several_stores_waits_until_they_retire():
+    assert through_memory((640, 636)) > through_memory((640, 640))
+
+
+def between_misses(calls: int, window: int) -> float:
+    """Cycles of one pass with two loads from memory and library calls of 8 cycles after each."""
+    library = LibraryLaw(
+        provenance="measured", source="a test", unknown=8.0, calls={"other": 8.0}, latencies={"other": 1.0}
+    )
+    law = LAW.model_copy(update={"library": library, "window": window})
+    call = MachineBlock("f", "", None, [Instruction("call", ("other",), "")], End.CALL, "other")
+    parts = [
+        piece("mov rbx, qword ptr [rbx]"),
+        *[call] * calls,
+        piece("mov rcx, qword ptr [rcx]"),
+        *[call] * calls,
+    ]
+    ran = np.tile(np.arange(len(parts)), REPEATS)
+    starts = range(0, len(ran), len(parts))
+    misses = np.array([(at + step, step, 3, 0) for at in starts for step in (0, calls + 1)])
+    took, _ = execute(
+        instruction_tables(parts, law, frozenset()),
+        ExecutionSequence(ran, np.zeros(len(ran), dtype=np.int8), misses),
+        MEMORY,
+    )
+    return float(took.sum()) / REPEATS
+
+
+def test_the_instructions_of_a_call_fill_the_reorder_buffer():
+    fit = int(LAW.window / (LAW.width * 8.0 / 2.0))
+    assert between_misses(fit // 2, LAW.window) < OVERLAP
+    assert between_misses(fit + 1, LAW.window) > NO_OVERLAP
+    assert between_misses(fit + 1, 4 * LAW.window) < OVERLAP
+
+
+def test_a_pattern_of_two_ways_of_a_loop_is_learnt():
+    """Which of two branches jumps back is told by more than the last two bits of the history."""
+    slope = [int((number * 0.382) % 1.0 < 0.382) for number in range(6000)]
+    for shift in range(4):
+        loop = [
+            piece(*["add rax, rbx"] * shift, "test eax, eax", "jne .LBB0_1", end=End.BRANCH),
+            piece("add rcx, rbx", "jmp .LBB0_1", end=End.JUMP),
+        ]
+        ran = np.array([one for way in slope for one in ((0,) if way else (0, 1))], dtype=np.int64)
+        ways = np.array([one for way in slope for one in ((1,) if way else (0, 1))], dtype=np.int8)
+        _, stalled = execute(instruction_tables(loop, LAW, frozenset()), ExecutionSequence(ran, ways))
+        assert np.count_nonzero(stalled) < 0.03 * len(slope)
+
+
 def test_repeating_branches_are_predicted_and_random_ones_are_not():
     random = [int(one) for one in np.random.default_rng(1).integers(0, 2, 4000)]
     assert mispredicted([number % 2 for number in range(4000)]) < 0.02

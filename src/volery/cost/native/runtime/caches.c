@@ -3,7 +3,7 @@
  * VOLERY_CACHES=SIZE/WAYS,...   bytes and ways of each cache, from the first on; lines have 64 bytes
  *
  * Caches are set-associative with least-recently-used replacement. Pages are numbered in the order of their first
- * access, so that the result does not depend on physical addresses. A line next to one of the last misses is
+ * access, so that the result depends on neither virtual nor physical addresses. A line next to one of the last misses is
  * prefetched: if the second cache or a later one has it, it arrives in time.
  */
 #include <stdint.h>
@@ -12,7 +12,7 @@
 
 enum { LINE = 6, PAGE = 12, MOST_CACHES = 4, STREAMS = 16, PREFETCHED = 8 };
 
-void volery_record_access(uint32_t what);
+void volery_record_access(uint32_t what, uint64_t place);
 
 typedef struct {
     uint64_t sets;
@@ -99,17 +99,15 @@ static unsigned level_of(uint64_t line) {
     return level;
 }
 
-/* Record an access. `what` is twice its number within its block, plus one for a store. */
+/* Record an access: which level serves it, and its address with the number of the page in place of the page. `what` is
+ * twice the number of the access in the program, plus one for a store. */
 void volery_access(const void *address, uint32_t what) {
-    if (!count)
-        return;
     uint64_t line = line_of((uintptr_t)address);
-    unsigned level = level_of(line);
-    if (!level)
-        return;
-    unsigned ahead = streamed(line) ? PREFETCHED : 0;
-    if (!ahead || level == count)
-        volery_record_access(what << 4 | ahead | level);
+    unsigned level = level_of(line), ahead = level && streamed(line) ? PREFETCHED : 0;
+    if (ahead && level < count)
+        level = ahead = 0;
+    uint64_t place = line << LINE | ((uintptr_t)address & ((1u << LINE) - 1));
+    volery_record_access(what << 4 | ahead | level, place);
 }
 
 /* Access all lines of a range that is copied or filled. */

@@ -3,7 +3,7 @@
  * VOLERY_COUNTS=FILE   counters at the end, less those at the beginning (64 bits each)
  * VOLERY_TRACE=FILE    numbers of blocks entered (32 bits each): the first VOLERY_WINDOW of every VOLERY_STRIDE,
  *                      and between them the values that switches used (the greatest bit is set) and the accesses to
- *                      memory that the first cache did not serve (the second greatest is; see caches.c)
+ *                      memory (the second greatest is), of two words each: what and where, see caches.c
  */
 #include <stdint.h>
 #include <stdio.h>
@@ -51,9 +51,11 @@ void volery_switch(uint32_t value) {
         append(value | 1u << 31);
 }
 
-void volery_record_access(uint32_t what) {
-    if (in_window())
-        append(what | 1u << 30);
+void volery_record_access(uint32_t what, uint64_t place) {
+    if (!in_window())
+        return;
+    append((what & ~(3u << 30)) | 1u << 30);
+    append((place & ~(3u << 30)) | 1u << 30);
 }
 
 /* Begin a trace of code that is loaded by another program. */
