@@ -170,7 +170,10 @@ def uncompilable(source: str, callables: frozenset[str] = frozenset()) -> Iterat
         source: Text of a module that is compiled.
         callables: Names of types of functions.
     """
-    for node in ast.walk(ast.parse(source)):
+    tree = ast.parse(source)
+    for line in (line for node in tree.body if isinstance(node, ast.ClassDef) for line in _overridable(node)):
+        yield line, "what a subclass in Python sets instead is not read; native_class=False"
+    for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
             marks = {ast.unparse(one) for one in node.decorator_list}
             returned = ast.unparse(node.returns) if node.returns else ""
@@ -188,6 +191,18 @@ def uncompilable(source: str, callables: frozenset[str] = frozenset()) -> Iterat
                 one.arg == "slots" and ast.unparse(one.value) == "True" for one in node.keywords
             ):
                 yield node.lineno, "slots=True makes a second, uncompiled class; leave it out"
+
+
+def _overridable(node: ast.ClassDef) -> Iterator[int]:
+    """Yield the lines of attributes that a subclass in plain Python may set, of a class that permits some."""
+    marks = " ".join(ast.unparse(mark) for mark in node.decorator_list)
+    if "allow_interpreted_subclasses" not in marks or "dataclass" in marks:
+        return
+    for line in node.body:
+        if isinstance(line, ast.Assign | ast.AnnAssign) and line.value is not None:
+            named = ast.unparse(line)
+            if "ClassVar" not in named and not named.startswith("__slots__"):
+                yield line.lineno
 
 
 def compiled_modules() -> Iterator[str]:

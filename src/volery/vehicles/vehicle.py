@@ -819,7 +819,7 @@ class Vehicle(ServicedVehicle):
         self._keep_monitoring(f"after {asked}", check)
 
     def _keep_monitoring(self, asked: str, check: Check) -> None:
-        """Check each ``MONITOR_PERIOD``, unless telemetry arrives in a node's own loop, which may not be run."""
+        """Check each ``MONITOR_PERIOD``, unless telemetry arrives in a node's loop that may not run."""
         if self._driver.cycle is not None:
             return
 

@@ -27,7 +27,6 @@ from volery.base.errors import CapabilityError
 from volery.base.frames import LocalFrame
 from volery.base.seeds import stream
 from volery.base.time import MS, Ns
-from volery.bridge import VehicleNodeOptions, serve_pprzros, serve_vehicle
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.links.link import Link
@@ -122,12 +121,16 @@ Serve = Callable[[RosGraph, Link, str, ExecutionContext, LocalFrame], object]
 def _mavros(
     graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame
 ) -> object:
+    from volery.bridge import VehicleNodeOptions, serve_vehicle  # loads the definitions of all messages
+
     return serve_vehicle(graph, link, vehicle, context, VehicleNodeOptions(origin=origin))
 
 
 def _pprzros(
     graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame
 ) -> object:
+    from volery.bridge import serve_pprzros
+
     return serve_pprzros(graph, link, vehicle, context)
 
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from math import nan
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 from volery.base.errors import UsageError, choices
 from volery.base.frames import Vector, ned_to_enu
@@ -31,61 +31,14 @@ from volery.links.link import Codec, Link
 from volery.links.mavlink_codec import MAVLINK
 from volery.ros.graph import RosGraph
 from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.simulation.autopilots.protocol_endpoint import GraphEndpoint, LinkEndpoint, ProtocolEndpoint
 from volery.simulation.autopilots.vehicle_state import (
     Vehicle,
     VehicleAction,
-    VehicleOutput,
     VehicleRules,
     do_nothing,
 )
 from volery.trace.events import VehicleState
-
-
-class ProtocolEndpoint(VehicleOutput, Protocol):
-    """One vehicle's protocol."""
-
-    def start(self) -> None:
-        """Start what is sent regularly, at the phase of the boot."""
-
-    def stop(self) -> None:
-        """Stop sending: the vehicle was switched off."""
-
-    def close(self) -> None:
-        """Close all links or the node."""
-
-
-@runtime_checkable
-class LinkEndpoint(ProtocolEndpoint, Protocol):
-    """A protocol on links."""
-
-    @property
-    def banner(self) -> bytes:
-        """Bytes that the autopilot writes to a new byte connection before any frame."""
-
-    def connect(self, link: Link, use: str = "") -> None:
-        """Serve *link*.
-
-        Args:
-            link: The autopilot's end of the link.
-            use: What the firmware uses the link for; empty: its default.
-        """
-
-    def disconnect(self, link: Link) -> None:
-        """Stop serving *link*."""
-
-
-@runtime_checkable
-class GraphEndpoint(ProtocolEndpoint, Protocol):
-    """A protocol of topics and services on a ROS graph."""
-
-    def join(self, graph: RosGraph, namespace: str, place: ExecutionContext) -> None:
-        """Serve on *graph*.
-
-        Args:
-            graph: The graph.
-            namespace: Prefix of all names.
-            place: Execution context that the node's computing is charged to.
-        """
 
 
 class BootEvent(NamedTuple):

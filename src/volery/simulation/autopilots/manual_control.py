@@ -107,6 +107,8 @@ class RcChannels:
 
     def pulses(self) -> list[int]:
         """Return the pulse widths of all channels in order [us]."""
+        if not any(self._override):
+            return list(self.transmitter)
         return [over or given for over, given in zip(self._override, self.transmitter, strict=True)]
 
 

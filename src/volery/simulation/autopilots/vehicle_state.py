@@ -11,7 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import hypot
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
+
+from mypy_extensions import mypyc_attr
 
 from volery.base.frames import Vector
 from volery.base.time import Ns, S, from_seconds
@@ -20,6 +22,7 @@ from volery.simulation.autopilots.autopilot_parameters import Parameter, Paramet
 from volery.simulation.autopilots.flight_stack.flight import Control, Estimate, Flight, Setpoint
 from volery.simulation.autopilots.manual_control import RcChannels
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, MissionItem, OnboardMission
+from volery.simulation.autopilots.protocol_endpoint import VehicleOutput
 from volery.simulation.autopilots.state_groups import (
     NEVER,
     ArmingState,
@@ -33,31 +36,7 @@ from volery.simulation.autopilots.state_groups import (
 )
 
 
-class VehicleOutput(Protocol):
-    """What the parts of an autopilot send; each endpoint implements it in its protocol."""
-
-    def send_text(self, severity: int, text: str) -> None:
-        """Send a status text; severity as in syslog."""
-
-    def parameter_changed(self, name: str) -> None:
-        """Report the new value of a parameter."""
-
-    def mode_changed(self) -> None:
-        """Report that another mode is in force."""
-
-    def home_changed(self) -> None:
-        """Report the new home position."""
-
-    def send_message(self, message: str) -> None:
-        """Send that message of the firmware's protocol now, on all links."""
-
-    def send_event(self, message: str, fields: dict[str, Any]) -> None:
-        """Send an event with these fields, on all links."""
-
-    def after_reply(self, action: Action) -> None:
-        """Run *action* once the message in hand has been answered; at once if there is none."""
-
-
+@mypyc_attr(native_class=False)
 class Manoeuvre:
     """One way of flying or driving.
 

@@ -10,7 +10,7 @@ from collections import deque
 from dataclasses import replace
 from enum import IntEnum
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
 from volery.base.errors import LinkError, LinkSilent
 from volery.base.time import MS, Ns, S
@@ -57,13 +57,13 @@ NOT_M100 = "aircraft of OSDK 4"
 class Ack:
     """Keys of acknowledgements in ``Telemetry.answers``."""
 
-    ACTIVATION = "activation"
-    AUTHORITY = "authority"
-    REFERENCE = "local reference"
-    MOTORS = "motors"
-    TASK = "task"
-    MISSION = "mission"
-    START = "mission start"
+    ACTIVATION: Final = "activation"
+    AUTHORITY: Final = "authority"
+    REFERENCE: Final = "local reference"
+    MOTORS: Final = "motors"
+    TASK: Final = "task"
+    MISSION: Final = "mission"
+    START: Final = "mission start"
 
 
 def _time_for(key: str) -> Ns:

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from math import degrees, nan
 from typing import Any
 
+from mypy_extensions import mypyc_attr
+
 from volery.base.errors import UsageError
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns
@@ -44,6 +46,7 @@ RC_CHANNELS = 18
 """Channels in RC_CHANNELS."""
 
 
+@mypyc_attr(native_class=False)
 class TelemetryDecoder(ABC):
     """Decodes MAVLink messages into telemetry.
 
