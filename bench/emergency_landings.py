@@ -2,14 +2,17 @@
 
 The safety switch is moved to its landing position at the start of the motors, in the climb, in a turn, on the
 way between way points, and in the descent; over a good link, over 57600 baud with loss, and with the link cut
-when the switch moves. Then the program cannot land, and the autopilot does by its own failsafe
-(FS_GCS_ENABLE=5). Each row must end on the ground, disarmed, with less than 1 m/s at touch-down.
+with the switch or later. Once LAND was sent the autopilot needs no link, and all its parameters are default
+ones. With the link cut before, the program cannot land, and the autopilot does by its own failsafe
+(FS_GCS_ENABLE=5) or by its own switch (RC6_OPTION=18). Each row must end on the ground, disarmed, with less
+than 1 m/s at touch-down. Arguments name the phases to fly; by default all.
 """
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext, suppress
 from math import hypot, inf
 from typing import NamedTuple
 
@@ -60,10 +63,23 @@ PHASES: Mapping[str, Phase] = {
     "way points": Phase(lambda: Waypoints([(8.0, 0.0, 4.0), (8.0, 8.0, 6.0)]), lambda seen: seen.way > 3.0),
     "descent": Phase(lambda: Altitude([8.0, 3.0], 8.0), lambda seen: seen.highest - seen.height > 1.5),
 }
-LINKS = {
-    "good": "",
-    "57600 baud, 2 % lost": "&wire=bytes&baud=57600&drop=0.02&flip=1e-5",
-    "lost": "&wire=bytes&parameters=FS_GCS_ENABLE:5,FS_OPTIONS:0,RC_OVERRIDE_TIME:1",
+FAILSAFE = "&parameters=FS_GCS_ENABLE:5,FS_OPTIONS:0,RC_OVERRIDE_TIME:1"
+
+
+class Link(NamedTuple):
+    """A link: options of the address, and when it is cut after the switch has moved, s; infinite: never."""
+
+    options: str
+    cut_after_s: float = inf
+
+
+LINKS: Mapping[str, Link] = {
+    "good": Link(""),
+    "57600 baud, 2 % lost": Link("&wire=bytes&baud=57600&drop=0.02&flip=1e-5"),
+    "lost 0.3 s later": Link("&wire=bytes", 0.3),
+    "lost 5 s later": Link("&wire=bytes", 5.0),
+    "lost with the switch": Link(f"&wire=bytes{FAILSAFE}", 0.0),
+    "lost, RC6_OPTION=18": Link("&wire=bytes&parameters=RC6_OPTION:18", 0.0),
 }
 """By RC override the mode is a pilot's, in which FS_OPTIONS=16, the default, does not land."""
 
@@ -91,9 +107,17 @@ class Landed(NamedTuple):
         return not self.armed and self.height < 0.3 and self.speed < GREATEST and self.moved < inf
 
 
-def landed(by: str, phase: Phase, link: str, cut_at: float | None = None) -> Landed:
-    """Fly, move the switch in the phase (or cut the link at a time in s), and return how it ended."""
-    options = link if cut_at is None else f"{link}&cut={cut_at:.3f}-{LIMIT_S}"
+def landed(by: str, phase: Phase, link: Link, known: float) -> Landed:
+    """Fly, move the switch in the phase, and return how it ended.
+
+    Args:
+        by: how commands are applied.
+        phase: what is flown.
+        link: the link.
+        known: when the switch moves, s, where the link is cut and a flight before has shown it.
+    """
+    cut_at = known + link.cut_after_s
+    options = link.options if cut_at == inf else f"{link.options}&cut={cut_at:.3f}-{LIMIT_S}"
     url = f"sim:{NAME}?start=warm&attitude=50&rate=20&rc=20{options}"
     opened = open_vehicles({NAME: url}, {NAME: Drone}, VehicleSettings())
     kernel, fleet, drone = opened.kernel, opened.fleet, opened.vehicles[0]
@@ -102,7 +126,7 @@ def landed(by: str, phase: Phase, link: str, cut_at: float | None = None) -> Lan
     vehicle, truth = fleet.autopilots[NAME].vehicle, fleet.flights[NAME].truth
     switch = vehicle.rc.transmitter
     switch[SWITCH.channel - 1] = 1500
-    moved = inf if cut_at is None else cut_at
+    moved = inf
     armed_at = ended = speed = highest = 0.0
 
     def look() -> None:
@@ -130,11 +154,8 @@ def landed(by: str, phase: Phase, link: str, cut_at: float | None = None) -> Lan
     try:
         with kernel.adopt("landings"):
             drone.wait_connected()
-            try:
+            with nullcontext() if cut_at == inf else suppress(LinkLost):
                 flight.run()
-            except LinkLost:
-                if cut_at is None:
-                    raise
             while vehicle.armed and kernel.now() < from_seconds(LIMIT_S):
                 sleep(kernel, S)
             body = truth()
@@ -150,12 +171,13 @@ def main() -> int:
     """Print one row for each combination; return 1 if one is not good."""
     print(f"{'phase':22}{'commands':12}{'link':24}{'touch-down':>12}{'disarmed after':>16}")
     wrong = 0
-    for name, phase in PHASES.items():
+    for name in sys.argv[1:] or PHASES:
+        phase = PHASES[name]
         for by in WAYS:
-            at: float | None = None
+            at = 0.0
             for link, options in LINKS.items():
-                found = landed(by, phase, options, at if link == "lost" else None)
-                at = found.moved if at is None else at
+                found = landed(by, phase, options, at)
+                at = at or found.moved
                 wrong += not found.good
                 note = "" if found.good else f"  WRONG: {found}"
                 times = f"{found.speed:8.2f} m/s{found.seconds:14.1f} s"

@@ -15,6 +15,8 @@ from typing import NamedTuple, Protocol
 
 from volery.base.errors import UsageError
 from volery.control.laws import PidGains, PidLaw
+from volery.control.link_failsafes import BY_STICKS
+from volery.trace.events import Text
 from volery.vehicles import Drone
 from volery.vehicles.telemetry import HALF_US, MIDDLE_US
 
@@ -172,6 +174,12 @@ class _TiltLoop:
         return forward, sideways
 
 
+LOW_THROTTLE = (800, 1300)
+"""Pulse widths in µs with which a throttle stick commands a fast descent in altitude hold."""
+THROTTLE = 3
+WARNING = 4
+
+
 class RcOverride:
     """RC channels overridden in altitude hold.
 
@@ -209,8 +217,14 @@ class RcOverride:
         self.engage()
 
     def engage(self) -> None:
-        """Enter altitude hold with centred sticks."""
+        """Enter altitude hold with centred sticks; a transmitter whose throttle stick is low is recorded."""
         self._loop.reset()
+        drone, channels = self._drone, self._drone.telemetry.rc
+        own = channels[THROTTLE - 1] if len(channels) >= THROTTLE else 0
+        if LOW_THROTTLE[0] <= own < LOW_THROTTLE[1]:
+            text = f"{BY_STICKS}: the transmitter's throttle, at {own} us, makes it descend fast"
+            text += "; move the stick to the middle"
+            drone.kernel.record(Text(drone.kernel.now(), drone.name, WARNING, text))
         self._drone.manual_control(0.0, 0.0, 0.5, 0.0)
         self._drone.altitude_hold()
 

@@ -4,6 +4,10 @@ The loop runs at a fixed period: it looks at the switch, executes the manoeuvre,
 records the terms of its loops. Between two samples it looks at the switch when a report of it arrives, and
 releases at once. One function, ``_look``, decides who has control; nothing is sent while the transmitter has
 it. During calls that block, such as the take-off, a second task looks at the switch and aborts them.
+
+An emergency landing is the autopilot's own from its first moment, so that it needs no link; the law's descent
+follows if the autopilot refuses, or if the settings state it. Descents are limited so that the last command
+may last for some seconds after the link is lost.
 """
 
 from __future__ import annotations
@@ -15,9 +19,9 @@ from math import inf, isfinite, nan
 from volery.base.errors import NotArrived, Overridden, VehicleError, VoleryError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, Ns, S, from_seconds, to_seconds
-from volery.control.actuation import Actuation, Measured
+from volery.control.actuation import Actuation, Command, Measured
 from volery.control.manoeuvres import Landing, LoopSample, Manoeuvre
-from volery.control.safety_switch import Authority, Received, SwitchSettings, SwitchState, decide
+from volery.control.safety_switch import Authority, Emergency, Received, SwitchSettings, SwitchState, decide
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Rate, sleep
 from volery.trace.events import ControlSample, Text
@@ -34,8 +38,27 @@ LANDED_WITHIN_S = 180.0
 STILL_SPEED = 0.15
 """Speed in m/s below which a descending drone may stand on the ground."""
 STILL_FOR_S = 2.0
+LASTS_S = 3.0
+"""Time in s for which an autopilot follows the last command after the link is lost: ArduPilot's
+RC_OVERRIDE_TIME and GUID_TIMEOUT. PX4's times are shorter.
+"""
+LEAST_DESCENT = 0.8
+"""Rate of descent in m/s that is harmless at the ground."""
+MARGIN = 1.5
+"""Height in m that is left when the last command ends: the drone still has to stop."""
 NOTICE = 5
 """Severity of the record's lines about who has control (syslog)."""
+
+
+def limited_descent(command: Command, height: float) -> Command:
+    """Return the command with a descent that may last ``LASTS_S`` longer without a hard touch-down.
+
+    Args:
+        command: command of a law.
+        height: height above home, m; an unknown one is a low one.
+    """
+    room = (height - MARGIN) / LASTS_S if isfinite(height) else 0.0
+    return command._replace(up=max(command.up, -max(LEAST_DESCENT, room)))
 
 
 class ControlledFlight:
@@ -181,13 +204,18 @@ class ControlledFlight:
                 self._release()
                 return
             if authority is Authority.LANDING and self._watched_from is Authority.AUTONOMOUS:
-                with suppress(VoleryError):  # the flight lands, whatever came of this
-                    if self._drone.flying:
-                        self._drone.hold()
-                    else:
-                        self._drone.land()
-                return
+                self._watched_from = authority
+                kernel, name = self._drone.kernel, f"landing of {self._drone.name}"
+                kernel.spawn(self._abort, name, ExecutionContext(name))
             self._await_report(WATCH_PERIOD)
+
+    def _abort(self) -> None:
+        """Abort the call that blocks by a landing, or by a stop where the law is to descend."""
+        with suppress(VoleryError):  # the flight lands, whatever came of this
+            if self._drone.flying and not self._autopilot_lands:
+                self._drone.hold()
+            else:
+                self._drone.land()
 
     def _release(self) -> None:
         self._engaged = False
@@ -245,7 +273,7 @@ class ControlledFlight:
     def _sample(self, manoeuvre: Manoeuvre, sample_s: float) -> Measured:
         measured = self._measure()
         command, samples = manoeuvre.step(measured, sample_s)
-        self._actuation.apply(command, measured, sample_s)
+        self._actuation.apply(limited_descent(command, measured.up), measured, sample_s)
         for one in samples:
             self._record(one)
         return measured
@@ -282,7 +310,31 @@ class ControlledFlight:
 
     # -- the landing
 
+    @property
+    def _autopilot_lands(self) -> bool:
+        """Whether an emergency landing is the autopilot's own."""
+        return self._switch is not None and self._switch.emergency is Emergency.AUTOPILOT
+
     def _land(self) -> None:
+        """Land: in an emergency by the autopilot, which then needs no link, else under the landing law."""
+        if self.authority is Authority.LANDING and self._autopilot_lands:
+            try:
+                self._finish_landing()
+            except VehicleError as error:
+                if isinstance(error, Overridden) or not self._drone.armed:
+                    raise
+                self._note(f"the law lands it: {error}")
+            else:
+                return
+        self._descend()
+
+    def _finish_landing(self) -> None:
+        """Let the autopilot land, and the pilot after a takeover."""
+        self._blocking(self._drone.land)
+        if self.authority is Authority.MANUAL:
+            self._fly_on_by_pilot()
+
+    def _descend(self) -> None:
         """Descend under the landing law to the ground, where the autopilot detects it and disarms.
 
         The autopilot lands all the way where the law cannot: without telemetry, a height or control.
@@ -298,12 +350,15 @@ class ControlledFlight:
                 self._await_sample(rate)
                 now = kernel.now()
                 sample_s, last = max(to_seconds(now - last), 1e-3), now
+                before = self.authority
                 if self._look() is Authority.MANUAL:
                     self._release()
                     self._fly_on_by_pilot()
                     return
                 if not self._drone.armed:
                     return
+                if self.authority is not before and self._autopilot_lands:
+                    break
                 if self._drone.telemetry.stale or not isfinite(self._drone.telemetry.above_home):
                     break
                 if not self._take_control(landing):
@@ -317,9 +372,7 @@ class ControlledFlight:
             if isinstance(error, Overridden):
                 raise
             self._note(f"the autopilot lands: {error}")
-        self._blocking(self._drone.land)
-        if self.authority is Authority.MANUAL:
-            self._fly_on_by_pilot()
+        self._finish_landing()
 
     def _fly_on_by_pilot(self) -> None:
         """Wait until the pilot has landed, or gives control back."""

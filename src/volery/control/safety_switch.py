@@ -33,6 +33,15 @@ class Reaction(Enum):
     CONTINUE = "continue"
 
 
+class Emergency(Enum):
+    """Who flies the emergency landing."""
+
+    AUTOPILOT = "autopilot"
+    """The autopilot's own landing, which needs no link."""
+    RAMP = "ramp"
+    """The landing law's descent in steps, as in the thesis, which needs the link to the end."""
+
+
 AFTER: Mapping[Reaction, Authority] = {
     Reaction.LAND: Authority.LANDING,
     Reaction.RELEASE: Authority.MANUAL,
@@ -56,6 +65,7 @@ class SwitchSettings:
         silent_s: silence of the autopilot from which telemetry counts as lost, s.
         on_rc_loss: reaction to the loss of the transmitter.
         on_telemetry_loss: reaction to the loss of telemetry.
+        emergency: who flies the emergency landing.
     """
 
     channel: int = 6
@@ -65,6 +75,7 @@ class SwitchSettings:
     silent_s: float = 2.0
     on_rc_loss: Reaction = Reaction.LAND
     on_telemetry_loss: Reaction = Reaction.LAND
+    emergency: Emergency = Emergency.AUTOPILOT
 
     def __post_init__(self) -> None:
         if not 1 <= self.channel <= 18:
@@ -87,6 +98,14 @@ def parse_reaction(text: str) -> Reaction:
         if one.value == text:
             return one
     raise UsageError(f"reaction {text!r}; there is {choices([one.value for one in Reaction])}")
+
+
+def parse_emergency(text: str) -> Emergency:
+    """Return who lands, called *text*; ``UsageError`` names the valid ones."""
+    for one in Emergency:
+        if one.value == text:
+            return one
+    raise UsageError(f"emergency landing by {text!r}; there is {choices([one.value for one in Emergency])}")
 
 
 class SwitchState(NamedTuple):

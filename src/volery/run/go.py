@@ -15,13 +15,14 @@ from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns
 from volery.control.actuation import Actuation, AttitudeSetpoints, RcOverride, VelocitySetpoints
 from volery.control.flight import PERIOD, ControlledFlight
+from volery.control.link_failsafes import BY_STICKS, link_failsafes
 from volery.control.manoeuvres import Manoeuvre
 from volery.control.safety_switch import SwitchSettings
 from volery.run.assembly.ros_graphs import GRAPHS, open_graph
 from volery.run.fly import fly
 from volery.run.gains import GainParameters, GainsFile
 from volery.run.result import Options, Run
-from volery.trace.events import Event, Stream
+from volery.trace.events import Event, Stream, Text
 from volery.vehicles import Drone
 from volery.vehicles.address import MAVLINK_OPTIONS, parse
 from volery.vehicles.driver import drivers
@@ -34,6 +35,7 @@ ACTUATIONS: Mapping[str, Callable[[Drone], Actuation]] = {
 WAYS = tuple(ACTUATIONS)
 RATES = {"rate": "20", "attitude": "50", "rc": "20"}
 """Telemetry that a control loop needs, Hz, unless the address states other rates."""
+INFO = 6
 NODE = "volery_go"
 """Node whose parameters are the gains."""
 
@@ -132,6 +134,10 @@ def go(
             stream.tap(listener)
         with _gain_parameters(settings.graph, drone, manoeuvre):
             drone.wait_ready()
+            if settings.by == "rc":
+                channel = settings.switch.channel if settings.switch is not None else None
+                for line in link_failsafes(drone, channel):
+                    drone.kernel.record(Text(drone.kernel.now(), drone.name, INFO, f"{BY_STICKS}: {line}"))
             flight.run()
 
     return fly(mission, with_rates(on, settings.switch), options)

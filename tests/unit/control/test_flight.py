@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from random import Random
+from typing import Any
 
 import pytest
 
 from rigs.controlled_flights import Watched, fly_watched
-from volery.base.errors import LinkLost, NotArrived, UsageError
-from volery.control.actuation import RC_SCALES, RcAxis
+from volery.base.errors import LinkLost, NotArrived, Refused, UsageError
+from volery.base.time import from_seconds
+from volery.control.actuation import RC_SCALES, Command, RcAxis
+from volery.control.flight import limited_descent
 from volery.control.laws import PidGains
 from volery.control.manoeuvres import Altitude, Rotation, Waypoints, cube, set_gains
-from volery.control.safety_switch import Reaction, SwitchSettings
+from volery.control.safety_switch import Emergency, Reaction, SwitchSettings
+from volery.vehicles import Drone
 
 SWITCH = SwitchSettings()
 BOTH = pytest.mark.parametrize("by", ["setpoints", "rc"])
@@ -120,6 +124,87 @@ def test_with_the_link_lost_the_autopilot_lands_by_its_failsafe() -> None:
     flown = fly_watched(rotation, [(0.0, 1500)], switch=SWITCH, options=cut, after_s=30.0)
     assert isinstance(flown.error, LinkLost)
     assert landed_gently(flown)
+
+
+@ALL
+@pytest.mark.parametrize("after", [0.15, 2.0, 6.0])
+def test_an_emergency_landing_needs_no_link_once_it_has_begun(by: str, after: float) -> None:
+    """With default parameters: LAND is sent first, so that a link that is lost then does no harm."""
+    cut = f"&wire=bytes&cut={13.0 + after}-100"
+    flown = fly_watched(
+        rotation, [(0.0, 1500), (13.0, 1900)], by=by, switch=SWITCH, options=cut, after_s=40.0
+    )
+    assert flown.authority == "emergency landing"
+    assert landed_gently(flown)
+
+
+def test_the_law_flies_the_emergency_landing_where_stated() -> None:
+    switch = SwitchSettings(emergency=Emergency.RAMP)
+    flown = fly_watched(rotation, [(0.0, 1500), (13.0, 1900)], by="rc", switch=switch)
+    assert any(one.loop == "landing" for one in flown.samples)
+    assert landed_gently(flown)
+
+
+def test_the_law_lands_where_the_autopilot_refuses(monkeypatch: pytest.MonkeyPatch) -> None:
+    refusals = []
+    land = Drone.land
+
+    def refuse_once(drone: Drone) -> None:
+        if not refusals:
+            refusals.append(drone.mode)
+            raise Refused(drone.name, "land", "LAND requires a position")
+        land(drone)
+
+    monkeypatch.setattr(Drone, "land", refuse_once)
+    flown = fly_watched(rotation, [(0.0, 1500), (13.0, 1900)], by="rc", switch=SWITCH)
+    assert refusals
+    assert any("the law lands it" in text for text in flown.texts)
+    assert any(one.loop == "landing" for one in flown.samples)
+    assert landed_gently(flown)
+
+
+@ALL
+def test_with_rc6_option_18_the_autopilot_obeys_the_switch_without_a_link(by: str) -> None:
+    cut = "&wire=bytes&cut=13-100&parameters=RC6_OPTION:18"
+    flown = fly_watched(
+        rotation, [(0.0, 1500), (13.5, 1900)], by=by, switch=SWITCH, options=cut, after_s=40.0
+    )
+    assert isinstance(flown.error, LinkLost)
+    assert landed_gently(flown)
+
+
+def test_a_link_lost_in_a_descent_does_not_end_in_a_hard_touch_down() -> None:
+    """RC override, default parameters: the last command lasts for 3 s, then the sticks of the transmitter."""
+
+    def centre(fleet: Any, _drone: Drone) -> None:
+        fleet.move_transmitter("ardupilot", from_seconds(9.0), 3, 1500)
+
+    for at in (17.0, 18.5, 20.0, 21.5):
+        cut = f"&wire=bytes&cut={at}-100"
+        flown = fly_watched(
+            lambda: Altitude([8.0, 1.0], 8.0),
+            [(0.0, 1500)],
+            by="rc",
+            switch=SWITCH,
+            options=cut,
+            after_s=10.0,
+            during=centre,
+        )
+        assert isinstance(flown.error, LinkLost)
+        assert flown.touch_down < 1.0, at
+
+
+def test_a_descent_may_last_until_the_last_command_ends() -> None:
+    fast = Command(1.0, 2.0, -1.5, 3.0)
+    assert limited_descent(fast, 20.0) == fast
+    assert limited_descent(fast, 4.5).up == pytest.approx(-1.0)
+    assert limited_descent(fast, 0.2).up == limited_descent(fast, float("nan")).up == -0.8
+    assert limited_descent(fast._replace(up=2.0), 0.2).up == 2.0
+
+
+def test_a_low_throttle_stick_is_recorded_before_the_sticks_are_taken() -> None:
+    low = fly_watched(rotation, [(0.0, 1500)], by="rc", switch=SWITCH)
+    assert any("throttle, at 1000 us" in text for text in low.texts)
 
 
 def test_lost_telemetry_that_returns_ends_in_a_landing() -> None:

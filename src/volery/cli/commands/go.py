@@ -51,6 +51,13 @@ class SwitchOptions:
     on_telemetry_loss: Annotated[
         str, typer.Option(metavar="land|release", help="Reaction to the loss of telemetry.")
     ] = "land"
+    emergency: Annotated[
+        str,
+        typer.Option(
+            metavar="autopilot|ramp",
+            help="Who flies the emergency landing: the autopilot, which needs no link, or the landing law.",
+        ),
+    ] = "autopilot"
 
     def settings(self) -> SwitchSettings | None:
         """Return the settings of the switch, or None for ``none``.
@@ -58,14 +65,17 @@ class SwitchOptions:
         Raises:
             UsageError: an option is wrong.
         """
-        from volery.control.safety_switch import SwitchSettings, parse_reaction
+        from volery.control.safety_switch import SwitchSettings, parse_emergency, parse_reaction
 
         rc, telemetry = parse_reaction(self.on_rc_loss), parse_reaction(self.on_telemetry_loss)
+        emergency = parse_emergency(self.emergency)
         if self.switch == "none":
             return None
         if not self.switch.isdecimal():
             raise UsageError(f"--switch {self.switch}: give the number of an RC channel, or none")
-        return SwitchSettings(channel=int(self.switch), on_rc_loss=rc, on_telemetry_loss=telemetry)
+        return SwitchSettings(
+            channel=int(self.switch), on_rc_loss=rc, on_telemetry_loss=telemetry, emergency=emergency
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

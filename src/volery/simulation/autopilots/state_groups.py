@@ -108,8 +108,8 @@ class SwitchState:
     """Since when the yaw stick has been at the same end with the throttle closed."""
     rudder: int = 0
     """That end: 1 right, -1 left."""
-    options: dict[int, bool] = field(default_factory=dict)
-    """Whether the switch of a channel is up, by channel."""
+    options: dict[int, int] = field(default_factory=dict)
+    """Position of the switch by channel: 1 up, 0 in the middle, -1 down."""
     read_from: tuple[list[int], int] | None = None
     """Pulse widths of all channels, and changes of parameters, that all of them were last read from."""
 
@@ -156,6 +156,8 @@ class FailsafeState:
     """Time of the last message of the ground station that controls the vehicle [ns]."""
     simulated: tuple[float, float, float, float, float] = (0.0, 0.0, 1.0, 0.0, 180.0)
     """Values of the parameters that inject faults, as they were last applied."""
+    simulated_at: int = -1
+    """Changes of parameters when these were last compared."""
     crashing_since: Ns = NEVER
     """Since when [ns] a vehicle leans far from where it should."""
     low_voltage_since: dict[str, Ns] = field(default_factory=dict)

@@ -96,10 +96,12 @@ def _sticks_moved(vehicle: Vehicle) -> None:
 
 def on_step(vehicle: Vehicle) -> None:
     """Simulate a failing transmitter and expire overrides, at each tick."""
-    if vehicle.parameters["SIM_RC_FAIL"] or vehicle.rc.transmitter != list(vehicle.rules.rc.transmitter):
-        simulate_rc_failure(vehicle)
-    simulate_faults(vehicle)
-    expire_overrides(vehicle)
+    simulate_rc_failure(vehicle)
+    if vehicle.parameters.changes != vehicle.failsafes.simulated_at:
+        vehicle.failsafes.simulated_at = vehicle.parameters.changes
+        simulate_faults(vehicle)
+    if vehicle.rc.overridden:
+        expire_overrides(vehicle)
 
 
 def simulate_faults(vehicle: Vehicle) -> None:
@@ -130,12 +132,15 @@ def expire_overrides(vehicle: Vehicle) -> None:
 
 
 def simulate_rc_failure(vehicle: Vehicle) -> None:
-    """Simulate SIM_RC_FAIL, whose values 1 and 2 both read as a throttle of 950 us."""
+    """Simulate SIM_RC_FAIL, whose values 1 and 2 both read as a throttle of 950 us, and its end."""
     throttle = vehicle.tuning.sticks.throttle
-    healthy = vehicle.rules.rc.transmitter[throttle - 1]
-    vehicle.rc.transmitter[throttle - 1] = 950 if vehicle.parameters["SIM_RC_FAIL"] else healthy
+    if vehicle.parameters["SIM_RC_FAIL"]:
+        vehicle.rc.transmitter[throttle - 1] = FAILED_THROTTLE
+    elif vehicle.rc.transmitter[throttle - 1] == FAILED_THROTTLE:
+        vehicle.rc.transmitter[throttle - 1] = vehicle.rules.rc.transmitter[throttle - 1]
 
 
+FAILED_THROTTLE = 950
 POSITIONS = (1230, 1360, 1490, 1620, 1749)
 """Upper ends of the first five positions of the mode switch [us]."""
 LOWEST, HIGHEST = 900, 2200
@@ -237,18 +242,19 @@ def read_options(
     """
     for channel in range(5, len(vehicle.rc.transmitter) + 1):
         option, pulse = round(vehicle.parameters[f"RC{channel}_OPTION"]), vehicle.rc[channel]
-        if not (UP <= pulse < HIGHEST or LOWEST < pulse <= DOWN):
+        if not LOWEST < pulse < HIGHEST:
             continue
-        up = pulse >= UP
+        position = (pulse > UP) - (pulse < DOWN)
         before = vehicle.switches.options.get(channel)
-        vehicle.switches.options[channel] = up
-        if before is None or before == up:
+        vehicle.switches.options[channel] = position
+        if before is None or before == position:
             continue
+        up, down = position > 0, position < 0
         if option == FENCE_OPTION:
             on_fence_enable(vehicle, Command(207, float(up), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, is_int=False))
         elif option == ARM_OPTION and up:
             arm(vehicle, problems, words[0], force=False)
-        elif option == ARM_OPTION:
+        elif option == ARM_OPTION and down:
             disarm(vehicle, words[1], force=False)
         elif option in modes and up:
             change_mode(vehicle, modes[option])
