@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache, partial
 from math import isfinite, nan
 
 from volery.base.errors import Refused, UsageError, VehicleError
@@ -196,8 +197,10 @@ class PX4(MavlinkDriver):
             said = [text for text in self.telemetry.texts_since(began) if OUTSIDE in text.lower()]
             return f"the autopilot refused to {ask}: {said[-1]}" if said else ""
 
+        arrived = cache(partial(arrived_at, rover=rover))
+
         def done(seen: Telemetry) -> bool:
-            there = arrived_at(goal(), rover) if turned is None else turned
+            there = arrived(goal()) if turned is None else turned
             return seen.mode == HOLD and there(seen)
 
         return Step(
