@@ -64,6 +64,8 @@ class TimelineWriter:
         self._running: dict[tuple[Any, ...], tuple[Ns, Slice]] = {}
         self._cores: dict[tuple[Any, ...], str] = {}
         self._names: dict[tuple[Any, ...], str] = {}
+        self._quoted: dict[str, str] = {}
+        self._tracks: dict[str, tuple[str, str]] = {}  # category and track of the spans of a process
         self._states: dict[tuple[str, str], Milestone] = {}
         self._last: Ns = 0
         self._writers: dict[type[Any], Callable[[Any], None]] = {
@@ -139,14 +141,14 @@ class TimelineWriter:
 
     def _activation(self, event: Activation) -> None:
         details = f'{{"deadline": {event.deadline}, {_CALLBACK}}}'
-        self._span(_ACTIVATIONS, _quote(event.component), event.released, event.finished, details)
+        self._span(_ACTIVATIONS, self._name(event.component), event.released, event.finished, details)
 
     def _message(self, event: Message) -> None:
         """Write a message that took time; lost and immediate ones do not show."""
         if event.received > event.sent:
-            ends = f'"from": {_quote(event.publisher)}, "to": {_quote(event.subscriber)}'
+            ends = f'"from": {self._name(event.publisher)}, "to": {self._name(event.subscriber)}'
             details = f'{{{ends}, "bytes": {event.size}, {_MESSAGE}}}'
-            self._span(_MESSAGES, _quote(event.topic), event.sent, event.received, details)
+            self._span(_MESSAGES, self._name(event.topic), event.sent, event.received, details)
 
     def _call(self, event: Call) -> None:
         name = f"{event.callee}.{event.operation}"
@@ -189,10 +191,12 @@ class TimelineWriter:
         """Write a span that may overlap with others: an asynchronous pair; *name* and *details* are JSON."""
         self._last = max(self._last, end)
         self._spans += 1
-        common = f'"cat":{_quote(process)},"id":{self._spans},{self._thread(process, "", process)}'
-        named = f'"name":{name}'
-        self._line(f'{{{named},"ph":"b","ts":{_microseconds(start)},{common},"args":{details}}}')
-        self._line(f'{{{named},"ph":"e","ts":{_microseconds(end)},{common}}}')
+        track = self._tracks.get(process)
+        if track is None:
+            track = self._tracks[process] = f'"cat":{_quote(process)}', self._thread(process, "", process)
+        common = f'{track[0]},"id":{self._spans},{track[1]}'
+        self._line(f'{{"name":{name},"ph":"b","ts":{_microseconds(start)},{common},"args":{details}}}')
+        self._line(f'{{"name":{name},"ph":"e","ts":{_microseconds(end)},{common}}}')
 
     def _instant(self, at: Ns, name: str, detail: str) -> None:
         self._last = max(self._last, at)
@@ -213,6 +217,13 @@ class TimelineWriter:
         self._threads[process, thread] = where
         self._line(_introduction("thread_name", where, name))
         return where
+
+    def _name(self, name: str) -> str:
+        """Return a name of the model as JSON; there are few, and they repeat."""
+        known = self._quoted.get(name)
+        if known is None:
+            known = self._quoted[name] = _quote(name)
+        return known
 
     def _line(self, line: str) -> None:
         self._lines.append(line)
