@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from math import atan2, dist, hypot, sqrt
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.frames import Vector
 from volery.base.time import Ns
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
@@ -76,7 +74,6 @@ def bearing(start: Vector, end: Vector) -> float:
     return atan2(end[1] - start[1], end[0] - start[0])
 
 
-@mypyc_attr(native_class=False)
 class ToPoint(Manoeuvre):
     """Go to a point with limited speed and hold it.
 
@@ -178,7 +175,6 @@ class TakeOff(ToPoint):
         return self.vehicle.height > self.height - CLOSE
 
 
-@mypyc_attr(native_class=False)
 class Land(Manoeuvre):
     """Descend straight down: fast while high, slowly near the ground. Without a position it descends level.
 
