@@ -3,11 +3,14 @@
 The programs in ``bench/library_programs`` take no part in the measurement of the table. As a reference the
 same programs are estimated without the table: then a library call takes no time.
 
-    python bench/library_calls.py
+    python bench/library_calls.py [--unseen]
+
+With --unseen the programs of ``bench/unseen_library_programs``, written when the table was finished.
 """
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
 from statistics import mean, median
 
@@ -15,6 +18,7 @@ from volery.calibration.timed_code import Rounds, TimedCode, measure, timed_prog
 from volery.cost import library_table, operation_table
 
 PROGRAMS = Path(__file__).with_name("library_programs")
+UNSEEN = Path(__file__).with_name("unseen_library_programs")
 SEED = 5
 
 
@@ -24,7 +28,10 @@ def shipped_ns(one: TimedCode) -> float:
 
 
 def main() -> None:
-    programs = [timed_program(file.stem, file.read_text(), SEED) for file in sorted(PROGRAMS.glob("*.py"))]
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--unseen", action="store_true")
+    folder = UNSEEN if parser.parse_args().unseen else PROGRAMS
+    programs = [timed_program(file.stem, file.read_text(), SEED) for file in sorted(folder.glob("*.py"))]
     own = timed_programs()
     measure([*own, *programs], Rounds(9, 15, 0.03))
     slowdown = median(one.median / shipped_ns(one) for one in own)
