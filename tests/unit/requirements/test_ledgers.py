@@ -181,6 +181,16 @@ def test_landed_is_disarmed_and_at_rest(speed: float, armed: bool, landed: bool)
     assert ledger.record().landed is landed
 
 
+def test_energy_that_no_reading_gives_is_not_zero() -> None:
+    ledger = VehicleLedger(VehicleSetup("d"))
+    ledger.state(state(0, volts=nan))
+    ledger.state(state(S, volts=nan))
+    assert ledger.record().energy_j is None
+    ledger.state(state(2 * S, volts=10.0, amperes=0.0))
+    ledger.state(state(3 * S, volts=10.0, amperes=0.0))
+    assert ledger.record().energy_j == 0.0
+
+
 def test_operations_of_a_vehicle() -> None:
     done = Operation(S, 3 * S, "d", "goto", "there", "ok", "", 0.2, -0.4, nan, 0.1)
     ledger = VehicleLedger(VehicleSetup("d"), operations=[done])

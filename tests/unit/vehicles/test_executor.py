@@ -92,8 +92,8 @@ class Rig:
     def sets(self, seconds: float, **values: Any) -> None:
         self.at(seconds, lambda: [setattr(self.seen, name, value) for name, value in values.items()])
 
-    def says(self, seconds: float, text: str) -> None:
-        self.at(seconds, lambda: self.seen.texts.append(StatusText(self.kernel.now(), 4, text)))
+    def says(self, seconds: float, text: str, severity: int = 4) -> None:
+        self.at(seconds, lambda: self.seen.texts.append(StatusText(self.kernel.now(), severity, text)))
 
     def answers(self, seconds: float, key: str, accepted: bool, result: str = "DENIED") -> None:
         answer = Answer(round(seconds * S), accepted, result)
@@ -189,6 +189,14 @@ def test_the_refusal_of_a_command_quotes_the_text_that_follows(rig: Rig) -> None
     with pytest.raises(Refused, match=r"refused to go \(DENIED\): PreArm: compass; wait for a fix"):
         rig.execute(rig.step(answer="400", advice="wait for a fix"))
     assert rig.kernel.now() >= 1500 * MS
+
+
+def test_a_refusal_quotes_notices_and_no_information(rig: Rig) -> None:
+    rig.answers(1.0, "400", accepted=False)
+    rig.says(1.1, "Mission: 3 WP", severity=6)
+    rig.says(1.2, "Throttle not zero", severity=5)
+    with pytest.raises(Refused, match=r"refused to go \(DENIED\): Throttle not zero$"):
+        rig.execute(rig.step(answer="400"))
 
 
 def test_a_refusal_without_a_text_says_so(rig: Rig) -> None:
