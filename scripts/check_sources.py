@@ -172,7 +172,7 @@ def uncompilable(source: str, callables: frozenset[str] = frozenset()) -> Iterat
     """
     tree = ast.parse(source)
     for line in (line for node in tree.body if isinstance(node, ast.ClassDef) for line in _overridable(node)):
-        yield line, "what a subclass in Python sets instead is not read; native_class=False"
+        yield line, "what a subclass in plain Python sets instead is not read; do not compile it"
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
             marks = {ast.unparse(one) for one in node.decorator_list}

@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping
 from math import degrees, nan
 from typing import Any
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.errors import UsageError
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns
@@ -46,7 +44,6 @@ RC_CHANNELS = 18
 """Channels in RC_CHANNELS."""
 
 
-@mypyc_attr(native_class=False)
 class TelemetryDecoder(ABC):
     """Decodes MAVLink messages into telemetry.
 

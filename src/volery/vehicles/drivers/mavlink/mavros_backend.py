@@ -15,8 +15,6 @@ from collections.abc import Callable, Mapping, Sequence
 from math import degrees, isnan, nan, radians
 from typing import Any, NamedTuple
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.errors import LinkError, LinkSilent
 from volery.base.frames import (
     attitude_enu_to_ned,
@@ -206,7 +204,6 @@ class MavrosDecoder:
         self._telemetry.mission_reached = message.wp_seq
 
 
-@mypyc_attr(native_class=False)
 class MavrosBackend:
     """See ``Backend``. The constructor joins the graph, which takes execution time of the calling task.
 
