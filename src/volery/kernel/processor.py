@@ -16,22 +16,18 @@ slices of the job contain. Prices are the caller's: a processor does not know wh
 
 from __future__ import annotations
 
-from bisect import insort
+from bisect import bisect, insort
 from functools import partial
 from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns
 from volery.kernel.task import NO_DEADLINE, ExecutionContext, Task
-from volery.kernel.virtual import FOREVER, NEVER, VirtualKernel
-from volery.trace.events import Preemption, Slice
+from volery.kernel.virtual import FOREVER, NEVER, VOID, Timer, VirtualKernel
+from volery.trace.events import Preemption, Slice, ignore
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    from volery.kernel.api import Handle
-
-NO_CORE = -1
 
 QUANTUM: Ns = 10 * MS
 """Default time slice of round-robin."""
@@ -51,7 +47,7 @@ class Job:
 
     __slots__ = (
         "arrival", "component", "core", "deadline", "done", "name",
-        "owner", "priority", "remaining", "started", "timer", "turn_ends",
+        "owner", "priority", "remaining", "started", "turn_ends",
     )  # fmt: skip
 
     def __init__(
@@ -67,14 +63,32 @@ class Job:
         self.priority, self.deadline = priority, deadline
         self.remaining = remaining
         self.arrival = 0
-        self.core = NO_CORE
+        self.core: Core | None = None
         self.started: Ns = 0
         self.turn_ends: Ns = 0
-        self.timer: Handle | None = None
         self.done = False
 
 
+class Core:
+    """One core: what it executes, whom it served last, and the timer that ends the job or its turn."""
+
+    __slots__ = ("job", "last", "number", "timer")
+
+    def __init__(self, number: int, timer: Timer) -> None:
+        self.number, self.timer = number, timer
+        self.job: Job | None = None
+        self.last: Task | ExecutionContext | None = None
+
+
 Order = tuple[int, ...]
+
+
+def _number(core: Core) -> int:
+    return core.number
+
+
+def _nothing() -> None:
+    """Do nothing; the action of a timer before its own is known."""
 
 
 def _by_priority(job: Job) -> Order:
@@ -135,16 +149,22 @@ class Processor:
         self._quantum = quantum if scheduler == "round-robin" else FOREVER
         self._context_switch = context_switch
         self._jobs: list[Job] = []  # in order; the first `cores` of them run
-        self._free = list(range(cores))
-        self._last: list[Task | ExecutionContext | None] = [None] * cores  # last owner of each core
+        self._orders: list[Order] = []  # of the jobs
+        self._cores = [self._core(number) for number in range(cores)]
+        self._free = list(self._cores)  # by number
         self._background: dict[ExecutionContext, Job] = {}
         self._arrivals = 0
         self._busy: Ns = 0
         self._halted = False
 
+    def _core(self, number: int) -> Core:
+        core = Core(number, Timer(_nothing, VOID))
+        core.timer.action = partial(self._expire, core)
+        return core
+
     def busy_ns(self, now: Ns) -> Ns:
         """Return the busy time until `now`, summed over the cores, ns."""
-        return self._busy + sum(now - job.started for job in self._jobs if job.core != NO_CORE)
+        return self._busy + sum(now - core.job.started for core in self._cores if core.job is not None)
 
     # -- requests
 
@@ -154,12 +174,14 @@ class Processor:
             return
         component = task.contexts[-1].component
         if not self._jobs and not self._halted:  # no job competes, and perhaps no event is due before the end
-            total = amount if self._last[0] is task else amount + self._context_switch
+            core = self._cores[0]
+            total = amount if core.last is task else amount + self._context_switch
             start = self._kernel.skip(total)
             if start != NEVER:
-                self._last[0] = task
+                core.last = task
                 self._busy += total
-                self._kernel.record(Slice(start, start + total, self.name, 0, task.name, component))
+                if self._kernel.record is not ignore:
+                    self._kernel.record(Slice(start, start + total, self.name, 0, task.name, component))
                 return
         job = Job(task, task.name, component, task.priority, amount, task.deadline)
         self._admit(job)
@@ -184,17 +206,15 @@ class Processor:
             self._admit(job)
         else:
             job.remaining += amount
-            if job.core != NO_CORE:
-                self._set_timer(job)
+            if job.core is not None:
+                self._set_timer(job, job.core)
 
     def halt(self) -> None:
         """Stop executing: no job progresses until `resume`."""
         self._halted = True
-        for job in list(self._jobs):
-            if job.core != NO_CORE:
-                self._stop(job)
-                if job.remaining == 0:  # it would have ended at this instant
-                    self._complete(job)
+        for core in self._cores:
+            if core.job is not None:
+                self._displace(core.job, core)
 
     def resume(self) -> None:
         """Execute again, from where `halt` stopped."""
@@ -206,80 +226,83 @@ class Processor:
     def _admit(self, job: Job) -> None:
         self._arrivals += 1
         job.arrival = self._arrivals
-        if self._jobs:
-            insort(self._jobs, job, key=self._order)
-        else:
-            self._jobs.append(job)
+        order = self._order(job)
+        at = bisect(self._orders, order)
+        self._orders.insert(at, order)
+        self._jobs.insert(at, job)
         if len(self._jobs) > self.cores:
-            self._preempt(job.name)
+            last = self._jobs[
+                self.cores
+            ]  # the only one that may have a core and is no longer among the first
+            core = last.core
+            if core is not None and not self._displace(last, core) and self._kernel.record is not ignore:
+                now = self._kernel.now()
+                self._kernel.record(Preemption(now, self.name, core.number, last.name, job.name))
         self._dispatch()
 
-    def _preempt(self, urgent: str) -> None:
-        """Stop the jobs that have a core but are no longer among the first; job `urgent` has arrived."""
-        for job in self._jobs[self.cores :]:
-            if job.core != NO_CORE:
-                core = job.core
-                self._stop(job)
-                if job.remaining == 0:  # it would have ended at this instant
-                    self._complete(job)
-                else:
-                    self._kernel.record(Preemption(self._kernel.now(), self.name, core, job.name, urgent))
+    def _displace(self, job: Job, core: Core) -> bool:
+        """Take the core from a job; return whether the job is done, as it would have been at this instant."""
+        self._stop(job, core)
+        if job.remaining == 0:
+            self._complete(job)
+        return job.done
 
     def _dispatch(self) -> None:
         if self._halted:
             return
         for job in self._jobs[: self.cores]:
-            if job.core == NO_CORE:
-                self._start(job)
+            if job.core is None:
+                self._start(job, self._free.pop(0))
 
-    def _start(self, job: Job) -> None:
-        job.core = min(self._free)
-        self._free.remove(job.core)
-        if self._last[job.core] is not job.owner:
-            self._last[job.core] = job.owner
+    def _start(self, job: Job, core: Core) -> None:
+        job.core, core.job = core, job
+        if core.last is not job.owner:
+            core.last = job.owner
             job.remaining += self._context_switch
         job.started = self._kernel.now()
         job.turn_ends = job.started + self._quantum
-        self._set_timer(job)
+        self._set_timer(job, core)
 
-    def _set_timer(self, job: Job) -> None:
-        if job.timer is not None:
-            job.timer.cancel()
+    def _set_timer(self, job: Job, core: Core) -> None:
+        """Let the timer expire at the end of the job or of its turn, whichever comes first."""
         ends = job.started + job.remaining
-        if ends <= job.turn_ends:
-            job.timer = self._kernel.call_at(ends, partial(self._finish, job))
-        else:
-            job.timer = self._kernel.call_at(job.turn_ends, partial(self._end_turn, job))
+        self._kernel.set_timer(core.timer, ends if ends <= job.turn_ends else job.turn_ends)
 
-    def _stop(self, job: Job) -> None:
+    def _stop(self, job: Job, core: Core) -> None:
         now = self._kernel.now()
-        if job.timer is not None:
-            job.timer.cancel()
+        core.timer.ticket = VOID
         if now > job.started:
             job.remaining -= now - job.started
             self._busy += now - job.started
-            self._kernel.record(Slice(job.started, now, self.name, job.core, job.name, job.component))
-        self._free.append(job.core)
-        job.core = NO_CORE
+            if self._kernel.record is not ignore:
+                name, component = job.name, job.component
+                self._kernel.record(Slice(job.started, now, self.name, core.number, name, component))
+        insort(self._free, core, key=_number)
+        job.core = core.job = None
 
-    def _end_turn(self, job: Job) -> None:
-        if len(self._jobs) <= self.cores:  # no other job waits
+    def _expire(self, core: Core) -> None:
+        """End the job of a core, or its turn if other jobs wait for a core."""
+        job = core.job
+        if job is None:
+            return
+        if job.started + job.remaining <= self._kernel.now():
+            self._stop(job, core)
+            self._complete(job)
+            self._dispatch()
+        elif len(self._jobs) <= self.cores:
             job.turn_ends += self._quantum
-            self._set_timer(job)
+            self._set_timer(job, core)
         else:
-            self._stop(job)
-            self._jobs.remove(job)
+            self._stop(job, core)
+            self._forget(job)
             self._admit(job)
 
-    def _finish(self, job: Job) -> None:
-        job.timer = None  # it has just fired
-        self._stop(job)
-        self._complete(job)
-        if self._jobs:
-            self._dispatch()
+    def _forget(self, job: Job) -> None:
+        at = self._jobs.index(job)
+        del self._jobs[at], self._orders[at]
 
     def _complete(self, job: Job) -> None:
-        self._jobs.remove(job)
+        self._forget(job)
         job.done = True
         if isinstance(job.owner, Task):
             self._kernel.wake(job.owner)
@@ -288,7 +311,7 @@ class Processor:
 
     def _abandon(self, job: Job) -> None:
         """Drop a job whose task has been cancelled: the rest is not executed."""
-        if job.core != NO_CORE:
-            self._stop(job)
-        self._jobs.remove(job)
+        if job.core is not None:
+            self._stop(job, job.core)
+        self._forget(job)
         self._dispatch()

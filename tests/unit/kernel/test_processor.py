@@ -14,7 +14,7 @@ from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext, Scope
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import current_task, executing_in
-from volery.trace.events import Event, Preemption
+from volery.trace.events import Event, Preemption, Slice
 
 Slices = Callable[[], list[tuple[float, float, str, str]]]
 
@@ -486,3 +486,38 @@ def test_background_computing_without_a_priority_has_the_least(
     compute(virtual, core, "task", at=1, ms=2, priority=1)
     virtual.run(S)
     assert slices() == [(0, 1, "cpu.0", "node"), (1, 3, "cpu.0", "task"), (3, 6, "cpu.0", "node")]
+
+
+def test_an_error_of_a_listener_within_a_timer_ends_the_run_and_leaves_the_kernel_usable() -> None:
+    errors = [OSError("no space left on device")]
+
+    def refuse(event: Event) -> None:
+        if isinstance(event, Slice) and event.task == "high" and errors:
+            raise errors.pop()
+
+    kernel = VirtualKernel(refuse)
+    core = Processor(kernel, "cpu")
+    compute(kernel, core, "low", at=0, ms=10, priority=1)
+    compute(kernel, core, "high", at=4, ms=3, priority=2)
+    with pytest.raises(OSError, match="no space"):
+        kernel.run(S)
+    assert kernel.now() == 7 * MS
+    kernel.close()
+
+
+def test_a_run_that_a_listener_cancels_within_a_timer_stops_there() -> None:
+    slices = []
+
+    def listen(event: Event) -> None:
+        slices.append(event)
+        if isinstance(event, Slice) and event.task == "high":
+            kernel.cancel(kernel.root, "enough")
+
+    kernel = VirtualKernel(listen)
+    core = Processor(kernel, "cpu")
+    compute(kernel, core, "low", at=0, ms=10, priority=1)
+    compute(kernel, core, "high", at=4, ms=3, priority=2)
+    kernel.run(S)
+    assert kernel.now() == 7 * MS
+    assert [event.task for event in slices if isinstance(event, Slice)] == ["low", "high"]
+    kernel.close()
