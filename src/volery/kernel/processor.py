@@ -173,15 +173,17 @@ class Processor:
         if amount <= 0:
             return
         component = task.contexts[-1].component
-        if not self._jobs and not self._halted:  # no job competes, and perhaps no event is due before the end
-            core = self._cores[0]
+        if self._free and not self._halted:  # no job competes, and perhaps no event is due before the end
+            core = self._free[0]
             total = amount if core.last is task else amount + self._context_switch
             start = self._kernel.skip(total)
             if start != NEVER:
                 core.last = task
                 self._busy += total
                 if self._kernel.record is not ignore:
-                    self._kernel.record(Slice(start, start + total, self.name, 0, task.name, component))
+                    self._kernel.record(
+                        Slice(start, start + total, self.name, core.number, task.name, component)
+                    )
                 return
         job = Job(task, task.name, component, task.priority, amount, task.deadline)
         self._admit(job)
