@@ -1,0 +1,50 @@
+"""Gains of a flight under a law as parameters of a node on real ROS 2, changed by plain rclpy in flight."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from volery.trace.events import ControlSample, Text
+from volery.trace.reader import read
+
+from .conftest import HERE, python_of, surroundings
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(120)]
+
+FLIGHT = "from volery.cli.main import main; raise SystemExit(main())"
+LIMIT_S = 100
+
+
+def test_a_gain_that_rclpy_sets_is_used_in_flight(tmp_path: Path) -> None:
+    domain, out = 20 + os.getpid() % 180, tmp_path / "run"
+    python, environment = python_of("jazzy"), surroundings(domain)
+    arguments = ["go", "rotation", "--graph", "ros2", "--angle", "0", "--angle", "30", "--hold", "10"]
+    arguments += ["--on", "sim:ardupilot?start=warm", "--speed", "3", "--out", str(out)]
+    flight = subprocess.Popen(
+        [python, "-c", FLIGHT, *arguments], env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
+    try:
+        tuner = subprocess.run(
+            [python, str(HERE / "rclpy_parameters.py"), "/volery_go", "yaw.kp", "1.5"],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=LIMIT_S,
+            check=False,
+        )
+        assert tuner.returncode == 0, tuner.stderr[-2000:]
+        assert float(tuner.stdout) == 2.2
+        said, _ = flight.communicate(timeout=LIMIT_S)
+        assert flight.returncode == 0, said[-2000:]
+    finally:
+        flight.kill()
+        flight.communicate()
+    events = list(read(out / "trace.mcap").events)
+    assert any("are in use" in one.text for one in events if isinstance(one, Text))
+    last = [one for one in events if isinstance(one, ControlSample) and one.loop == "yaw"][-1]
+    assert last.goal == 30.0
+    assert last.proportional == pytest.approx(1.5 * last.error, rel=1e-6)
