@@ -14,7 +14,10 @@ pytestmark = [pytest.mark.integration, pytest.mark.timeout(1200)]
 ROOT = Path(__file__).parents[2]
 RUNS = (
     ("simulate", "examples/starter", "--seed", "3"),
-    ("fly", "examples/mission.py", "--on", "sim:ardupilot", "--seed", "3"),
+    *(
+        ("fly", "examples/mission.py", "--on", f"sim:{autopilot}", "--seed", "3")
+        for autopilot in ("ardupilot", "px4", "paparazzi", "dji")
+    ),
 )
 COMMAND = "from volery.cli.main import main; main()"
 WHICH = "import volery.kernel.virtual as a, volery.requirements.ledgers as b; print(a.__file__, b.__file__)"
