@@ -22,6 +22,7 @@ from volery.bridge.node_interface import (
     stamped,
 )
 from volery.links.link import Frame
+from volery.links.mavlink_messages import mission_type
 from volery.ros.messages import new, service
 
 ANSWERED_WITHIN: Ns = 1500 * MS
@@ -127,7 +128,7 @@ class PlanServices:
     def _next(self, answers: FrameSubscription, within: Ns) -> Frame | None:
         """Return the next frame about this list."""
         answer = answers.next(within)
-        while answer is not None and answer.fields.get("mission_type", 0) != self._plan.kind:
+        while answer is not None and mission_type(answer.fields) != self._plan.kind:
             answer = answers.next(within)
         return answer
 

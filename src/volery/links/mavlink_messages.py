@@ -259,6 +259,29 @@ def constant(name: str) -> int:
     return value
 
 
+_LIST_OF = {
+    constant(f"MAV_CMD_NAV_{name}"): constant(f"MAV_MISSION_TYPE_{kind}")
+    for name, kind in (
+        ("FENCE_RETURN_POINT", "FENCE"),
+        ("FENCE_POLYGON_VERTEX_INCLUSION", "FENCE"),
+        ("FENCE_POLYGON_VERTEX_EXCLUSION", "FENCE"),
+        ("FENCE_CIRCLE_INCLUSION", "FENCE"),
+        ("FENCE_CIRCLE_EXCLUSION", "FENCE"),
+        ("RALLY_POINT", "RALLY"),
+    )
+}
+
+
+def mission_type(fields: Mapping[str, Any]) -> int:
+    """Return the MAV_MISSION_TYPE of a message of a plan.
+
+    PX4 1.14 sends the items of its fence and its rally points without it: they are recognised by their
+    command.
+    """
+    stated: int = fields.get("mission_type", 0)
+    return stated or _LIST_OF.get(fields.get("command", 0), 0)
+
+
 @cache
 def entry_name(enumeration: str, value: int) -> str:
     """Return the name of *value* without the prefix: ``entry_name("MAV_RESULT", 4)`` is ``FAILED``.

@@ -324,6 +324,10 @@ def test_a_fence_is_stored_and_a_reposition_beyond_it_is_not_flown(bench: Any) -
     rig.send("MISSION_REQUEST_LIST", target_system=1, target_component=1, mission_type=1)
     rig.run(0.1)
     assert (rig.latest["MISSION_COUNT"]["count"], rig.latest["MISSION_COUNT"]["mission_type"]) == (4, 1)
+    rig.send("MISSION_REQUEST_INT", target_system=1, target_component=1, seq=1, mission_type=1)
+    rig.run(0.1)
+    item = rig.latest["MISSION_ITEM_INT"]
+    assert (item["seq"], item["command"], item["mission_type"]) == (1, 5001, 0)  # as the original: no type
     there = {"y": round(longitude * 1e7), "z": amsl, "param4": nan}
     for north, flown in ((6e-4, False), (2e-4, True)):
         target = round((latitude + north) * 1e7)

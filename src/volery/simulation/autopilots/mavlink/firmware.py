@@ -17,6 +17,11 @@ from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction, do_nothing
 
 
+def _always(*_question: object) -> bool:
+    """Return True: the default of permissions."""
+    return True
+
+
 def _never(*_question: object) -> bool:
     """Return False: the default of conditions."""
     return False
@@ -143,6 +148,8 @@ class CommandPolicy:
     """MAV_RESULT of a command for another system or component; ``None``: no answer, and the component is
     ignored.
     """
+    accepts: Callable[[Vehicle, str, int], bool] = _always
+    """Whether a message, by its name and the system that sends it, is handled at all."""
     reads_nan: bool = False
     """Whether a NaN parameter of a command means that the parameter is not given."""
 
@@ -166,6 +173,8 @@ class MissionPolicy:
     """The same as ``stored_item`` for the points of the fence and for rally points, by MAV_MISSION_TYPE;
     ``None``: they are not supported.
     """
+    names_lists: bool = True
+    """Whether items of the fence and rally points are sent with their MAV_MISSION_TYPE."""
     points_changed: Callable[[Vehicle, int], None] = _ignore
     """Called after such a list has changed, with its MAV_MISSION_TYPE."""
     writes_parts: bool = False

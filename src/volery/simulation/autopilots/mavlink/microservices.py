@@ -452,7 +452,7 @@ class MissionService:
             x=x,
             y=y,
             z=item.z,
-            mission_type=kind,
+            mission_type=kind if self._firmware.missions.names_lists else MISSION,
         )
 
     # -- the rest

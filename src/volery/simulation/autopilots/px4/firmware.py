@@ -229,6 +229,7 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
             ),
             stored_item=mission.stored_item,
             stored_point=failsafes.stored_fence_point,
+            names_lists=False,
         ),
         parameters=PARAMETERS,
         texts=TEXTS,

@@ -15,7 +15,7 @@ from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.kernel.waiting import Lock, Signal
 from volery.links.link import Frame
-from volery.links.mavlink_messages import constant, entry_name, from_bytewise, to_bytewise
+from volery.links.mavlink_messages import constant, entry_name, from_bytewise, mission_type, to_bytewise
 from volery.vehicles.rtcm import correction_parts
 from volery.vehicles.services import Item, LogEntry, Parameter, mavlink_parameter_name
 from volery.vehicles.telemetry import Telemetry
@@ -245,7 +245,7 @@ class MavlinkServices:
 
         def counted(frame: Frame) -> int | None:
             _refuse_list(self._name, frame, kind)
-            mine = frame.name == "MISSION_COUNT" and _kind(frame) == kind
+            mine = frame.name == "MISSION_COUNT" and mission_type(frame.fields) == kind
             return int(frame.fields["count"]) if mine else None
 
         with self._kernel.joined(), self._plan_lock:
@@ -262,7 +262,11 @@ class MavlinkServices:
         def item(frame: Frame) -> Item | None:
             _refuse_list(self._name, frame, kind)
             fields = frame.fields
-            if frame.name != "MISSION_ITEM_INT" or _kind(frame) != kind or fields["seq"] != number:
+            if (
+                frame.name != "MISSION_ITEM_INT"
+                or mission_type(frame.fields) != kind
+                or fields["seq"] != number
+            ):
                 return None
             parameters = (fields["param1"], fields["param2"], fields["param3"], fields["param4"])
             place = fields["x"] / 1e7, fields["y"] / 1e7
@@ -277,7 +281,7 @@ class MavlinkServices:
         asked = f"store {len(items)} items of its {_LISTS[kind]}"
 
         def answer(frame: Frame) -> bool | None:
-            if _kind(frame) != kind:
+            if mission_type(frame.fields) != kind:
                 return None
             if frame.name in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
                 number = frame.fields["seq"]
@@ -380,14 +384,9 @@ class _Listening:
 _LISTS = {0: "mission", 1: "geofence", 2: "rally points"}
 
 
-def _kind(frame: Frame) -> int:
-    kind: int = frame.fields.get("mission_type", 0)
-    return kind
-
-
 def _refuse_list(name: str, frame: Frame, kind: int, asked: str = "") -> None:
     """Raise if *frame* is the refusal of a list of that kind."""
-    if frame.name != "MISSION_ACK" or _kind(frame) != kind or frame.fields["type"] == 0:
+    if frame.name != "MISSION_ACK" or mission_type(frame.fields) != kind or frame.fields["type"] == 0:
         return
     result = entry_name("MAV_MISSION_RESULT", frame.fields["type"]).removeprefix("MAV_MISSION_")
     if result == "UNSUPPORTED":
