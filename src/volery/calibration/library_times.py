@@ -95,6 +95,14 @@ def snippets() -> Iterator[Snippet]:
 def _arrays(generator: np.random.Generator) -> Iterator[Snippet]:
     for side in SIDES:
         row = generator.random(side * side)
+        fitted = (np.linspace(-1.0, 1.0, max(row.size, 5)), np.resize(row, max(row.size, 5)))
+        yield Snippet("numpy.interp", "elements", np.interp, (row, *fitted))
+        yield Snippet("numpy.polyfit", "elements", np.polyfit, (*fitted, 3))
+        yield Snippet("numpy.polyval", "elements", np.polyval, ((0.1, 0.2, 0.3, 0.4), row))
+        yield Snippet("numpy.rfft", "elements", np.fft.rfft, (row,))
+        yield Snippet("numpy.fft", "elements", np.fft.fft, (row,))
+        for name in ("column_stack", "stack", "vstack", "hstack"):
+            yield Snippet(f"numpy.{name}", "elements", getattr(np, name), ([row, row],))
         for name in ("sort", "argsort", "median"):
             yield Snippet(f"numpy.{name}", "elements", getattr(np, name), (row,))
         yield Snippet("numpy.nonzero", "elements", np.nonzero, (row > 0.99,))
@@ -107,6 +115,7 @@ def _arrays(generator: np.random.Generator) -> Iterator[Snippet]:
         for name in _BINARY:
             yield Snippet(_key(getattr(np, name)), "elements", getattr(np, name), (array, other))
         yield Snippet("numpy.operator", "elements", lambda a, b: a * b, (array, other))
+        yield Snippet("numpy.remainder", "elements", lambda a, b: a % b, (array, other))
         yield Snippet("numpy.where", "elements", np.where, (array > 1.0, array, other))
         yield Snippet("numpy.clip", "elements", np.clip, (array, 0.2, 0.8))
         yield Snippet("numpy.concatenate", "elements", lambda a: np.concatenate((a, a)), (array,))
@@ -143,6 +152,8 @@ def _linear_algebra(generator: np.random.Generator) -> Iterator[Snippet]:
             function = getattr(np.linalg, name)
             given = (matrix, matrix[0]) if name == "solve" else (matrix,)
             yield Snippet(f"numpy.{name}", "cube", function, given)
+        tall = generator.random((8 * side, side))
+        yield Snippet("numpy.lstsq", "elements", np.linalg.lstsq, (tall, tall[:, 0]))
         yield Snippet("numpy.eye", "elements", np.eye, (side,))
         yield Snippet("numpy.outer", "elements", np.outer, (matrix[0], matrix[0]))
 
@@ -165,8 +176,9 @@ def _texts() -> Iterator[Snippet]:
         assert hit is not None
         yield Snippet("re.groups", "text", hit.groups, ())
         yield Snippet("re.group", "text", hit.group, (1,))
-        yield Snippet("zlib.compress", "text", zlib.compress, (data,))
-        yield Snippet("zlib.decompress", "text", lambda d: zlib.decompress(zlib.compress(d)), (data,))
+        packed = zlib.compress(text.encode())
+        yield Snippet("zlib.compress", "text", zlib.compress, (text.encode(),))
+        yield Snippet("zlib.decompress", "text", zlib.decompress, (packed,))
         yield Snippet("zlib.crc32", "text", zlib.crc32, (data,))
         yield Snippet("hashlib.*", "text", lambda d: hashlib.sha256(d).digest(), (data,))
         yield Snippet("pickle.dumps", "text", pickle.dumps, (rows,))

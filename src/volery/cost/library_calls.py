@@ -35,6 +35,11 @@ OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
 }  # fmt: skip
 """Functions of the operators that pass through, by the name of the syntax node."""
 
+ENTRIES: Mapping[str, str] = {
+    "MatMult": "numpy.matmul", "Subscript": "numpy.subscript", "Pow": "numpy.power", "Mod": "numpy.remainder",
+}  # fmt: skip
+"""Entries of operators on arrays that differ from that of all others."""
+
 SIZES = ("elements", "bytes", "products", "cube", "text")
 """Meanings of a size: elements of the largest array among arguments and result; their bytes; multiplications
 of a matrix product; elements of a matrix to the power of 1.5; length of the argument or result as text."""
@@ -205,9 +210,7 @@ class LibraryCalls:
         return {name: self._operator(name, function) for name, function in OPERATORS.items()}
 
     def _operator(self, name: str, function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-        key = {"MatMult": "numpy.matmul", "Subscript": "numpy.subscript", "Pow": "numpy.power"}.get(
-            name, "numpy.operator"
-        )
+        key = ENTRIES.get(name, "numpy.operator")
 
         def operate(left: Any, right: Any) -> Any:
             result = function(left, right)
