@@ -258,3 +258,10 @@ def test_what_the_application_notes_is_counted_once_for_each_subject():
 def test_a_note_needs_a_kind_and_a_state(expression):
     with pytest.raises(UsageError):
         make_observer(expression)
+
+
+def test_the_quantity_of_an_unknown_subject_says_what_it_is() -> None:
+    of_a_vehicle = next(one.quantity for one in OBSERVABLES if one.subject == "vehicle")
+    make_observer(f"somebody.{of_a_vehicle}")
+    with pytest.raises(UsageError, match="a component has no quantity 'nonsense'"):
+        make_observer("somebody.nonsense")
