@@ -16,6 +16,7 @@ from typing import NamedTuple, Protocol
 from volery.base.errors import UsageError
 from volery.control.laws import PidGains, PidLaw
 from volery.control.link_failsafes import BY_STICKS
+from volery.control.turn_prediction import TurnModel, TurnPrediction
 from volery.trace.events import Text
 from volery.vehicles import Drone
 from volery.vehicles.telemetry import HALF_US, MIDDLE_US
@@ -33,7 +34,10 @@ class Command(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """What a law sees: heading in degrees, position in m about home, velocity in m/s; NaN where unknown."""
+    """What a law sees: heading in degrees, position in m about home, velocity in m/s; NaN where unknown.
+
+    ``lead`` is the turn in degrees that is still to come by the commands already given.
+    """
 
     heading: float
     north: float
@@ -42,10 +46,16 @@ class Measured(NamedTuple):
     velocity_north: float
     velocity_east: float
     velocity_up: float
+    lead: float = 0.0
 
 
 class Actuation(Protocol):
     """Applies commands to a drone."""
+
+    @property
+    def lead(self) -> float:
+        """Turn in degrees that is still to come by the commands already given; 0 where it is not modelled."""
+        return 0.0
 
     def take_off(self, height: float) -> None:
         """Arm and climb to *height* m above home; blocks until it is there."""
@@ -57,7 +67,7 @@ class Actuation(Protocol):
         """Send one command."""
 
 
-class VelocitySetpoints:
+class VelocitySetpoints(Actuation):
     """Velocity set-points in the mode in which the autopilot follows a computer.
 
     Args:
@@ -67,17 +77,30 @@ class VelocitySetpoints:
 
     def __init__(self, drone: Drone, lasting: float = 1.0) -> None:
         self._drone, self._lasting = drone, lasting
+        self._turning = TurnPrediction(None)
+
+    @property
+    def lead(self) -> float:
+        """Turn in degrees that is still to come."""
+        return self._turning.lead
 
     def take_off(self, height: float) -> None:
         """Take off by the autopilot's own take-off."""
         self._drone.takeoff(height)
+        self._model_turns()
 
     def engage(self) -> None:
         """Stop where it is."""
         self._drone.hold()
+        self._model_turns()
+
+    def _model_turns(self) -> None:
+        scale = RC_SCALES.get(self._drone.telemetry.autopilot)
+        self._turning = TurnPrediction(scale.turning if scale is not None else None)
 
     def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
         """Send a velocity and a turn rate."""
+        self._turning.command(command.yaw_rate, sample_s)
         self._drone.set_velocity(*command, lasting=self._lasting)
 
 
@@ -124,15 +147,19 @@ class RcScale(NamedTuple):
     turn: RcAxis
     most_tilt: float
     """Tilt angle that the laws use at most, degrees."""
+    turning: TurnModel | None = None
+    """How the autopilot follows a turn rate by its yaw channel; ``None`` is not modelled."""
 
 
 RC_SCALES: Mapping[str, RcScale] = {
+    # ATC_ACCEL_Y_MAX 270; the loops as fitted to a log of ArduCopter on its own simulator's quadrotor
     # RCn_DZ 20 us, THR_DZ 100, ANGLE_MAX 30 degrees, PILOT_SPEED_UP 2.5 m/s, PILOT_Y_RATE 202.5 degrees/s
     "ArduPilot": RcScale(
         RcAxis(480.0 / 30.0, dead=20.0),
         RcAxis(400.0 / 2.5, dead=100.0),
         RcAxis(480.0 / 202.5, dead=20.0),
         20.0,
+        TurnModel(acceleration=270.0, delay_s=0.09, frequency=5.0, damping=0.3),
     ),
     # MPC_HOLD_DZ 0.1, MPC_MAN_TILT_MAX 35 degrees, MPC_Z_VEL_MAX_UP 3 m/s, MPC_MAN_Y_MAX 150 degrees/s
     "PX4": RcScale(
@@ -180,7 +207,7 @@ THROTTLE = 3
 WARNING = 4
 
 
-class RcOverride:
+class RcOverride(Actuation):
     """RC channels overridden in altitude hold.
 
     The velocity loop on this side turns velocities into tilt angles; the autopilot levels, holds the height
@@ -198,6 +225,12 @@ class RcOverride:
         self._drone = drone
         self._scale = scale
         self._loop = _TiltLoop(gains)
+        self._turning = TurnPrediction(None)
+
+    @property
+    def lead(self) -> float:
+        """Turn in degrees that is still to come."""
+        return self._turning.lead
 
     @property
     def scale(self) -> RcScale:
@@ -219,6 +252,7 @@ class RcOverride:
     def engage(self) -> None:
         """Enter altitude hold with centred sticks; a transmitter whose throttle stick is low is recorded."""
         self._loop.reset()
+        self._turning = TurnPrediction(self.scale.turning)
         drone, channels = self._drone, self._drone.telemetry.rc
         own = channels[THROTTLE - 1] if len(channels) >= THROTTLE else 0
         if LOW_THROTTLE[0] <= own < LOW_THROTTLE[1]:
@@ -233,6 +267,7 @@ class RcOverride:
         scale = self.scale
         forward, right = self._loop.tilt(command, measured, sample_s, scale.most_tilt)
         throttle = (scale.climb.position(command.up) + 1.0) / 2.0
+        self._turning.command(command.yaw_rate, sample_s)
         pitch, roll = scale.tilt.position(forward), scale.tilt.position(right)
         self._drone.manual_control(pitch, roll, throttle, scale.turn.position(command.yaw_rate))
 
@@ -246,7 +281,7 @@ THRUST_GAINS = PidGains(kp=0.12, ki=0.08, low=-0.3, high=0.3)
 MOST_TILT = 20.0
 
 
-class AttitudeSetpoints:
+class AttitudeSetpoints(Actuation):
     """Attitude set-points: tilt angles of the velocity loop, thrust and turn rate.
 
     Args:
@@ -290,4 +325,4 @@ def thesis_scale(trim: float = 1480.0) -> RcScale:
     Args:
         trim: pulse width of the yaw channel at an output of 0, µs.
     """
-    return RC_SCALES["ArduPilot"]._replace(turn=RcAxis(1.0, trim=trim))
+    return RC_SCALES["ArduPilot"]._replace(turn=RcAxis(1.0, trim=trim), turning=None)

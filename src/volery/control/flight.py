@@ -289,7 +289,7 @@ class ControlledFlight:
             here = seen.position
             east, north, _ = self._frame.to_enu(here.latitude, here.longitude, here.altitude.metres)
         heading = seen.attitude.heading if not seen.stale else nan
-        return Measured(heading, north, east, seen.above_home, *seen.velocity)
+        return Measured(heading, north, east, seen.above_home, *seen.velocity, self._actuation.lead)
 
     def _record(self, one: LoopSample) -> None:
         kernel, terms = self._drone.kernel, one.terms

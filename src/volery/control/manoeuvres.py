@@ -151,7 +151,7 @@ class Rotation(Manoeuvre):
         index = min(int(self._elapsed / self._hold_s), len(self._headings) - 1)
         self._elapsed += sample_s
         goal = self._headings[index]
-        terms = self.laws["yaw"](goal, measured.heading, sample_s)
+        terms = self.laws["yaw"](goal, measured.heading + measured.lead, sample_s)
         sample = LoopSample("yaw", self._controller, "deg", DEGREES, goal, measured.heading, terms)
         place = self._place.command(measured, sample_s) if self._place is not None else (0.0, 0.0, 0.0)
         return Command(*place, float(terms.output)), [sample]
@@ -259,7 +259,7 @@ class Waypoints(Manoeuvre):
             terms = law(goal, value, sample_s)
             outputs.append(float(terms.output))
             samples.append(LoopSample(loop, "PID", "m", 0.0, goal, value, terms))
-        turn = self._yaw(self._heading or 0.0, measured.heading, sample_s)
+        turn = self._yaw(self._heading or 0.0, measured.heading + measured.lead, sample_s)
         north, east, up = outputs
         return Command(north, east, up, float(turn.output)), samples
 
@@ -342,7 +342,7 @@ class Landing(Manoeuvre):
         north, east, _ = self._place.command(measured, sample_s)
         if self._heading is None and isfinite(measured.heading):
             self._heading = measured.heading
-        turn = self._yaw(self._heading or 0.0, measured.heading, sample_s)
+        turn = self._yaw(self._heading or 0.0, measured.heading + measured.lead, sample_s)
         rate = self.rate(measured.up)
         terms = Terms(rate + measured.velocity_up, 0.0, 0.0, 0.0, -rate, -rate)
         sample = LoopSample("landing", "ramp", "m/s", 0.0, -rate, measured.velocity_up, terms)

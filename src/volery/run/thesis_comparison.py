@@ -26,7 +26,7 @@ from volery.vehicles import Drone
 
 STEPS = (45.0, 90.0, 120.0, 180.0)
 HOLD_S = 20.0
-PUSH_RATE = 90.0
+PUSH_RATE = 73.0
 """Turn rate of the push, degrees/s, through the yaw channel: the law has no influence meanwhile."""
 PUSHED_UNTIL = 10.0
 """Turn at which the push ends, degrees; the drone then turns on to about 50."""
@@ -74,6 +74,11 @@ class _Push:
         self._from: float | None = None
         self._over = False
         self.take_off, self.engage = inner.take_off, inner.engage
+
+    @property
+    def lead(self) -> float:
+        """Turn in degrees that is still to come."""
+        return self._inner.lead
 
     def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
         """Apply a command, or the push."""

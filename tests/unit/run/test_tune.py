@@ -29,7 +29,7 @@ def test_tuned_gains_keep_their_margins_and_fly(monkeypatch: pytest.MonkeyPatch,
         ("CANDIDATES", 2),
     ):
         monkeypatch.setattr(module, name, value)
-    found = tune("rotation", "sim:ardupilot?start=warm", GoSettings(), Options(out=tmp_path))
+    found = tune("rotation", "sim:ardupilot?start=warm", GoSettings(by="attitude"), Options(out=tmp_path))
     hand, simc, tuned = found.judged
     assert found.process.misfit < 1.5
     assert 2.0 < found.oscillation.ultimate_gain < 6.0

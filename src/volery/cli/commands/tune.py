@@ -26,7 +26,7 @@ def tune(
     gains: Annotated[
         Path, typer.Option(metavar="FILE", help="TOML file to write the gains into, for `volery go --gains`.")
     ] = Path("gains.toml"),
-    by: By = "setpoints",
+    by: By = "attitude",
     seed: Seed = 1,
     out: Out = None,
 ) -> int:

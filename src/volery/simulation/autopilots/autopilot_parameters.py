@@ -138,6 +138,9 @@ class Tuning:
     straight: bool = False
     """Whether a point at another height is approached along a straight line."""
 
+    yaw_loop: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Gain, integral gain and filter in rad/s of the yaw rate loop, see ``Flight.set_yaw_loop``."""
+
     land_speed: float = 0.5
     land_speed_high: float = 1.5
     land_slow_below: float = 10.0

@@ -234,6 +234,7 @@ class Vehicle:
             rules.parameters.defaults(), {**rules.parameters.of_vehicle(system, flight), **(overrides or {})}
         )
         self.tuning = rules.parameters.tuning(self.parameters)
+        flight.set_yaw_loop(*self.tuning.yaw_loop)
         self.rc = RcChannels(rules.rc.transmitter)
         self.mission = OnboardMission()
         self.points: dict[int, list[MissionItem]] = {}
@@ -348,6 +349,7 @@ class Vehicle:
         if self.parameters.set(name, value) is None:
             return False
         self.tuning = self.rules.parameters.tuning(self.parameters)
+        self.flight.set_yaw_loop(*self.tuning.yaw_loop)
         self.output.parameter_changed(name)
         return True
 

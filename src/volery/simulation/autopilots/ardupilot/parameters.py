@@ -6,7 +6,7 @@ All other parameters are only stored, listed and read back.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import radians
+from math import pi, radians
 from types import MappingProxyType
 
 from volery.base.time import MS, from_seconds
@@ -72,10 +72,18 @@ _SHARED = {
     "SYSID_MYGCS": "system id whose heartbeats and manual control count",
 }
 
+YAW_AUTHORITY = 0.755
+"""Ratio of yaw accelerations at full output: ArduPilot's own quadrotor, 17 rad/s^2, over the body here."""
+ROTOR_LAG_S = 0.04
+"""Lag of the rotors here, s; ArduPilot's own simulator has none, so the filter is quicker by as much."""
+
 COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
     {
         **_SHARED,
         "ANGLE_MAX": "largest lean",
+        "ATC_RAT_YAW_FLTE": "filter of the yaw rate's error",
+        "ATC_RAT_YAW_I": "integral gain of the yaw rate loop",
+        "ATC_RAT_YAW_P": "gain of the yaw rate loop; 0: another loop, without a filter",
         "AUTO_OPTIONS": "bit 0 allows arming in AUTO, bit 1 its take-off without a raised throttle",
         "CIRCLE_RADIUS": "circle of LOITER_TURNS",
         "CIRCLE_RATE": "yaw rate on that circle",
@@ -204,6 +212,11 @@ def copter_tuning(parameters: Parameters) -> Tuning:
         face_path=p["WP_YAW_BEHAVIOR"] in (1.0, 2.0, 3.0),
         face_return=p["WP_YAW_BEHAVIOR"] in (1.0, 3.0),
         straight=True,
+        yaw_loop=(
+            YAW_AUTHORITY * p["ATC_RAT_YAW_P"],
+            YAW_AUTHORITY * p["ATC_RAT_YAW_I"],
+            1.0 / max(1.0 / (2.0 * pi * _moving(p["ATC_RAT_YAW_FLTE"], 100.0)) - ROTOR_LAG_S, 0.002),
+        ),
         land_speed=_moving(p["LAND_SPEED"] / 100.0),
         land_speed_high=_moving(p["LAND_SPEED_HIGH"] / 100.0, speed_down),
         land_slow_below=p["LAND_ALT_LOW"] / 100.0,

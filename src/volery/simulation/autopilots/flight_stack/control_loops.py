@@ -4,6 +4,9 @@
   rates; a PID on each rate has its derivative on the measurement. The mixer gives roll and pitch precedence
   over yaw, and yaw over collective. Motor output is linear in thrust through ArduPilot's thrust curve
   (MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX).
+* Where C_YAW_P is above 0 yaw is ArduCopter's, which swings: angle gain ATC_ANG_YAW_P, its braking limited to
+  120 degrees/s^2, and a rate loop on an error that is filtered at ATC_RAT_YAW_FLTE, 2.5 Hz. With its default
+  gains on its own simulator's quadrotor the loop has a natural frequency of 5 rad/s and a damping of 0.36.
 * Landed detector, every guidance period: ArduCopter's documented rule. In flight: collective at its lower
   limit, acceleration below 1 m/s^2 and vertical speed below 1 m/s for one second. On the ground, flight
   begins when the collective exceeds 0.8 of hover.
@@ -24,7 +27,10 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_THROTTLE,
     C_VELOCITY,
     C_YAW,
+    C_YAW_FILTER,
+    C_YAW_I,
     C_YAW_MODE,
+    C_YAW_P,
     C_YAW_RATE,
     DRIVE,
     IDLE,
@@ -51,6 +57,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_TARGET_VELOCITY,
     K_THROTTLE,
     K_VELOCITY,
+    K_YAW_MISS,
     K_YAW_SPEED,
     OFF,
     STEER,
@@ -75,6 +82,8 @@ _ATTITUDE_GAIN = 4.5  # [1/s]
 _YAW_GAIN = 4.0  # [1/s]
 _TILT_BRAKE = 19.2  # [rad/s^2]: 1100 degrees
 _YAW_BRAKE = 4.7  # [rad/s^2]: 270 degrees
+_YAW_GAIN_FILTERED = 4.5  # [1/s]: ATC_ANG_YAW_P
+_YAW_BRAKE_FILTERED = 2.09  # [rad/s^2]: 120 degrees
 _TOP_RATE = 3.84  # [rad/s]: 220 degrees
 _P = (0.11, 0.11, 0.5)
 _I = (0.11, 0.11, 0.05)
@@ -129,10 +138,13 @@ def _rate_targets(row: Array) -> tuple[float, float, float]:
     roll = sign * (w * tx - x * tw - y * tz + z * ty)
     pitch = sign * (w * ty + x * tz - y * tw - z * tx)
     yaw = sign * (w * tz - x * ty + y * tx - z * tw)
+    gain, brake = _YAW_GAIN, _YAW_BRAKE
+    if row[C_YAW_P] > 0.0:
+        gain, brake = _YAW_GAIN_FILTERED, _YAW_BRAKE_FILTERED
     return (
         clip(approach(roll, _ATTITUDE_GAIN, _TILT_BRAKE), -_TOP_RATE, _TOP_RATE),
         clip(approach(pitch, _ATTITUDE_GAIN, _TILT_BRAKE), -_TOP_RATE, _TOP_RATE),
-        clip(approach(yaw, _YAW_GAIN, _YAW_BRAKE) + row[K_YAW_SPEED], -_TOP_RATE, _TOP_RATE),
+        clip(approach(yaw, gain, brake) + row[K_YAW_SPEED], -_TOP_RATE, _TOP_RATE),
     )
 
 
@@ -150,6 +162,20 @@ def _torque(row: Array, axis: int, target: float) -> float:
     row[K_LAST_RATES + axis] = rate
     row[K_RATE_DERIVATIVE + axis] += _SLOPE_FILTER * (slope - row[K_RATE_DERIVATIVE + axis])
     torque: float = _P[axis] * error + row[K_RATE_INTEGRAL + axis] - _D[axis] * row[K_RATE_DERIVATIVE + axis]
+    return torque
+
+
+@numeric
+def _filtered_yaw_torque(row: Array, target: float) -> float:
+    """Return the output of the yaw rate's PI on its filtered error."""
+    share = 1.0 - 1.0 / (1.0 + row[C_YAW_FILTER] * STEP_S)
+    row[K_YAW_MISS] += share * (target - row[K_RATES + 2] - row[K_YAW_MISS])
+    if row[K_LANDED] > 0.5 or row[K_SPOOL] < 1.0:
+        row[K_RATE_INTEGRAL + 2] *= 1.0 - STEP_S / 0.2
+    else:
+        grown = row[K_RATE_INTEGRAL + 2] + row[C_YAW_I] * row[K_YAW_MISS] * STEP_S
+        row[K_RATE_INTEGRAL + 2] = clip(grown, -_I_MOST, _I_MOST)
+    torque: float = row[C_YAW_P] * row[K_YAW_MISS] + row[K_RATE_INTEGRAL + 2]
     return torque
 
 
@@ -195,6 +221,7 @@ def run_attitude_loops(row: Array, control: int) -> None:
             row[K_RATE_INTEGRAL + axis] = 0.0
             row[K_LAST_RATES + axis] = row[K_RATES + axis]
             row[K_RATE_DERIVATIVE + axis] = 0.0
+        row[K_YAW_MISS] = 0.0
         row[K_SPOOL] = 0.0
         row[K_AT_LOWER_LIMIT] = 1.0
         return
@@ -202,7 +229,7 @@ def run_attitude_loops(row: Array, control: int) -> None:
     roll_rate, pitch_rate, yaw_rate = _rate_targets(row)
     roll = _torque(row, 0, roll_rate)
     pitch = _torque(row, 1, pitch_rate)
-    yaw = _torque(row, 2, yaw_rate)
+    yaw = _filtered_yaw_torque(row, yaw_rate) if row[C_YAW_P] > 0.0 else _torque(row, 2, yaw_rate)
     spool = row[K_SPOOL]
     _mix(row, roll * spool, pitch * spool, yaw * spool)
 

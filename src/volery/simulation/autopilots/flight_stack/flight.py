@@ -34,6 +34,7 @@ from volery.simulation.autopilots.flight_stack.estimator import (
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_AIDED,
     C_CONTROL,
+    C_YAW_P,
     FLIGHT,
     HOLD_HEADING,
     K_HOVER_THROTTLE,
@@ -42,6 +43,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_POSITION,
     VISIBLE,
     YAW_ANGLE,
+    YAW_ANGLE_AND_RATE,
     YAW_RATE,
     Airframe,
     Control,
@@ -85,6 +87,15 @@ __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
 _FAR = 1e6  # [m] beyond which a point is placed on an unrolled map
 _FIRST_HOVER = 0.35  # MOT_THST_HOVER's default
+
+
+TURNINGS = {
+    (False, False): HOLD_HEADING,
+    (True, False): YAW_ANGLE,
+    (False, True): YAW_RATE,
+    (True, True): YAW_ANGLE_AND_RATE,
+}
+"""How the heading is commanded, by whether there are a yaw and a yaw rate."""
 
 
 @numeric
@@ -193,11 +204,7 @@ class Setpoint:
 
     def row(self) -> tuple[float, ...]:
         """Return the values in the order of the command columns, from ``C_CONTROL`` on."""
-        if self.yaw is not None and self.yaw_rate is not None:
-            raise UsageError("a set-point with both a yaw and a yaw rate; give one of them or neither")
-        turning = (
-            YAW_ANGLE if self.yaw is not None else YAW_RATE if self.yaw_rate is not None else HOLD_HEADING
-        )
+        turning = TURNINGS[self.yaw is not None, self.yaw_rate is not None]
         return (
             float(self.control),
             *self.position,
@@ -284,6 +291,16 @@ class Flight:
     def forget_origin(self) -> None:
         """Stop using satellites, as after a restart of the autopilot."""
         self._world.set_input(self._body, C_AIDED, 0.0)
+
+    def set_yaw_loop(self, gain: float, integral: float, corner: float) -> None:
+        """Filter the error of the yaw rate, as ArduCopter does.
+
+        Args:
+            gain: Share of full thrust per rad/s; 0: another loop, without a filter.
+            integral: Integral gain.
+            corner: Corner frequency of the filter [rad/s].
+        """
+        self._world.set_input(self._body, C_YAW_P, gain, integral, corner)
 
     def payload_power(self, watts: float) -> None:
         """Set the power of the on-board computers [W]."""

@@ -58,7 +58,7 @@ class Control(IntEnum):
 
 OFF, IDLE, ATTITUDE, CLIMB, VELOCITY, POSITION, POSITION_CLIMB, VELOCITY_HEIGHT, STEER, DRIVE = range(10)
 
-HOLD_HEADING, YAW_ANGLE, YAW_RATE = range(3)
+HOLD_HEADING, YAW_ANGLE, YAW_RATE, YAW_ANGLE_AND_RATE = range(4)
 """Values of ``C_YAW_MODE``."""
 
 FLIGHT_LAYOUT = Layout(after=WORLD_LAYOUT)
@@ -77,7 +77,7 @@ C_ROLL = _add("C_ROLL", "rad", "roll angle")
 C_PITCH = _add("C_PITCH", "rad", "pitch angle")
 C_YAW = _add("C_YAW", "rad", "yaw angle, clockwise from north")
 C_YAW_RATE = _add("C_YAW_RATE", "rad/s", "yaw rate, clockwise")
-C_YAW_MODE = _add("C_YAW_MODE", "1", "HOLD_HEADING, YAW_ANGLE or YAW_RATE")
+C_YAW_MODE = _add("C_YAW_MODE", "1", "HOLD_HEADING, YAW_ANGLE, YAW_RATE or both")
 C_THROTTLE = _add("C_THROTTLE", "1", "collective 0..1; rover -1..1")
 C_STEERING = _add("C_STEERING", "1", "rover: -1..1, right positive")
 C_CLIMB = _add("C_CLIMB", "m/s", "climb rate, up")
@@ -90,6 +90,9 @@ C_TILT = _add("C_TILT", "rad", "limit of tilt")
 C_JERK = _add("C_JERK", "m/s^3", "limit of the shaped target's jerk")
 C_STRAIGHT = _add("C_STRAIGHT", "1", "1: height and horizontal position are approached along a straight line")
 C_AIDED = _add("C_AIDED", "1", "1: use satellites; the estimator's origin is the position when this became 1")
+C_YAW_P = _add("C_YAW_P", "s", "gain of the yaw rate loop on a filtered error; 0: another loop, unfiltered")
+C_YAW_I = _add("C_YAW_I", "1", "integral gain of that loop")
+C_YAW_FILTER = _add("C_YAW_FILTER", "rad/s", "corner frequency of its error's filter")
 
 # --- memory that ``Estimate`` shows ---
 K_POSITION = _add("K_POSITION", "m", "estimated, about the world's origin", 3, NED)
@@ -138,6 +141,7 @@ K_RATE_DERIVATIVE = _add("K_RATE_DERIVATIVE", "rad/s^2", "filtered derivative of
 K_VELOCITY_INTEGRAL = _add("K_VELOCITY_INTEGRAL", "m/s^2", "integrators of the velocity loops", 3, NED)
 K_YAW_TARGET = _add("K_YAW_TARGET", "rad", "shaped yaw target, clockwise from north")
 K_YAW_SPEED = _add("K_YAW_SPEED", "rad/s", "rate of the shaped yaw target")
+K_YAW_MISS = _add("K_YAW_MISS", "rad/s", "filtered error of the yaw rate")
 K_SPOOL = _add("K_SPOOL", "1", "0 idle .. 1 full authority of the loops")
 K_LANDED_TIME = _add("K_LANDED_TIME", "s", "time for which the landed condition has been true")
 K_TARGET_QUATERNION = _add("K_TARGET_QUATERNION", "1", "target attitude, as K_ATTITUDE", 4, "w, x, y, z")

@@ -33,6 +33,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_VELOCITY,
     C_YAW,
     C_YAW_MODE,
+    C_YAW_P,
     C_YAW_RATE,
     CLIMB,
     IDLE,
@@ -86,6 +87,10 @@ _LEASH = 20.0  # [m] largest horizontal distance of target and vehicle, against 
 _HEIGHT_LEASH = 2.0  # [m] the same in height: on the ground the target waits
 _SLEW = 1.05  # [rad/s] of yaw: ATC_SLEW_YAW
 _SLEW_BRAKE = 1.6  # [rad/s^2]
+_YAW_AHEAD = 0.5  # [rad] of the target over the heading
+_YAW_AHEAD_FILTERED = 0.785  # [rad]: 45 degrees
+_INPUT_GAIN = 1.0 / 0.15  # [1/s]: ATC_INPUT_TC
+_YAW_ACCEL = 4.71  # [rad/s^2]: ATC_ACCEL_Y_MAX
 _TC = 0.15  # [s] ATC_INPUT_TC
 _LEARN_TIME = 10.0  # [s] of hover throttle: MOT_THST_HOVER
 _OVERSPEED_GAIN = 2.0  # POSCONTROL_OVERSPEED_GAIN_Z
@@ -359,12 +364,18 @@ def _shape_yaw(row: Array) -> None:
     elif kind == 1:
         error = wrap_angle(row[C_YAW] - row[K_YAW_TARGET])
         target = clip(approach(error, 2.0, _SLEW_BRAKE), -_SLEW, _SLEW)
+    elif kind == 3:
+        error = wrap_angle(row[C_YAW] - row[K_YAW_TARGET])
+        target = approach(error, _INPUT_GAIN, _YAW_ACCEL) + row[C_YAW_RATE]
     else:
         target = 0.0
-    row[K_YAW_SPEED] = ramp(row[K_YAW_SPEED], target, 2.0 * _SLEW_BRAKE * GUIDE_S)
+    accel, most = 2.0 * _SLEW_BRAKE, _YAW_AHEAD
+    if row[C_YAW_P] > 0.0:
+        accel, most = _YAW_ACCEL, _YAW_AHEAD_FILTERED
+    row[K_YAW_SPEED] = ramp(row[K_YAW_SPEED], target, accel * GUIDE_S)
     ahead = wrap_angle(row[K_YAW_TARGET] - row[K_EULER + 2])
-    if abs(ahead) > 0.5:
-        row[K_YAW_TARGET] = wrap_angle(row[K_EULER + 2] + clip(ahead, -0.5, 0.5))
+    if abs(ahead) > most:
+        row[K_YAW_TARGET] = wrap_angle(row[K_EULER + 2] + clip(ahead, -most, most))
     row[K_YAW_TARGET] = wrap_angle(row[K_YAW_TARGET] + row[K_YAW_SPEED] * GUIDE_S)
 
 

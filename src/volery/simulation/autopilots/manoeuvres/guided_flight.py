@@ -10,10 +10,11 @@ from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import TakeOff, ToPoint, direction_of_flight
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.world.arithmetic import wrap_angle
 
 
 class Turn(NamedTuple):
-    """Commanded heading [rad] or yaw rate [rad/s]; neither: the firmware's own choice."""
+    """Commanded heading [rad], yaw rate [rad/s] or both; neither: the firmware's own choice."""
 
     yaw: float | None = None
     rate: float | None = None
@@ -117,7 +118,7 @@ class FollowAttitude(Manoeuvre):
     Args:
         vehicle: The vehicle.
         attitude: Quaternion from forward, right, down to north, east, down; ``None``: level.
-        yaw_rate: Yaw rate [rad/s] instead of the heading of *attitude*.
+        yaw_rate: Yaw rate [rad/s] by which the heading of *attitude* goes on.
         thrust: 0..1; one half holds the height.
     """
 
@@ -126,7 +127,7 @@ class FollowAttitude(Manoeuvre):
     ) -> None:
         super().__init__(vehicle)
         self._roll, self._pitch, yaw = quaternion_to_euler(attitude) if attitude else (0.0, 0.0, None)
-        self._turn = Turn(yaw if yaw_rate is None else None, yaw_rate)
+        self._turn = Turn(yaw, yaw_rate)
         self._thrust = thrust
         self._given: Ns = vehicle.kernel.now()
 
@@ -141,13 +142,16 @@ class FollowAttitude(Manoeuvre):
             vehicle.drive(Setpoint(Control.CLIMB, accel_z=tuning.accel_z))
             return
         share = 2.0 * self._thrust - 1.0
+        yaw, rate = self._turn
+        if yaw is not None and rate is not None:
+            yaw = wrap_angle(yaw + rate * to_seconds(vehicle.kernel.now() - self._given))
         vehicle.drive(
             Setpoint(
                 Control.CLIMB,
                 roll=self._roll,
                 pitch=self._pitch,
-                yaw=self._turn.yaw,
-                yaw_rate=self._turn.rate,
+                yaw=yaw,
+                yaw_rate=rate,
                 climb=share * (tuning.speed_up if share > 0.0 else tuning.speed_down),
                 speed_up=tuning.speed_up,
                 speed_down=tuning.speed_down,

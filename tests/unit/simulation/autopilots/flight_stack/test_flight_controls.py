@@ -186,8 +186,6 @@ def test_a_rover_drives_a_heading_and_backwards(rover):
 
 def test_invalid_set_points_are_refused(drone):
     flight = drone("perfect").flight
-    with pytest.raises(UsageError, match="yaw and a yaw rate"):
-        flight.drive(Setpoint(Control.POSITION, yaw=1.0, yaw_rate=1.0))
     with pytest.raises(UsageError, match="finite"):
         flight.drive(Setpoint(Control.POSITION, position=(math.nan, 0.0, 0.0)))
     with pytest.raises(UsageError, match="motor 7"):
