@@ -116,3 +116,11 @@ def test_the_length_of_a_frame_anywhere_in_the_data(before: int) -> None:
         assert frame_length(data[:-1], before) == 0
         assert frame_length(data[:-1] + b"\0", before) == 0
         assert frame_length(data, before + 1) == 0
+
+
+def test_a_frame_or_two_of_an_unknown_kind_are_chance_and_three_another_dialect() -> None:
+    parser = MavlinkParser()
+    parser.statistics.octets = 90
+    for unknown, said in ((2, "no MAVLink: another protocol"), (3, "3 of unknown kind")):
+        parser.statistics.unknown = unknown
+        assert said in parser.problem()
