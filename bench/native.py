@@ -12,8 +12,8 @@ when the model was finished. (The second and the third were looked at while it w
 
     python bench/native.py [--rounds 9] [--no-qemu] [--unseen] [kernel ...]
 
-With --unseen the kernels of bench/unseen_kernels, which were written before their errors were known and
-not used while the model was made.
+With --unseen the kernels of bench/unseen_kernels, which were written before their errors were known. What was
+mended with some of them in view is stated in docs/native-simulation.md.
 """
 
 from __future__ import annotations
