@@ -211,9 +211,8 @@ class Twin(Manoeuvre):
             terms = law(goal, value, sample_s, feed)
             outputs.append(float(terms.output) if isfinite(goal) else 0.0)
             samples.append(LoopSample(loop, "twin", "m", 0.0, goal, value, terms))
-        turn = self._yaw(
-            aim.heading, measured.heading, sample_s, aim.turn_rate if isfinite(aim.turn_rate) else 0.0
-        )
+        heading = measured.heading + measured.lead
+        turn = self._yaw(aim.heading, heading, sample_s, aim.turn_rate if isfinite(aim.turn_rate) else 0.0)
         samples.append(
             LoopSample("yaw", "twin", "deg", DEGREES, aim.heading % DEGREES, measured.heading, turn)
         )
