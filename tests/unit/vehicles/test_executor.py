@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import FrozenInstanceError, dataclass, field, fields
+from itertools import pairwise
 from math import isnan, nan
 from typing import Any
 
@@ -22,6 +23,7 @@ from volery.vehicles.executor import (
     LANDING,
     LAST_RESORT,
     MANUAL,
+    MONITOR_PERIOD,
     NO_GOAL,
     PLAIN,
     STREAM,
@@ -260,6 +262,20 @@ def test_a_check_ends_a_step(rig: Rig) -> None:
 
     with pytest.raises(NotArrived, match=r"goto.*the fence"):
         rig.execute(rig.step(), check=check)
+
+
+def test_a_check_is_made_at_telemetry_five_times_a_second_at_most(rig: Rig) -> None:
+    made: list[Ns] = []
+
+    def check(_asked: str, now: Ns) -> None:
+        made.append(now)
+
+    for number in range(1, 100):
+        rig.at(number * 0.03, rig.seen.changed.notify)
+    rig.sets(3.0, mode="LAND")
+    rig.execute(rig.step(done=lambda seen: seen.mode == "LAND", enters="LAND"), check=check)
+    assert 13 <= len(made) <= 16
+    assert all(later - earlier >= MONITOR_PERIOD for earlier, later in pairwise(made))
 
 
 def test_what_is_to_be_kept_is_repeated_until_the_end(rig: Rig) -> None:

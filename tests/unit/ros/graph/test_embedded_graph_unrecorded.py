@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from volery.base.time import S
+import pytest
+
+from volery.base.time import MS, S
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.ros import messages
-from volery.ros.graph import EmbeddedGraph
+from volery.ros.graph import EmbeddedGraph, QoS
 from volery.trace.events import Charge, Message
 
 STRING, TRIGGER = "std_msgs/msg/String", "std_srvs/srv/Trigger"
@@ -95,3 +97,34 @@ def test_an_unrecorded_graph_records_nothing_and_needs_no_prices_without_a_proce
     events = played(both, tariffs=tariff, unrecorded=True)
     assert not [event for event in events if isinstance(event, Charge | Message)]
     assert asked == []
+
+
+@pytest.mark.parametrize(
+    ("spacings", "options", "expected"),
+    [
+        ((100 * MS,), {"unrecorded": True}, [0, 100, 200]),
+        ((100 * MS, 50 * MS), {"unrecorded": True}, [0, 50, 100, 150, 200, 250]),
+        ((100 * MS, 0), {"unrecorded": True}, list(range(0, 300, 10))),
+        ((100 * MS,), {"unrecorded": True, "as_bytes": True}, list(range(0, 300, 10))),
+        ((100 * MS,), {}, list(range(0, 300, 10))),
+    ],
+)
+def test_where_a_graph_is_a_link_messages_that_no_subscription_uses_are_not_awaited(
+    spacings: tuple[int, ...], options: dict[str, bool], expected: list[int]
+) -> None:
+    sent: list[int] = []
+
+    def talker(graph: EmbeddedGraph) -> None:
+        listener = graph.node("listener")
+        for spacing in spacings:
+            listener.subscribe("state", STRING, lambda message: None, QoS(spacing=spacing))
+        node = graph.node("talker")
+        publisher = node.advertise("state", STRING)
+        for _ in range(30):
+            if publisher.awaited():
+                sent.append(graph.kernel.now() // MS)
+                publisher.publish(messages.new(STRING))
+            node.sleep(10 * MS)
+
+    played(talker, **options)
+    assert sent == expected
