@@ -31,13 +31,19 @@ CONFIGURATION = Path("conf", "conf_aircraft.xml")
 PREFERRED_MODULE = "autopilot"
 """Module whose setting is meant if several modules have one of the same name."""
 
+GENERATED_AUTOPILOT = "autopilot_generated"
+"""Header of the setting that lists the modes of an autopilot generated from a state machine in XML."""
+
 FIRST_WAYPOINT = 1
 """Number of the first waypoint of a plan; in the aircraft an unnamed waypoint precedes it."""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """A variable that can be set in flight. ``name`` is the short name, else the variable."""
+    """A variable that can be set in flight. ``name`` is the short name, else the variable.
+
+    ``header`` is the file of the aircraft's code that declares the variable, where the XML states one.
+    """
 
     number: int
     name: str
@@ -45,6 +51,7 @@ class Setting:
     low: float
     high: float
     words: tuple[str, ...] = ()
+    header: str = ""
 
 
 @dataclass(frozen=True)
@@ -93,10 +100,12 @@ class PaparazziAircraft:
         """Return the setting that a ground station finds under *name*.
 
         The first of these that fits decides: the short name, the variable, the variable without its
-        structure (``autopilot.mode``), and without the prefix of its module (``autopilot_mode``).
+        structure (``autopilot.mode``), and without the prefix of its module (``autopilot_mode``). A
+        variable that is listed more than once is set by the first of its numbers, as Paparazzi's own ground
+        station does.
 
         Raises:
-            UsageError: There is none, or several fit equally well.
+            UsageError: There is none, or several variables fit equally well.
         """
         ranks = (
             [one for one in self.settings if one.name == name],
@@ -107,12 +116,17 @@ class PaparazziAircraft:
         found = next((rank for rank in ranks if rank), [])
         if len(found) > 1:
             found = [one for one in found if one.variable.startswith(PREFERRED_MODULE)] or found
-        if len(found) == 1:
+        if len({one.variable for one in found}) == 1:
             return found[0]
         if found:
             listed = choices([f"{one.number} ({one.variable})" for one in found])
             raise UsageError(f"{self.source}: {name!r} may be setting {listed}")
         raise self._lacks("setting", name, [one.name for one in self.settings])
+
+    @property
+    def generated_modes(self) -> tuple[str, ...]:
+        """Modes of a generated autopilot in the order of their numbers; empty for the static autopilot."""
+        return next((one.words for one in self.settings if one.header == GENERATED_AUTOPILOT), ())
 
     def block(self, name: str) -> Block:
         """Return the block called *name*; raise ``UsageError`` listing the blocks otherwise."""
@@ -241,7 +255,8 @@ def _settings(root: Any, file: str) -> Iterable[Setting]:
         variable = given.get("var", "")
         words = tuple(word for word in given.get("values", "").split("|") if word)
         low, high = (_float(given.get(name, "0"), name, element, file) for name in ("min", "max"))
-        yield Setting(number, given.get("shortname") or variable, variable, low, high, words)
+        name, header = given.get("shortname") or variable, given.get("header", "")
+        yield Setting(number, name, variable, low, high, words, header)
 
 
 def _blocks(plan: Any, file: str) -> Iterable[Block]:

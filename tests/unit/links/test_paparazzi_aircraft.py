@@ -124,6 +124,23 @@ def test_a_name_in_several_modules_is_that_of_the_autopilot_or_an_error(tmp_path
         read("gps.mode", "imu.mode")
 
 
+def test_a_variable_listed_twice_is_set_by_its_first_number(tmp_path: Path) -> None:
+    twice = '<dl_setting var="autopilot.kill_throttle" min="0" max="1"/>' * 2
+    text = f'<settings><dl_setting var="x"/>{twice}</settings>'
+    aircraft = read_aircraft(folder(tmp_path, settings=text, flight_plan=PLAN))
+    assert aircraft.setting("kill_throttle").number == 1
+
+
+def test_modes_of_a_generated_autopilot(tmp_path: Path) -> None:
+    text = (
+        '<settings><dl_setting var="x" header="x"/>'
+        '<dl_setting var="autopilot_mode_ap" values="NAV|HOME|KILL" header="autopilot_generated"/></settings>'
+    )
+    aircraft = read_aircraft(folder(tmp_path, settings=text, flight_plan=PLAN))
+    assert aircraft.generated_modes == ("NAV", "HOME", "KILL")
+    assert stock_aircraft().generated_modes == ()
+
+
 def test_an_unknown_name_is_reported_with_the_known_ones(tmp_path: Path) -> None:
     aircraft = read_aircraft(folder(tmp_path, settings=SETTINGS, flight_plan=PLAN))
     with pytest.raises(UsageError) as raised:

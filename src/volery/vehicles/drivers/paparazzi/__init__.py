@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from volery.base.errors import UsageError
 from volery.kernel.api import Kernel
 from volery.links.link import Link
 from volery.links.paparazzi_aircraft import PaparazziAircraft, read_aircraft, stock_aircraft
@@ -63,7 +64,15 @@ def open_pprzros(kernel: Kernel, node: Node, name: str, options: Mapping[str, st
 
 def _aircraft(options: Mapping[str, str]) -> PaparazziAircraft:
     given = options.get("aircraft")
-    return read_aircraft(Path(given)) if given else stock_aircraft()
+    if not given:
+        return stock_aircraft()
+    aircraft = read_aircraft(Path(given))
+    if modes := aircraft.generated_modes:
+        raise UsageError(
+            f"{given}: a generated autopilot, whose modes have numbers of its own ({', '.join(modes)}); "
+            "only the static autopilot can be flown: build the aircraft without USE_GENERATED_AUTOPILOT"
+        )
+    return aircraft
 
 
 def _blocks(options: Mapping[str, str]) -> Blocks:

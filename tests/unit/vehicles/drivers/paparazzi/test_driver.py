@@ -489,6 +489,16 @@ def test_a_setting_that_is_missing_is_an_error_before_anything_is_sent(
         bench(options={"aircraft": folder})
 
 
+def test_a_generated_autopilot_with_modes_of_its_own_is_refused(bench: Make, tmp_path: Path) -> None:
+    """Its number 5 is FAILSAFE: the numbers of the static autopilot would select something else."""
+    folder = generated(tmp_path)
+    file = tmp_path / "settings.xml"
+    modes = 'values="DIRECT|Z_HOLD|MODULE|NAV|HOME|FAILSAFE|KILL" header="autopilot_generated"'
+    file.write_text(file.read_text().replace("</settings>", f'<dl_setting var="ap" {modes}/></settings>'))
+    with pytest.raises(UsageError, match=r"generated autopilot.*\(DIRECT, Z_HOLD, MODULE, NAV, HOME"):
+        bench(options={"aircraft": folder})
+
+
 def test_xml_of_another_aircraft_is_noticed(bench: Make, tmp_path: Path) -> None:
     at = bench(options={"aircraft": generated(tmp_path)})
     at.autopilot.numbers = dict.fromkeys(range(6), "gain")
