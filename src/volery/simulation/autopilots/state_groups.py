@@ -110,6 +110,8 @@ class SwitchState:
     """That end: 1 right, -1 left."""
     options: dict[int, int] = field(default_factory=dict)
     """Position of the switch by channel: 1 up, 0 in the middle, -1 down."""
+    overrides_denied: bool = False
+    """Whether a switch denies the sticks of a ground station."""
     read_from: tuple[list[int], int] | None = None
     """Pulse widths of all channels, and changes of parameters, that all of them were last read from."""
 
@@ -120,6 +122,8 @@ class OutputState:
 
     servos: dict[int, int] = field(default_factory=dict)
     """Pulse widths [us] by channel, from 1."""
+    relays: set[int] = field(default_factory=set)
+    """Relays that are on, from 0."""
 
 
 @dataclass

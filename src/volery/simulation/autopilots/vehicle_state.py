@@ -192,6 +192,8 @@ class VehicleRules:
     arming: ArmingTimes = field(default_factory=ArmingTimes)
     parameters: ParameterTable
     rc: RcDefaults
+    return_point: Callable[[Vehicle], Vector | None] = do_nothing
+    """Return where a return ends and its least height, north, east, down [m]; ``None``: home."""
     firmware_state: Callable[[Vehicle], object] = do_nothing
     """Create the state that only this firmware keeps about a vehicle: ``Vehicle.firmware_state``."""
 

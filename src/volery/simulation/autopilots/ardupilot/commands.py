@@ -7,7 +7,7 @@ from functools import partial
 from math import isfinite, isnan, pi, radians
 
 from volery.base.frames import wrap
-from volery.base.time import S
+from volery.simulation.autopilots.ardupilot import payload
 from volery.simulation.autopilots.ardupilot.failsafes import fence_admits, on_fence_enable
 from volery.simulation.autopilots.ardupilot.modes import (
     CRITICAL,
@@ -40,17 +40,8 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 LOITER_UNLIMITED, RETURN, LAND, TAKEOFF = 17, 20, 21, 22
 CONDITION_YAW, DO_SET_MODE, CHANGE_SPEED, SET_HOME = 115, 176, 178, 179
 FLIGHT_TERMINATION, REPOSITION, PAUSE_CONTINUE, SET_YAW_SPEED, SET_MISSION_CURRENT = 185, 192, 193, 213, 224
-SET_RELAY, REPEAT_RELAY, SET_SERVO, REPEAT_SERVO, FENCE_ENABLE, RUN_PREARM_CHECKS = (
-    181,
-    182,
-    183,
-    184,
-    207,
-    401,
-)
-ROI_LOCATION, ROI_NONE, ROI, MOTOR_TEST, GRIPPER = 195, 197, 201, 209, 211
-GRIPS_WITHIN = 2 * S
-"""Time of a servo gripper from the command to the report of its end."""
+REPEAT_RELAY, REPEAT_SERVO, FENCE_ENABLE, RUN_PREARM_CHECKS = 182, 184, 207, 401
+ROI_LOCATION, ROI_NONE, ROI, MOTOR_TEST = 195, 197, 201, 209
 START_MAG_CAL, ACCEPT_MAG_CAL, CANCEL_MAG_CAL = 42424, 42425, 42426
 CALIBRATION, STORAGE, REBOOT, MISSION_START, ARM_DISARM, GET_HOME = 241, 245, 246, 300, 400, 410
 
@@ -60,9 +51,6 @@ HIGHEST = 83_000.0
 FARTHEST_POINT = 2.1e7
 """Largest distance of a target that is flown towards [m]: any point of the globe."""
 
-LONGEST_PULSE = 65_535
-RELAY_FUNCTION = 1
-"""RELAYn_FUNCTION of a relay that commands switch."""
 MOTORS = 4
 
 Problems = Callable[[Vehicle], list[str]]
@@ -334,26 +322,6 @@ def on_prearm_checks(vehicle: Vehicle, _command: Command, problems: Problems) ->
     return ACCEPTED
 
 
-def on_set_servo(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_SET_SERVO: a channel that drives nothing else takes the pulse width."""
-    channel, pulse = round(command.param1), round(command.param2)
-    function = f"SERVO{channel}_FUNCTION"
-    if function not in vehicle.parameters or not 0 <= pulse <= LONGEST_PULSE:
-        return FAILED
-    if vehicle.parameters[function]:
-        vehicle.send_text(INFO, f"ServoRelayEvent: Channel {channel} is already in use")
-        return FAILED
-    vehicle.outputs.servos[channel] = pulse
-    return ACCEPTED
-
-
-def on_relay(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_SET_RELAY and DO_REPEAT_RELAY: a relay exists where a pin is assigned to it."""
-    function = f"RELAY{round(command.param1) + 1}_FUNCTION"
-    exists = function in vehicle.parameters and vehicle.parameters[function] == RELAY_FUNCTION
-    return ACCEPTED if exists else FAILED
-
-
 def on_region(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_SET_ROI and its two forms: without a mount the nose turns to the place."""
     if command.number == ROI_NONE or (command.x == 0.0 and command.y == 0.0):
@@ -362,18 +330,6 @@ def on_region(vehicle: Vehicle, command: Command) -> int:
     if not _is_place(command):
         return FAILED
     vehicle.commanded.look_at = vehicle.point(command.frame, command.x, command.y, command.z)
-    return ACCEPTED
-
-
-def on_gripper(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_GRIPPER: 0 releases, 1 grabs; it needs GRIP_ENABLE."""
-    if not vehicle.parameters["GRIP_ENABLE"]:
-        return FAILED
-    said = {0: "Gripper load releas", 1: "Gripper load grabb"}.get(round(command.param2))
-    if said is None:
-        return FAILED
-    vehicle.send_text(INFO, f"{said}ing")
-    vehicle.kernel.call_at(vehicle.kernel.now() + GRIPS_WITHIN, lambda: vehicle.send_text(INFO, f"{said}ed"))
     return ACCEPTED
 
 
@@ -410,15 +366,15 @@ def shared_commands(
         STORAGE: on_calibration,
         REBOOT: on_reboot,
         RUN_PREARM_CHECKS: partial(on_prearm_checks, problems=prearm),
-        SET_SERVO: on_set_servo,
-        REPEAT_SERVO: on_set_servo,
-        SET_RELAY: on_relay,
-        REPEAT_RELAY: on_relay,
+        payload.SET_SERVO: payload.on_set_servo,
+        REPEAT_SERVO: payload.on_set_servo,
+        payload.SET_RELAY: payload.on_set_relay,
+        REPEAT_RELAY: payload.on_repeat_relay,
         ROI: on_region,
         ROI_LOCATION: on_region,
         ROI_NONE: on_region,
         MOTOR_TEST: on_motor_test,
-        GRIPPER: on_gripper,
+        payload.GRIPPER: payload.on_gripper,
         START_MAG_CAL: on_calibration,
         ACCEPT_MAG_CAL: on_calibration,
         CANCEL_MAG_CAL: on_calibration,

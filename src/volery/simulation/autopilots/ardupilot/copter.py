@@ -34,6 +34,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
     mode_not_armable,
 )
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED, copter_tuning
+from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.telemetry import (
     ACTIVE,
     CRITICAL,
@@ -198,6 +199,7 @@ def start_warm(vehicle: Vehicle) -> None:
     """Bring a warm vehicle to the state after its boot, except for the position."""
     boot.store_parameters(vehicle, (*boot.COPTER_GYROS, *boot.COPTER_PRESSURE))
     boot.skip_elevation(vehicle)
+    pilot_input.keep_mode(vehicle, "FLTMODE_CH")
     finish_setup(vehicle)
 
 
@@ -351,6 +353,7 @@ COPTER = Firmware(
     rules=VehicleRules(
         modes=MODES,
         boot_mode=MODES[0],
+        return_point=return_point,
         startup=StartupTimes(READY, ORIGIN, POSITION, POSITION),
         arming=ArmingTimes(
             motors_rest=2 * S, spool_up=500 * MS, takeoff_slew=100 * MS, abandoned_after=1500 * MS

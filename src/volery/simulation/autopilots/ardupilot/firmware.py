@@ -10,9 +10,9 @@ from functools import partial
 from typing import Any
 
 from volery.base.time import MS, Ns, S
-from volery.simulation.autopilots.ardupilot import failsafes, mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot import failsafes, mission, payload, pilot_input, rally, telemetry
 from volery.simulation.autopilots.ardupilot.commands import go_to_item
-from volery.simulation.autopilots.ardupilot.failsafes import FENCE, RALLY
+from volery.simulation.autopilots.ardupilot.failsafes import FENCE
 from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED
 from volery.simulation.autopilots.ardupilot.telemetry import Health
@@ -31,7 +31,6 @@ from volery.simulation.autopilots.mavlink.firmware import (
     TelemetryPolicy,
 )
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED, Command, Handler
-from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
 
 WARNING = 4
@@ -63,29 +62,14 @@ def on_fence_fetch(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> No
     sender.answer("FENCE_POINT", idx=index, count=len(points), **place)
 
 
-def on_rally_fetch(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
-    """Handle RALLY_FETCH_POINT, the deprecated form."""
-    points, index = vehicle.points.get(RALLY, []), fields["idx"]
-    if index >= len(points):
-        vehicle.send_text(WARNING, "Bad rally point ID")
-        return
-    point = points[index]
-    place = {"lat": point.x, "lng": point.y, "alt": round(point.z), "break_alt": 0, "land_dir": 0, "flags": 0}
-    sender.answer("RALLY_POINT", idx=index, count=round(vehicle.parameters["RALLY_TOTAL"]), **place)
+def accepts(vehicle: Vehicle, name: str, system: int) -> bool:
+    """Return whether a message called *name* from a system counts: SYSID_ENFORCE admits SYSID_MYGCS only.
 
-
-def on_rally_point(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
-    """Handle RALLY_POINT, the deprecated form: RALLY_TOTAL states the number of points first."""
-    points, index = vehicle.points.get(RALLY, []), fields["idx"]
-    if index >= vehicle.parameters["RALLY_TOTAL"]:
-        vehicle.send_text(WARNING, "Bad rally point message ID")
-    elif fields["count"] != vehicle.parameters["RALLY_TOTAL"]:
-        vehicle.send_text(WARNING, "Bad rally point message count")
-    else:
-        blank = MissionItem(failsafes.RALLY_POINT, GLOBAL_RELATIVE)
-        points = [*points, *([blank] * (index + 1 - len(points)))]
-        points[index] = blank._replace(x=fields["lat"], y=fields["lng"], z=float(fields["alt"]))
-        vehicle.points[RALLY] = points
+    The vehicle's own components and the state of the radio always count.
+    """
+    if not vehicle.parameters["SYSID_ENFORCE"] or name in ("RADIO", "RADIO_STATUS"):
+        return True
+    return system in (vehicle.system, round(vehicle.parameters["SYSID_MYGCS"]))
 
 
 def questions(version: Builder) -> dict[str, QuestionHandler]:
@@ -99,7 +83,7 @@ def questions(version: Builder) -> dict[str, QuestionHandler]:
         "FENCE_FETCH_POINT": on_fence_fetch,
         "FILE_TRANSFER_PROTOCOL": onboard_files.on_file_transfer_with_parameters,
         "LOG_REQUEST_LIST": on_log_list,
-        "RALLY_FETCH_POINT": on_rally_fetch,
+        "RALLY_FETCH_POINT": rally.on_rally_fetch,
         "TERRAIN_CHECK": on_terrain_check,
     }
 
@@ -139,6 +123,7 @@ BUILDERS: Mapping[str, Builder] = {
     "RAW_IMU": telemetry.raw_imu,
     "RC_CHANNELS": telemetry.rc_channels,
     "RC_CHANNELS_RAW": telemetry.rc_channels_raw,
+    "RELAY_STATUS": payload.relay_status,
     "SCALED_IMU2": telemetry.scaled_imu2,
     "SCALED_IMU3": telemetry.scaled_imu3,
     "SCALED_PRESSURE": telemetry.pressure,
@@ -304,7 +289,7 @@ def builders(
 
 MESSAGE_HANDLERS = {
     "HEARTBEAT": pilot_input.on_heartbeat,
-    "RALLY_POINT": on_rally_point,
+    "RALLY_POINT": rally.on_rally_point,
     "MANUAL_CONTROL": pilot_input.on_manual_control,
     "RC_CHANNELS_OVERRIDE": pilot_input.on_override,
 }
@@ -346,6 +331,7 @@ def ardupilot_mavlink(
             set_mode=set_mode,
             set_mode_ack=11,
             questions=questions(messages["AUTOPILOT_VERSION"]),
+            accepts=accepts,
         ),
         missions=MissionPolicy(
             runs=mission.runs,

@@ -160,6 +160,22 @@ def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> N
     guided.follow_attitude(attitude, rate, min(1.0, max(0.0, fields["thrust"])))
 
 
+def rover_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """Handle SET_ATTITUDE_TARGET of a rover: a share of its speed, with a heading or a turn rate."""
+    guided, mask = vehicle.manoeuvre, fields["type_mask"]
+    if not isinstance(guided, GuidedRover) or mask & THROTTLE_IGNORED:
+        return
+    if not all_within((*fields["q"], fields["body_yaw_rate"], fields["thrust"])):
+        return
+    speed = min(1.0, max(-1.0, fields["thrust"])) * vehicle.tuning.speed
+    if mask & YAW_RATE_IGNORED:
+        w, x, y, z = fields["q"]
+        heading = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        guided.follow_speed(speed, Turn(yaw=heading))
+    else:
+        guided.follow_speed(speed, Turn(rate=fields["body_yaw_rate"]))
+
+
 def rover_local(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_POSITION_TARGET_LOCAL_NED of a rover, which reads the horizontal axes only."""
     _drive(vehicle, _of_local(vehicle, _level(fields)), fields["vx"])

@@ -6,6 +6,7 @@ from math import isinf, isnan
 
 from volery.simulation.autopilots.ardupilot.commands import HIGHEST, change_speed, turn_to
 from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, INFO, disarm
+from volery.simulation.autopilots.ardupilot.payload import GRIPPER, SET_RELAY, SET_SERVO, act_on_payload
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import MissionRules
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint
 from volery.simulation.autopilots.mavlink.messages import finite
@@ -58,13 +59,14 @@ NAMES = {
     CHANGE_SPEED: "ChangeSpeed",
     SET_HOME: "SetHome",
     JUMP: "Jump",
+    SET_RELAY: "SetRelay",
+    SET_SERVO: "SetServo",
+    GRIPPER: "Gripper",
 }
 """Names of the items in the firmware's status texts."""
 
-KEPT_ONLY = frozenset(
-    {92, 94, 189, 195, 197, 201, 203, 205, 206, 211, 181, 182, 183, 184, 207, 208, 212, 218, 222}
-)
-"""Items that are stored and read back without effect: cameras, servos, relays, grippers, fences, regions of
+KEPT_ONLY = frozenset({92, 94, 189, 195, 197, 201, 203, 205, 206, 182, 184, 207, 208, 212, 218, 222})
+"""Items that are stored and read back without effect: cameras, repeated servos and relays, fences, regions of
 interest, payload places, auxiliary functions and limits of GUIDED.
 """
 
@@ -179,6 +181,8 @@ def act(vehicle: Vehicle, item: MissionItem) -> None:
             vehicle.set_home_here()
         else:
             vehicle.set_home(item.x / 1e7, item.y / 1e7, item.z)
+    else:
+        act_on_payload(vehicle, item)
 
 
 def leaves_ground(vehicle: Vehicle) -> bool:

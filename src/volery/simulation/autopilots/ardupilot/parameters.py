@@ -35,7 +35,7 @@ _SHARED = {
     **_STICKS,
     "ARMING_CHECK": "0 skips all checks; any other value runs all of them",
     **{
-        f"RC{channel}_OPTION": "switch: a mode, 11 fence, 153 arming; others do nothing"
+        f"RC{channel}_OPTION": "switch: a mode, fence, gripper, relay, overrides, arming; others: nothing"
         for channel in range(5, 17)
     },
     "ARMING_RUDDER": "0: the yaw stick does not arm; 1 arms, 2 disarms, too",
@@ -59,6 +59,8 @@ _SHARED = {
     "FS_THR_VALUE": "pulse width below which the transmitter is lost",
     "GRIP_ENABLE": "any value but 0: there is a gripper",
     "INITIAL_MODE": "mode after boot",
+    "RALLY_INCL_HOME": "any value but 0: home counts as a rally point of the return",
+    "RALLY_LIMIT_KM": "distance beyond which a rally point is not used; 0: none",
     "RALLY_TOTAL": "number of rally points",
     "RC_OVERRIDE_TIME": "time after which overrides end; 0 refuses them, a negative value keeps them",
     "RNGFND1_TYPE": "any value but 0 sends RANGEFINDER and DISTANCE_SENSOR",
@@ -68,7 +70,9 @@ _SHARED = {
     "SIM_RC_FAIL": "any value but 0: the transmitter's throttle reads 950",
     "SIM_WIND_DIR": "direction that the wind comes from",
     "SIM_WIND_SPD": "mean speed of the wind",
+    "SIM_PIN_MASK": "bits of the pins that relays switch on",
     "STAT_BOOTCNT": "counts the boots",
+    "SYSID_ENFORCE": "1: messages of other systems than SYSID_MYGCS are ignored",
     "SYSID_MYGCS": "system id whose heartbeats and manual control count",
 }
 

@@ -8,12 +8,14 @@ three for a rover.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from math import cos, dist, radians, sin
 from typing import Any
 
 from volery.base.time import MS, Ns, from_seconds
-from volery.simulation.autopilots.ardupilot.failsafes import on_fence_enable
+from volery.simulation.autopilots.ardupilot.failsafes import on_fence_enable, radio_lost
 from volery.simulation.autopilots.ardupilot.modes import arm, change_mode, disarm
+from volery.simulation.autopilots.ardupilot.payload import GRAB, LET_GO, move_gripper, set_relay
 from volery.simulation.autopilots.manual_control import ChannelRange
 from volery.simulation.autopilots.mavlink.messages import Command
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -42,6 +44,8 @@ def on_override(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
         return
     now = vehicle.kernel.now()
     vehicle.failsafes.station_last_ns = now
+    if vehicle.switches.overrides_denied:
+        return
     for channel in range(1, len(vehicle.rc.transmitter) + 1):
         pulse = fields[f"chan{channel}_raw"]
         if channel <= LAST_PLAIN_CHANNEL:
@@ -58,6 +62,8 @@ def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> 
         return
     now = vehicle.kernel.now()
     vehicle.failsafes.station_last_ns = now
+    if vehicle.switches.overrides_denied:
+        return
     sticks = vehicle.tuning.sticks
     roll, pitch, throttle, yaw = sticks.travels
     middle = vehicle.rules.rc.throttle_centred
@@ -140,6 +146,8 @@ def simulate_rc_failure(vehicle: Vehicle) -> None:
         vehicle.rc.transmitter[throttle - 1] = vehicle.rules.rc.transmitter[throttle - 1]
 
 
+NO_PULSES = 1.0
+"""SIM_RC_FAIL: nothing is received."""
 FAILED_THROTTLE = 950
 POSITIONS = (1230, 1360, 1490, 1620, 1749)
 """Upper ends of the first five positions of the mode switch [us]."""
@@ -151,7 +159,7 @@ FULL_RUDDER = 0.89
 TRACK_SPACING, TRACK_POINTS = 2.0, 300
 """SRTL_ACCURACY [m] and SRTL_POINTS."""
 
-FENCE_OPTION, ARM_OPTION = 11, 153
+ARM_OPTION = 153
 NEVER_AGAIN: Ns = 1 << 62
 
 
@@ -174,25 +182,37 @@ def sticks_rest(vehicle: Vehicle) -> bool:
     return rest
 
 
+def _mode_position(vehicle: Vehicle, channel: str) -> int | None:
+    """Return the position of the mode switch, or ``None`` if the parameter *channel* names no channel."""
+    number = round(vehicle.parameters[channel])
+    return position_of(vehicle.rc[number]) if 1 <= number <= len(vehicle.rc.transmitter) else None
+
+
+def keep_mode(vehicle: Vehicle, channel: str) -> None:
+    """Count the mode switch as read: a warm vehicle has taken its mode from it before the run."""
+    vehicle.switches.mode = vehicle.switches.read = _mode_position(vehicle, channel) or 0
+
+
 def read_mode_switch(vehicle: Vehicle, channel: str, modes: str) -> None:
-    """Enter the mode of the switch once it has moved.
+    """Enter the mode of the switch, after a boot as soon as there is a transmitter, then once it has moved.
 
     Args:
         vehicle: The vehicle.
         channel: Parameter with the number of the channel.
         modes: Parameter with the number of a mode, without the position.
     """
-    number = round(vehicle.parameters[channel])
-    if not 1 <= number <= len(vehicle.rc.transmitter):
+    position = _mode_position(vehicle, channel)
+    booting = vehicle.uptime() < vehicle.rules.startup.ready_after
+    no_pulses = vehicle.parameters["SIM_RC_FAIL"] == NO_PULSES
+    if position is None or booting or no_pulses or radio_lost(vehicle):
         return
-    now, switches, position = vehicle.kernel.now(), vehicle.switches, position_of(vehicle.rc[number])
+    now, switches = vehicle.kernel.now(), vehicle.switches
     if position != switches.read:
         switches.read, switches.read_since = position, now
     if not position or now - switches.read_since < SETTLED or position == switches.mode:
         return
-    first, switches.mode = switches.mode == 0, position
-    if not first:
-        change_mode(vehicle, round(vehicle.parameters[f"{modes}{position}"]))
+    switches.mode = position
+    change_mode(vehicle, round(vehicle.parameters[f"{modes}{position}"]))
 
 
 def read_rudder(
@@ -226,13 +246,46 @@ def read_rudder(
         disarm(vehicle, words[1], force=False)
 
 
+def _switch_fence(vehicle: Vehicle, position: int) -> None:
+    on = float(position > 0)
+    on_fence_enable(vehicle, Command(207, on, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, is_int=False))
+
+
+def _switch_gripper(vehicle: Vehicle, position: int) -> None:
+    if position:
+        move_gripper(vehicle, GRAB if position > 0 else LET_GO)
+
+
+def _switch_relay(vehicle: Vehicle, position: int, number: int) -> None:
+    set_relay(vehicle, number, int(position > 0))
+
+
+def _switch_overrides(vehicle: Vehicle, position: int) -> None:
+    """Admit or deny the sticks of a ground station; denied ones go back to the transmitter at once."""
+    if position:
+        vehicle.switches.overrides_denied = position < 0
+    if position < 0:
+        vehicle.rc.release()
+        _sticks_moved(vehicle)
+
+
+RELAY_OPTIONS = (28, 34, 35, 36, 66, 67)
+SWITCHES: Mapping[int, Callable[[Vehicle, int], None]] = {
+    11: _switch_fence,
+    19: _switch_gripper,
+    46: _switch_overrides,
+    **{option: partial(_switch_relay, number=number) for number, option in enumerate(RELAY_OPTIONS)},
+}
+"""RCn_OPTION to what its switch does at a position: 1 up, 0 in the middle, -1 down."""
+
+
 def read_options(
     vehicle: Vehicle,
     modes: Mapping[int, int],
     problems: Callable[[Vehicle], list[str]],
     words: tuple[str, str],
 ) -> None:
-    """Act on channels whose RCn_OPTION is a mode, the fence or arming, when their switch moves.
+    """Act on channels whose RCn_OPTION is a mode, arming or one of ``SWITCHES``, when their switch moves.
 
     Args:
         vehicle: The vehicle.
@@ -250,8 +303,8 @@ def read_options(
         if before is None or before == position:
             continue
         up, down = position > 0, position < 0
-        if option == FENCE_OPTION:
-            on_fence_enable(vehicle, Command(207, float(up), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, is_int=False))
+        if option in SWITCHES:
+            SWITCHES[option](vehicle, position)
         elif option == ARM_OPTION and up:
             arm(vehicle, problems, words[0], force=False)
         elif option == ARM_OPTION and down:

@@ -15,7 +15,7 @@ from volery.simulation.autopilots.ardupilot.firmware import (
     send_version,
     streams,
 )
-from volery.simulation.autopilots.ardupilot.guided import rover_global, rover_local
+from volery.simulation.autopilots.ardupilot.guided import rover_attitude, rover_global, rover_local
 from volery.simulation.autopilots.ardupilot.modes import (
     CUSTOM,
     GUIDED,
@@ -31,6 +31,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
     mode_not_armable,
 )
 from volery.simulation.autopilots.ardupilot.parameters import ROVER_SUPPORTED, rover_tuning
+from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.telemetry import (
     ACTIVE,
     ATTITUDE_CONTROL,
@@ -193,6 +194,7 @@ def start_warm(vehicle: Vehicle) -> None:
     """Bring a warm vehicle to the state after its boot, except for the position."""
     boot.store_parameters(vehicle, (*boot.ROVER_GYROS, *boot.ROVER_PRESSURE))
     boot.skip_elevation(vehicle)
+    pilot_input.keep_mode(vehicle, "MODE_CH")
     finish_setup(vehicle)
 
 
@@ -264,6 +266,7 @@ _MAVLINK = ardupilot_mavlink(
         {mode.name: mode.number for mode in MODES.values()},
     ),
     handlers={
+        "SET_ATTITUDE_TARGET": rover_attitude,
         "SET_POSITION_TARGET_GLOBAL_INT": rover_global,
         "SET_POSITION_TARGET_LOCAL_NED": rover_local,
     },
@@ -276,6 +279,7 @@ ROVER = Firmware(
     rules=VehicleRules(
         modes=MODES,
         boot_mode=INITIALISING,
+        return_point=return_point,
         startup=StartupTimes(READY, HOME, POSITION, HOME),
         parameters=ParameterTable(parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
         rc=RcDefaults((1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0), True),

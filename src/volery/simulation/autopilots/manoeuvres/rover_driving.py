@@ -171,7 +171,7 @@ class GuidedRover(Manoeuvre):
 
 
 class ReturnRover(Manoeuvre):
-    """Drive home and stop.
+    """Drive home, or where the firmware returns instead, and stop.
 
     Args:
         vehicle: The vehicle.
@@ -182,8 +182,8 @@ class ReturnRover(Manoeuvre):
         super().__init__(vehicle)
         self._on_arrival, self._reported = on_arrival, False
         self._arrived_at: Ns | None = None
-        home = vehicle.home
-        self._driving = DriveTo(vehicle, home.ned if home else vehicle.estimate.position)
+        home = vehicle.home.ned if vehicle.home else vehicle.estimate.position
+        self._driving = DriveTo(vehicle, vehicle.rules.return_point(vehicle) or home)
 
     def enter(self) -> None:
         """Set the speed of the return."""

@@ -239,15 +239,17 @@ class Return(Manoeuvre):
         ground = vehicle.home.ned if vehicle.home else (0.0, 0.0, 0.0)
         estimate = vehicle.estimate
         here = stopping_point(estimate.position, estimate.velocity, tuning.accel, tuning.accel_z)
-        away = hypot(ground[0] - here[0], ground[1] - here[1])
-        height = max(vehicle.height + tuning.return_climb_min, self._return_height(vehicle.height, away))
-        self._home = (ground[0], ground[1], ground[2] - height)
+        chosen = vehicle.rules.return_point(vehicle)
+        north, east, down = chosen or (ground[0], ground[1], ground[2] - tuning.return_height)
+        away = hypot(north - here[0], east - here[1])
+        least = self._return_height(vehicle.height, away, ground[2] - down)
+        height = max(vehicle.height + tuning.return_climb_min, least)
+        self._home = (north, east, ground[2] - height)
         self._begin("climb", ToPoint(vehicle, (here[0], here[1], ground[2] - height)))
 
-    def _return_height(self, height: float, away: float) -> float:
-        """Height of the return: lower within a cone about home."""
+    def _return_height(self, height: float, away: float, target_height: float) -> float:
+        """Height of the return: lower within a cone about its end."""
         tuning = self.vehicle.tuning
-        target_height = tuning.return_height
         if tuning.return_cone > 0.0:
             target_height = min(target_height, max(away * tuning.return_cone, 2.0))
         return max(height, target_height)

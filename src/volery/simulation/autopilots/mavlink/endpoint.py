@@ -256,6 +256,8 @@ class MavlinkEndpoint:
     def _handle(self) -> None:
         channel, frame = self._arrived.popleft()
         fields = frame.fields
+        if not self.firmware.commands.accepts(self._vehicle, frame.name, frame.system):
+            return
         if not self._is_addressed(frame):
             self._reject(channel, frame)
             return
