@@ -28,7 +28,7 @@ def main(of, name, value):
     while not (found := result(client.get_parameters([name])).values) or not found[0].type:
         if time.monotonic() > end:
             raise SystemExit(f"{of} has no parameter {name}")
-    print(found[0].double_value)
+    sys.stdout.write(f"{found[0].double_value}\n")
     wanted = Parameter(name, Parameter.Type.DOUBLE, float(value))
     (answer,) = result(client.set_parameters([wanted])).results
     if not answer.successful:
