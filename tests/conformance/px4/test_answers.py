@@ -388,6 +388,38 @@ def test_it_has_no_current_sensor(bench: Any) -> None:
     assert rig.latest["BATTERY_STATUS"]["current_consumed"] == 0
 
 
+def test_a_target_on_the_other_side_of_the_earth_is_accepted_and_flown_to(bench: Any) -> None:
+    """Seen on PX4 1.14, whose commander does not look at coordinates."""
+    rig = bench()
+    rig.airborne()
+    far = {"x": 460825000, "y": -1038995000, "z": 500.0}
+    assert rig.command_int(192, param1=-1, param2=1, frame=5, **far) == ACCEPTED
+    rig.run(15.0)
+    assert rig.ned[1] < -20.0
+
+
+def test_an_orbit_is_accepted_on_the_ground(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    assert rig.command(34, 10, 2) == ACCEPTED
+
+
+def test_a_mission_whose_first_waypoint_is_far_is_stored_and_not_started(bench: Any) -> None:
+    """Seen on PX4 1.14 (MIS_DIST_1WP): the upload is accepted, the start denied with this text."""
+    rig = bench()
+    rig.ready()
+    latitude, longitude, _ = rig.vehicle.estimate.geodetic
+    place = {"command": 16, "frame": 6, "y": round(longitude * 1e7), "z": 20.0}
+    assert upload(rig, 0, [{**place, "x": round((latitude + 0.02) * 1e7)}]) == ACCEPTED
+    assert rig.command(300) == DENIED
+    rig.run(0.2)
+    assert "Mission start denied! No valid mission\t" in rig.texts()
+    assert upload(rig, 0, [{**place, "x": round((latitude + 0.001) * 1e7)}]) == ACCEPTED
+    assert rig.command(300) == ACCEPTED
+    rig.run(0.5)
+    assert rig.vehicle.armed
+
+
 def test_the_receiver_is_present_once_the_estimator_uses_it(bench: Any) -> None:
     """Seen on PX4 1.14: clients that wait for a global position by this bit arm 2 s later."""
     rig = bench(warm=False)

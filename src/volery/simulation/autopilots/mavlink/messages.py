@@ -20,7 +20,7 @@ EPOCH_US = 1_767_225_600_000_000
 """Satellite time at the start of a run: 2026-01-01 00:00 UTC [us]."""
 
 LARGEST = 1e9
-FARTHEST = 1e6
+FARTHEST = 2.1e7
 """Largest distance of a point that is accepted [m]."""
 
 
@@ -126,8 +126,8 @@ class Command(NamedTuple):
     is_int: bool
 
 
-Handler = Callable[[Vehicle, Command], int]
-"""Executes a command and returns a MAV_RESULT."""
+Handler = Callable[[Vehicle, Command], int | None]
+"""Executes a command and returns a MAV_RESULT; ``None``: the command stays without an answer."""
 
 
 def from_long(fields: dict[str, Any], reads_nan: bool = False) -> Command:

@@ -58,13 +58,15 @@ class CommandService:
         self._perform(peer, from_int(fields, self._firmware.commands.reads_nan))
 
     def _perform(self, peer: Peer, command: Command) -> None:
-        own = self._own.get(command.number)
-        if own is not None:
+        result: int | None
+        if own := self._own.get(command.number):
             result = own(peer, command)
+        elif handler := self._firmware.commands.commands.get(command.number):
+            result = handler(self._vehicle, command)
         else:
-            handler = self._firmware.commands.commands.get(command.number)
-            result = UNSUPPORTED if handler is None else handler(self._vehicle, command)
-        self.acknowledge(peer, command.number, result)
+            result = UNSUPPORTED
+        if result is not None:
+            self.acknowledge(peer, command.number, result)
 
     def acknowledge(self, peer: Peer, number: int, result: int) -> None:
         """Send the COMMAND_ACK of command *number* with a MAV_RESULT."""

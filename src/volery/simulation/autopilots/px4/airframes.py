@@ -81,6 +81,7 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "FLW_TGT_FA": "angle from the course of that target; 180: behind it",
         "FLW_TGT_HT": "height over home while following",
         "FLW_TGT_MAX_VEL": "largest speed while following",
+        "MIS_DIST_1WP": "largest distance to the first waypoint of a mission; 0: any",
         "MIS_TAKEOFF_ALT": "minimum height of a take-off",
         "MPC_ACC_DOWN_MAX": "largest acceleration down",
         "MPC_ACC_HOR": "acceleration in the plane",

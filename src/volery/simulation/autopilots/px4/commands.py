@@ -42,6 +42,7 @@ RETURN, LAND, TAKEOFF, ORBIT = 20, 21, 22, 34
 DO_SET_MODE, CHANGE_SPEED, SET_HOME, FLIGHT_TERMINATION, REPOSITION = 176, 178, 179, 185, 192
 STORAGE, REBOOT, MISSION_START, ARM_DISARM, REQUEST_PROTOCOL = 245, 246, 300, 400, 519
 ROI_LOCATION, ROI_NONE, ROI, GET_HOME, RUN_CHECKS, GRIPPER = 195, 197, 201, 410, 401, 211
+WINCH, INJECT_FAILURE = 42_600, 420
 GRIPPER_ACTIONS = (0, 1)
 MOTOR_TEST, CALIBRATION, ACTUATOR_TEST = 209, 241, 310
 
@@ -189,7 +190,7 @@ def on_orbit(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_ORBIT: radius and speed, about the given point or the present position."""
     commander = commander_of(vehicle)
     centre = commanded_point(vehicle, command)
-    if centre is None or not vehicle.has_position or not vehicle.armed:
+    if centre is None or not vehicle.has_position:
         return TEMPORARILY_REJECTED
     radius = command.param1 if isfinite(command.param1) and abs(command.param1) >= 1.0 else 5.0
     speed = command.param2 if isfinite(command.param2) and command.param2 else 1.0
@@ -201,7 +202,10 @@ def on_orbit(vehicle: Vehicle, command: Command) -> int:
 def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
     """Handle MISSION_START: enter AUTO.MISSION and arm."""
     commander = commander_of(vehicle)
-    if len(vehicle.mission) == 0 or commander.request_mode(modes.MISSION) != ACCEPTED:
+    if not commander.has_mission:
+        vehicle.send_text(modes.CRITICAL, "Mission start denied! No valid mission\t")
+        return DENIED
+    if commander.request_mode(modes.MISSION) != ACCEPTED:
         return DENIED
     return ACCEPTED if commander.arm(force=False) == ACCEPTED else DENIED
 
@@ -303,11 +307,15 @@ def on_region(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_gripper(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_GRIPPER, which needs PD_GRIPPER_EN."""
+def on_gripper(vehicle: Vehicle, command: Command) -> int | None:
+    """Handle DO_GRIPPER, which needs PD_GRIPPER_EN; without it nothing answers."""
     if not vehicle.parameters["PD_GRIPPER_EN"]:
-        return UNSUPPORTED
+        return None
     return ACCEPTED if to_integer(command.param2) in GRIPPER_ACTIONS else DENIED
+
+
+def ignore(_vehicle: Vehicle, _command: Command) -> None:
+    """Leave a command without an answer: it is meant for a module that does not run."""
 
 
 SHARED_COMMANDS: Mapping[int, Handler] = {
@@ -326,6 +334,8 @@ SHARED_COMMANDS: Mapping[int, Handler] = {
     ROI_LOCATION: on_region,
     ROI_NONE: on_region,
     GRIPPER: on_gripper,
+    WINCH: ignore,
+    INJECT_FAILURE: ignore,
     GET_HOME: on_get_home,
     RUN_CHECKS: on_run_checks,
     CALIBRATION: on_calibration,

@@ -9,11 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from math import dist
 
 from volery.base.frames import Vector
 from volery.base.time import MS, Ns
 from volery.kernel.api import Handle
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import item_point
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
+from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.px4 import event_interface
 from volery.simulation.autopilots.px4.offboard import Joystick, SetpointStream
 from volery.simulation.autopilots.px4.position_control import PositionLoops
@@ -175,6 +178,9 @@ class Commander:
         """Remaining hold before a failsafe acts [s]; negative: all of COM_FAIL_ACT_T."""
         self.hold_until: Ns = NEVER
         self.after_hold = 0
+        self._examined: list[MissionItem] = []
+        """Mission that was examined last."""
+        self._feasible = False
         self.reached: tuple[int, Ns] | None = None
         """Mission item that was reached last, and when."""
         self.calibration: list[Handle] = []
@@ -222,6 +228,22 @@ class Commander:
         """Whether arming needs a mission on board (COM_ARM_MIS_REQ)."""
         return self.vehicle.parameters["COM_ARM_MIS_REQ"] != 0.0
 
+    @property
+    def has_mission(self) -> bool:
+        """Whether there is a mission, and its first waypoint was near when it was examined (MIS_DIST_1WP)."""
+        items = self.vehicle.mission.items
+        if items is not self._examined:
+            self._examined, self._feasible = items, bool(items) and self._first_is_near(items)
+        return self._feasible
+
+    def _first_is_near(self, items: list[MissionItem]) -> bool:
+        vehicle = self.vehicle
+        most = vehicle.parameters["MIS_DIST_1WP"]
+        first = next((item for item in items if item.navigates and item.has_place), None)
+        if first is None or most <= 0.0 or not vehicle.has_position:
+            return True
+        return dist(item_point(vehicle, first)[:2], vehicle.estimate.position[:2]) < most
+
     def checks(self) -> event_interface.ArmingChecks:
         """Return the results of the arming checks."""
         vehicle = self.vehicle
@@ -231,7 +253,7 @@ class Commander:
             attitude=age >= ATTITUDE_AFTER,
             position=self.ready,
             sticks=self.has_sticks,
-            mission=len(vehicle.mission) > 0,
+            mission=self.has_mission,
             mission_required=self.mission_required,
             home=vehicle.home is not None or age < HOME_CHECK_FROM,
             offboard=self.stream_alive(),
@@ -248,7 +270,7 @@ class Commander:
             return False
         if number == OFFBOARD and not self.stream_alive():
             return False
-        return number != MISSION or len(vehicle.mission) > 0
+        return number != MISSION or self.has_mission
 
     # -- modes
 
@@ -372,7 +394,7 @@ class Commander:
         mode = self.vehicle.rules.modes[self.requested]
         if not mode.armable or not self.can_fly(self.requested):
             return False
-        if self.mission_required and len(self.vehicle.mission) == 0:
+        if self.mission_required and not self.has_mission:
             return False
         if self.ready:
             return True
