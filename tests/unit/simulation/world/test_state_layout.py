@@ -76,7 +76,7 @@ def test_a_set_point_fills_the_command_columns_in_their_order():
     commands = [
         field
         for field in flight_state.FLIGHT_LAYOUT.fields
-        if field.name.startswith("C_") and field.name != "C_AIDED"
+        if flight_state.C_CONTROL <= field.column < flight_state.C_AIDED
     ]
     row = Setpoint(
         flight_state.Control.POSITION,
