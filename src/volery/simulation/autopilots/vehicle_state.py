@@ -13,8 +13,6 @@ from dataclasses import dataclass, field
 from math import hypot
 from typing import Any, NamedTuple
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.frames import Vector
 from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Action, Kernel
@@ -36,7 +34,6 @@ from volery.simulation.autopilots.state_groups import (
 )
 
 
-@mypyc_attr(native_class=False)
 class Manoeuvre:
     """One way of flying or driving.
 
