@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import nan
 
-from volery.base.errors import CapabilityError, UsageError
+from volery.base.errors import CapabilityError, NotArrived, UsageError
 from volery.base.position import AMSL, Position
 from volery.vehicles.limits import is_number
 from volery.vehicles.services import Services
@@ -99,12 +99,19 @@ class Payload:
     def open_gripper(self, number: int = 1) -> None:
         """Release what the gripper holds."""
         self._check(f"open_gripper({number!r})", (number, 1, 8))
-        self._services.command("open the gripper", "MAV_CMD_DO_GRIPPER", number, 0)
+        self._move_gripper("open the gripper", number, 0)
 
     def close_gripper(self, number: int = 1) -> None:
         """Let the gripper hold."""
         self._check(f"close_gripper({number!r})", (number, 1, 8))
-        self._services.command("close the gripper", "MAV_CMD_DO_GRIPPER", number, 1)
+        self._move_gripper("close the gripper", number, 1)
+
+    def _move_gripper(self, asked: str, number: int, action: int) -> None:
+        try:
+            self._services.command(asked, "MAV_CMD_DO_GRIPPER", number, action)
+        except NotArrived as error:  # as PX4, whose module for it does not run then
+            what = "nothing answers; a PX4 has a gripper with PD_GRIPPER_EN=1, after a reboot"
+            raise CapabilityError(f"{self._name}: {asked}: {what}") from error
 
     def _check(self, call: str, *limited: tuple[object, float, float]) -> None:
         """Raise ``UsageError`` unless each number lies between its limits."""
