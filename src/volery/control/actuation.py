@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import atan, cos, degrees, isnan, radians, sin
+from math import asinh, atan, copysign, cos, degrees, isnan, radians, sin, sinh, sqrt
 from typing import NamedTuple, Protocol
 
 from volery.base.errors import UsageError
@@ -104,12 +104,28 @@ class VelocitySetpoints(Actuation):
         self._drone.set_velocity(*command, lasting=self._lasting)
 
 
+def straighten(share: float, expo: float) -> float:
+    """Return the way of a stick, 0 to 1, whose expo curve gives that share of the full command.
+
+    Args:
+        share: share of the full command, at least 0.
+        expo: share of the cubic, from 0 to below 1; the rest of the curve is straight. Solved as the
+            depressed cubic with one real root.
+    """
+    if expo == 0.0:
+        return share
+    p = (1.0 - expo) / expo
+    return 2.0 * sqrt(p / 3.0) * sinh(asinh(1.5 * share / (expo * p) * sqrt(3.0 / p)) / 3.0)
+
+
 @dataclass(frozen=True)
 class RcAxis:
     """Trim, dead band and scale of one channel.
 
     Attributes:
         per_unit: µs per unit of the command beyond the dead band.
+        per_unit_down: the same for commands below 0, where it is another.
+        expo: share of the cubic in the curve that the autopilot applies beyond the dead band.
         trim: pulse width that is meant to command nothing, µs.
         dead: half of the dead band about the trim, which a command jumps over, µs.
         least: least pulse width, µs.
@@ -121,6 +137,8 @@ class RcAxis:
     dead: float = 0.0
     least: float = MIDDLE_US - HALF_US
     greatest: float = MIDDLE_US + HALF_US
+    per_unit_down: float | None = None
+    expo: float = 0.0
 
     def __post_init__(self) -> None:
         if not self.least < self.trim < self.greatest or self.dead < 0.0 or not self.per_unit > 0.0:
@@ -131,8 +149,12 @@ class RcAxis:
 
     def pulse(self, command: float) -> float:
         """Return the pulse width of a command, µs."""
-        beyond = self.dead if command > 0.0 else -self.dead if command < 0.0 else 0.0
-        return min(self.greatest, max(self.least, self.trim + beyond + self.per_unit * command))
+        if command == 0.0:
+            return self.trim
+        scale = self.per_unit if command > 0.0 or self.per_unit_down is None else self.per_unit_down
+        way = HALF_US - self.dead
+        beyond = self.dead + way * straighten(scale * abs(command) / way, self.expo)
+        return min(self.greatest, max(self.least, self.trim + copysign(beyond, command)))
 
     def position(self, command: float) -> float:
         """Return the stick position -1..1 of a command."""
@@ -161,9 +183,13 @@ RC_SCALES: Mapping[str, RcScale] = {
         20.0,
         TurnModel(acceleration=270.0, delay_s=0.09, frequency=5.0, damping=0.3),
     ),
-    # MPC_HOLD_DZ 0.1, MPC_MAN_TILT_MAX 35 degrees, MPC_Z_VEL_MAX_UP 3 m/s, MPC_MAN_Y_MAX 150 degrees/s
+    # MPC_HOLD_DZ 0.1, MPC_MAN_TILT_MAX 35 degrees, MPC_Z_VEL_MAX_UP 3 m/s, MPC_Z_VEL_MAX_DN 1.5 m/s,
+    # MPC_Z_MAN_EXPO 0.6, MPC_MAN_Y_MAX 150 degrees/s
     "PX4": RcScale(
-        RcAxis(500.0 / 35.0), RcAxis(450.0 / 3.0, dead=50.0), RcAxis(450.0 / 150.0, dead=50.0), 20.0
+        RcAxis(500.0 / 35.0),
+        RcAxis(450.0 / 3.0, dead=50.0, per_unit_down=450.0 / 1.5, expo=0.6),
+        RcAxis(450.0 / 150.0, dead=50.0),
+        20.0,
     ),
 }
 """Scales by autopilot, from the defaults of its parameters."""

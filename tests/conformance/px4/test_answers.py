@@ -445,6 +445,17 @@ def in_posctl(rig: Any) -> None:
     rig.run(3.0)
 
 
+def test_in_altctl_a_third_of_the_stick_is_a_sixth_of_the_climb(bench: Any) -> None:
+    """Dead zone and expo curve of ALTCTL, as in PX4's FlightTaskManualAltitude."""
+    rig = bench()
+    in_posctl(rig)
+    assert rig.mode(2) == ACCEPTED
+    rig.sticks(z=500 - 50 - 150)  # a third of the way beyond the dead zone
+    rig.run(3.0)
+    sink = rig.vehicle.estimate.velocity[2]
+    assert sink == pytest.approx(1.5 * (0.6 / 27.0 + 0.4 / 3.0), rel=0.2)
+
+
 def test_lost_sticks_hold_then_return_and_only_movement_brings_the_pilot_back(bench: Any) -> None:
     rig = bench()
     in_posctl(rig)

@@ -15,6 +15,7 @@ from volery.control.flight import limited_descent
 from volery.control.laws import PidGains, wrap
 from volery.control.manoeuvres import Altitude, Rotation, Waypoints, cube, set_gains
 from volery.control.safety_switch import Emergency, Reaction, SwitchSettings
+from volery.simulation.autopilots.px4.flight_modes import apply_expo
 from volery.vehicles import Drone
 
 SWITCH = SwitchSettings()
@@ -265,6 +266,13 @@ def test_a_channel_jumps_over_its_dead_band() -> None:
     assert axis.pulse(-0.1) < 1480.0
     assert (axis.pulse(1000.0), axis.pulse(-1000.0)) == (2000.0, 1000.0)
     assert axis.position(202.5) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("climb", [-1.5, -0.7, -0.05, 0.0, 0.05, 1.0, 3.0])
+def test_a_climb_rate_arrives_through_the_expo_curve_of_a_px4(climb: float) -> None:
+    stick = RC_SCALES["PX4"].climb.position(climb)
+    most = 3.0 if climb > 0.0 else 1.5
+    assert most * apply_expo(stick, dead=0.1) == pytest.approx(climb)
 
 
 @pytest.mark.parametrize(

@@ -233,18 +233,28 @@ STICK_SPEED_SHARE = 0.78
 """Share of MPC_VEL_MANUAL that a held stick reaches, as recorded."""
 
 
+def bend(share: float) -> float:
+    """Return a share of a stick's way, -1..1, on the expo curve."""
+    return EXPO * share**3 + (1.0 - EXPO) * share
+
+
 def apply_expo(stick: float, dead: float) -> float:
     """Return a stick deflection -1..1 after dead zone and expo curve."""
     size = abs(stick)
     if size <= dead:
         return 0.0
-    along = (size - dead) / (1.0 - dead)
-    shaped = EXPO * along**3 + (1.0 - EXPO) * along
+    shaped = bend((size - dead) / (1.0 - dead))
     return shaped if stick > 0.0 else -shaped
 
 
 class AltitudeControl(AltitudeHold):
-    """ALTCTL: as ``AltitudeHold``; the yaw stick has a dead zone and an expo curve."""
+    """ALTCTL: as ``AltitudeHold``; throttle and yaw stick have a dead zone and an expo curve."""
+
+    def climb(self, throttle: float) -> float:
+        """Return the climb rate [m/s] for a throttle position 0..1 on the expo curve."""
+        rate = super().climb(throttle)
+        most = self.vehicle.tuning.pilot_up if rate > 0.0 else self.vehicle.tuning.pilot_down
+        return most * bend(rate / most)
 
     @property
     def pilot(self) -> StickPositions:
