@@ -35,6 +35,12 @@ _ULOG_MAGIC = b"ULog\x01\x12\x35"
 _DATAFLASH_HEAD = b"\xa3\x95"
 _FORMAT, _FORMAT_SIZE, _HEAD_SIZE = 0x80, 89, 3
 """Type and length of the message that defines others in a DataFlash log; length of a message's head."""
+_ULOG_START, _ULOG_HEAD = 16, struct.Struct("<HB")
+"""Length of a ULog's header; length of a message's content and its type."""
+_ULOG_DATA, _ULOG_DEFINITIONS = b"ACL", b"BFIMPQ"
+"""Types of the messages that end the definitions of a ULog, and of those that make them up."""
+_ULOG_LONGEST = 10_000
+"""Length above which pyulog takes a message of unknown type for damage and reads on one byte later."""
 _NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
 
 
@@ -192,11 +198,30 @@ def _dataflash(path: Path, wanted: set[str]) -> Tables:
     return rows.tables()
 
 
+def _check_definitions(path: Path) -> None:
+    """Refuse a ULog that ends inside damaged definitions: pyulog would read it for ever."""
+    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data:
+        at = _ULOG_START
+        while at + _ULOG_HEAD.size <= len(data):
+            length, kind = _ULOG_HEAD.unpack_from(data, at)
+            after = at + _ULOG_HEAD.size + length
+            if kind in _ULOG_DATA:
+                return
+            if kind in _ULOG_DEFINITIONS or (kind and 0 < length <= _ULOG_LONGEST):
+                at = after
+            elif after > len(data):
+                what = f"of {length} bytes, {after - len(data)} more than the file has"
+                raise UsageError(f"{path} is a damaged ULog: at byte {at} it defines a message {what}")
+            else:
+                at += 1
+
+
 def _ulog(path: Path, wanted: set[str]) -> Tables:
     require_extra("control", "logs of PX4")
     from pyulog import ULog
     from pyulog.core import ULogException
 
+    _check_definitions(path)
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         try:
             log = ULog(str(path), sorted(wanted) or None, disable_str_exceptions=True)

@@ -107,6 +107,23 @@ SEEKS_BEFORE_THE_FILE += b"\xff" + bytes(4)
 """Found by fuzzing: flags with the offset of appended data at -2^31."""
 
 
+def test_a_ulog_that_ends_inside_damaged_definitions_is_refused_and_not_read_for_ever(px4: Path) -> None:
+    whole = px4.read_bytes()
+    first = 16 + 3 + 40
+    px4.write_bytes(whole[:first] + b"\xff\xff\x00" + whole[first:-40])
+    with pytest.raises(UsageError, match=f"at byte {first} it defines a message of 65535 bytes"):
+        read_flight_log(px4)
+
+
+def test_damage_inside_the_definitions_of_a_ulog_does_not_end_it(tmp_path: Path) -> None:
+    rows = [(0.1 * step, 1.0, 0.0, 0.0, 0.0) for step in range(1000)]
+    path = ulog(tmp_path / "log.ulg", {"vehicle_attitude": ("float[4] q", rows)})
+    whole = path.read_bytes()
+    first = 16 + 3 + 40
+    path.write_bytes(whole[:first] + bytes(5) + whole[first:])
+    assert len(read_flight_log(path)["vehicle_attitude"]["time"]) == 1000
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [
