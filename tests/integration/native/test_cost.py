@@ -92,6 +92,26 @@ def test_twice_the_rounds_cost_twice_as_much_and_call_twice_as_often(source):
     assert once.places[0].source.endswith("work.cpp:7")
 
 
+def test_a_changed_header_is_compiled_and_an_unchanged_one_is_not(tmp_path, monkeypatch):
+    law = load_catalogue().processor("rpi4-cortex-a72").core_law()
+    header, file = tmp_path / "rounds.h", tmp_path / "use.c"
+    header.write_text("enum { ROUNDS = 10 };\n")
+    file.write_text('#include "rounds.h"\nint work(int a) { return a + ROUNDS; }\n')
+    before = compile_program([file], law)
+    with monkeypatch.context() as without_compiler:
+        without_compiler.setattr("volery.cost.native.compilation.run_tool", None)
+        assert compile_program([file], law).text == before.text
+    header.write_text("enum { ROUNDS = 20 };\n")
+    assert compile_program([file], law).text != before.text
+
+
+def test_programs_run_again_where_nothing_can_be_kept(source, tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("VOLERY_CACHE", str(tmp_path / "file"))
+    program = compile_program([source], load_catalogue().processor("rpi4-cortex-a72").core_law())
+    assert estimate_program(program, Invocation("work(10)")).library_calls == {"sin": 10}
+
+
 def test_the_same_run_costs_the_same_each_time(source):
     program = compile_program([source], load_catalogue().processor("intel-i5-3470").core_law())
     first, second = (estimate_program(program, Invocation("work(500)")) for _ in range(2))

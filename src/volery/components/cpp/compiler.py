@@ -7,7 +7,6 @@ included (the system's too) are unchanged. The folder may be deleted at any time
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -19,6 +18,7 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
+from volery.base.dependency_record import content_digest, is_current, rule_dependencies, write_record
 from volery.base.errors import Location, ModelError, UsageError
 
 _SOURCE_SUFFIXES = (".cpp", ".cc", ".cxx", ".c++")
@@ -183,20 +183,17 @@ class CppToolchain:
         """
         folders = [option for folder in include for option in ("-I", str(folder))]
         command = [compiler().program, *FLAGS, *_extra_flags(), *flags, *folders, "-c", str(source)]
-        place = cache_folder() / _digest(compiler().version, *command, _content(source))
+        place = cache_folder() / _digest(compiler().version, *command, content_digest(source))
         made, record = place.with_suffix(".o"), place.with_suffix(".json")
-        if made.exists() and _is_current(record):
+        if made.exists() and is_current(record):
             return made
         if self.report_progress is not None:
             self.report_progress(f"compiling {source.name} of {self.component}")
         with tempfile.TemporaryDirectory(dir=cache_folder()) as scratch:
             new, depends = Path(scratch, "new.o"), Path(scratch, "new.d")
             self._run([*command, "-MD", "-MF", str(depends), "-o", str(new)])
-            headers = _read_dependencies(depends.read_text(encoding="utf-8"))
             new_record = Path(scratch, "new.json")
-            new_record.write_text(
-                json.dumps({name: _content(Path(name)) for name in headers}), encoding="utf-8"
-            )
+            write_record(new_record, rule_dependencies(depends.read_text(encoding="utf-8")))
             new.replace(made)
             new_record.replace(record)
         return made
@@ -213,7 +210,8 @@ class CppToolchain:
         self, kind: Sequence[str], objects: Sequence[Path], options: Sequence[str], suffix: str
     ) -> Path:
         command = [compiler().program, *kind]
-        place = cache_folder() / _digest(compiler().version, *command, *options, *map(_content, objects))
+        contents = map(content_digest, objects)
+        place = cache_folder() / _digest(compiler().version, *command, *options, *contents)
         made = place.with_suffix(suffix)
         if not made.exists():
             with tempfile.TemporaryDirectory(dir=cache_folder()) as scratch:
@@ -245,25 +243,3 @@ def _extra_flags() -> tuple[str, ...]:
 
 def _digest(*parts: str) -> str:
     return sha256("\0".join(parts).encode()).hexdigest()[:32]
-
-
-def _content(path: Path) -> str:
-    try:
-        return sha256(path.read_bytes()).hexdigest()
-    except OSError:
-        return "gone"
-
-
-def _is_current(record: Path) -> bool:
-    """Return whether all files of a dependency record are unchanged."""
-    try:
-        known = json.loads(record.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return all(_content(Path(name)) == content for name, content in known.items())
-
-
-def _read_dependencies(text: str) -> list[str]:
-    r"""Return the files of a make rule: ``a.o: b.cpp c.h \``."""
-    _, _, files = text.replace("\\\n", " ").partition(": ")
-    return [name.replace("\\ ", " ") for name in re.split(r"(?<!\\)\s+", files.strip()) if name]

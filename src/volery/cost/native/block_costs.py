@@ -12,16 +12,17 @@ text of their address.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native import core_model
+from volery.cost.native.build_cache import cached_path, keep_file
 from volery.cost.native.compilation import Program, compile_program
 from volery.cost.native.instruction_tables import InstructionTables, instruction_tables
 from volery.cost.native.instrumented_run import ADDRESS, AHEAD, LEVEL, NUMBER, POSITION, BlockTrace
@@ -264,37 +265,25 @@ def blocks_of(code: MachineCode, first: int) -> list[int]:
 # -- costs kept in the user's cache
 
 
-def cache_folder() -> Path:
-    """Return the folder of kept costs: ``$VOLERY_CACHE``, or ``volery`` in the user's cache."""
-    named = os.environ.get("VOLERY_CACHE")
-    if named:
-        return Path(named)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "volery"
-
-
 def load_costs(key: str) -> BlockCosts | None:
     """Return the costs kept under a ``Program.key``, or None."""
     try:
-        with np.load(_file(key)) as kept:
+        with np.load(cached_path(_name(key))) as kept:
             return BlockCosts(kept["cycles"], kept["instructions"], kept["memory"], kept["seen"])
     except (OSError, KeyError, ValueError):
         return None
 
 
 def save_costs(key: str, costs: BlockCosts) -> None:
-    """Keep costs under a ``Program.key``; do nothing where the folder cannot be written."""
-    file = _file(key)
-    new = file.with_suffix(f".{os.getpid()}.npz")
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
+    """Keep costs under a ``Program.key``; do nothing where the cache cannot be written."""
+    with TemporaryDirectory(prefix="volery-native-") as folder:
+        new = Path(folder, _name(key))
         np.savez(new, **asdict(costs))
-        new.replace(file)
-    except OSError:
-        return
+        keep_file(new, new.name)
 
 
-def _file(key: str) -> Path:
-    return cache_folder() / "native" / f"{key}.npz"
+def _name(key: str) -> str:
+    return f"{key}.npz"
 
 
 # -- for components

@@ -14,21 +14,22 @@ intermediate code and reported with file and line.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import re
-import shlex
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from volery.base.dependency_record import is_current, rule_dependencies, write_record
 from volery.base.errors import UsageError
 from volery.cost.code_laws import CoreLaw
+from volery.cost.native.build_cache import cached_file, cached_path, digest, keep_file
 from volery.cost.native.llvm_ir import (
     BasicBlock,
     basic_blocks,
@@ -89,12 +90,11 @@ def overlay_options(source: Path, isa: str, folder: Path, dependencies: Dependen
         folder: Empty folder for the copies.
         dependencies: Lists the files, the system's excepted, that the source includes.
     """
-    folder.mkdir()
     known: set[str] = {_absolute(source)}
     options: list[str] = []
     for _ in range(_MOST_PASSES):
         options = _overlay(sorted(known), isa, folder)
-        found = {_absolute(one) for one in _files(dependencies(options))}
+        found = {_absolute(one) for one in rule_dependencies(dependencies(options))}
         if found <= known:
             break
         known |= found
@@ -104,11 +104,6 @@ def overlay_options(source: Path, isa: str, folder: Path, dependencies: Dependen
 def _absolute(path: str | Path) -> str:
     """Return the path by which the front end finds the file; links are not followed."""
     return os.path.normpath(Path.cwd() / path)
-
-
-def _files(rule: str) -> list[str]:
-    """Return the files after the colon of a rule for make."""
-    return shlex.split(rule.partition(":")[2].replace("\\\n", " "))
 
 
 def _overlay(files: Sequence[str], isa: str, folder: Path) -> list[str]:
@@ -211,6 +206,12 @@ class LlvmToolchain:
     llc: str
     link: str
 
+    @cached_property
+    def versions(self) -> tuple[str, ...]:
+        """What changes with another version of the programs."""
+        paths = [Path(one) for one in (self.clang, self.opt, self.llc, self.link)]
+        return tuple(f"{one} {one.stat().st_mtime_ns} {one.stat().st_size}" for one in paths)
+
 
 @cache
 def llvm_toolchain() -> LlvmToolchain:
@@ -277,6 +278,10 @@ PROMOTE = "function(loop-mssa(licm))"
 METHOD = "4"
 """Version of the method that finds costs; a new version makes kept costs invalid."""
 
+_RULE = "read.d"
+"""File with the rule for make that the front end writes."""
+_SEARCH_PATHS = ("CPATH", "C_INCLUDE_PATH", "CPLUS_INCLUDE_PATH")
+
 C_SUFFIXES = {".c"}
 LANGUAGES = {".c", ".cc", ".cpp", ".cxx", ".C"}
 
@@ -292,17 +297,20 @@ class Program:
     @cached_property
     def key(self) -> str:
         """Digest of the code and the core."""
-        text = METHOD + self.text + self.law.model_dump_json()
-        return hashlib.sha256(text.encode()).hexdigest()[:24]
+        return digest(METHOD, self.text, self.law.model_dump_json())
 
     @cached_property
     def assembly(self) -> str:
         """Assembly for the core."""
         options = ["-O2", f"-mcpu={self.law.cpu}", "-relocation-model=pic"]
         notation = ["-x86-asm-syntax=intel"] if self.law.isa == "x86_64" else []
-        return run_tool(
-            [llvm_toolchain().llc, *options, *notation, "-o", "-"], with_access_columns(self.text)
-        )
+        command = [llvm_toolchain().llc, *options, *notation, "-o"]
+
+        def make(out: Path) -> None:
+            run_tool([*command, str(out)], with_access_columns(self.text))
+
+        with TemporaryDirectory(prefix="volery-native-") as folder:
+            return cached_file(f"{self.key}.s", Path(folder), make).read_text(encoding="utf-8")
 
     @cached_property
     def machine_blocks(self) -> tuple[MachineBlock, ...]:
@@ -352,19 +360,38 @@ def compile_program(sources: Sequence[Path], law: CoreLaw, flags: Sequence[str] 
             raise UsageError(f"{source}: there is no such file")
         if source.suffix not in LANGUAGES:
             raise UsageError(f"{source}: not a C or C++ file ({', '.join(sorted(LANGUAGES))})")
-    tools = llvm_toolchain()
-    with TemporaryDirectory(prefix="volery-native-") as folder:
-        modules = []
-        for number, source in enumerate(sources):
-            plain = _front_end(source, law.isa, flags, Path(folder, str(number)))
-            module = Path(folder, f"{number}.ll")
-            retargeted = retarget(plain, *TARGETS[law.isa])
-            run_tool(
-                [tools.opt, f"-passes={OPTIMISE}", f"-mcpu={law.cpu}", "-S", "-o", str(module)], retargeted
-            )
-            modules.append(str(module))
-        text = run_tool([tools.link, "-S", "-o", "-", *modules])
+    with TemporaryDirectory(prefix="volery-native-") as scratch:
+        text = _optimised(sources, law, flags, Path(scratch))
     return Program(text, law, tuple(basic_blocks(text)))
+
+
+def _optimised(sources: Sequence[Path], law: CoreLaw, flags: Sequence[str], scratch: Path) -> str:
+    """Return the intermediate code of the program, from the cache while no file that was read has changed."""
+    tools = llvm_toolchain()
+    place = [str(Path.cwd()), *(os.environ.get(one, "") for one in _SEARCH_PATHS), *map(str, sources)]
+    name = digest(METHOD, *tools.versions, law.isa, law.cpu, *flags, "", *place)
+    record, cached = cached_path(f"{name}.json"), cached_path(f"{name}.ll")
+    if is_current(record):
+        with suppress(OSError):
+            return cached.read_text(encoding="utf-8")
+    modules, read = [], set[str]()
+    for number, source in enumerate(sources):
+        folder = scratch / str(number)
+        folder.mkdir()
+        plain = _front_end(source, law.isa, flags, folder)
+        read.update(rule_dependencies((folder / _RULE).read_text(encoding="utf-8")))
+        module = scratch / f"{number}.ll"
+        retargeted = retarget(plain, *TARGETS[law.isa])
+        run_tool([tools.opt, f"-passes={OPTIMISE}", f"-mcpu={law.cpu}", "-S", "-o", str(module)], retargeted)
+        modules.append(module)
+    out = modules[0] if len(modules) == 1 else scratch / "linked.ll"
+    if len(modules) > 1:
+        run_tool([tools.link, "-S", "-o", str(out), *map(str, modules)])
+    text = out.read_text(encoding="utf-8")
+    write_record(scratch / record.name, sorted(read))
+    keep_file(out, cached.name)
+    keep_file(scratch / record.name, record.name)
+    return text
 
 
 def _front_end(source: Path, isa: str, flags: Sequence[str], folder: Path) -> str:
@@ -379,7 +406,8 @@ def _front_end(source: Path, isa: str, flags: Sequence[str], folder: Path) -> st
     command = [llvm_toolchain().clang, "-x", language, *flags]
 
     def compiled(*options: str) -> str:
-        return run_tool([*command, *FRONT_END_OPTIONS, *options, str(source), "-o", "-"])
+        rule = ("-MD", "-MF", str(folder / _RULE))
+        return run_tool([*command, *FRONT_END_OPTIONS, *rule, *options, str(source), "-o", "-"])
 
     if isa == HOST_ISA:
         return compiled()

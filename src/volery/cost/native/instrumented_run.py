@@ -20,6 +20,7 @@ import numpy as np
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.cost.code_laws import MemoryLaw
+from volery.cost.native.build_cache import cached_file, digest
 from volery.cost.native.compilation import Program, llvm_toolchain, run_tool
 
 _SWITCHED, _ACCESSED = 1 << 31, 1 << 30
@@ -159,9 +160,19 @@ class Invocation:
     times: int = 1
 
 
+_BEGINNING = """\
+void volery_fix_addresses(char **);
+void volery_begin(void);
+void volery_end(void);
+__attribute__((constructor(101))) static void start(int count, char **arguments) {
+    volery_fix_addresses(arguments);
+}
+"""
+
+
 def driver(program: Program, invocation: Invocation) -> str:
     """Return the C text that makes the calls between ``volery_begin`` and ``volery_end``."""
-    declared = {"": "void volery_begin(void);\nvoid volery_end(void);\n"}
+    declared = {"": _BEGINNING}
     calls = [
         _call(program, text, declared)
         for text in (*invocation.before, *([invocation.entry] if invocation.entry else []))
@@ -191,25 +202,44 @@ def timing_driver(program: Program, invocation: Invocation) -> str:
 
 
 def build_executable(program: Program, invocation: Invocation, instrumented: Path, folder: Path) -> Path:
-    """Link an instrumented object with its driver and the runtime; return the executable in ``folder``."""
+    """Link an instrumented object with its driver and the runtime.
+
+    Returns:
+        The executable: a file of the cache, or of ``folder`` if the user's libraries are linked, which may
+        change, or if there is no cache.
+    """
     source = folder / "driver.c"
     source.write_text(driver(program, invocation), encoding="utf-8")
-    out = folder / "program"
-    clang = llvm_toolchain().clang
-    with as_file(files("volery.cost.native").joinpath("runtime")) as runtime:
-        ours = [str(runtime / name) for name in RUNTIME]
-        command = [clang, "-O2", "-x", "c", str(source), *ours, "-x", "none", str(instrumented)]
-        run_tool([*command, *_link_options(program, invocation), "-o", str(out)])
-    return out
+    objects = [instrumented, *runtime_objects(folder)]
+    command = [llvm_toolchain().clang, "-O2", "-x", "c", str(source), "-x", "none", *map(str, objects)]
+    options = _link_options(program, invocation)
+
+    def make(out: Path) -> None:
+        run_tool([*command, *options, "-o", str(out)])
+
+    if invocation.links:
+        make(folder / "program")
+        return folder / "program"
+    contents = [one.read_bytes() for one in (source, *objects)]
+    return cached_file(f"{digest(*contents, *options)}.program", folder, make, runs=True)
 
 
 def runtime_objects(folder: Path) -> list[Path]:
-    """Compile the runtime in ``folder``, for code that is loaded by another program."""
+    """Return the runtime's objects, which shared libraries may contain as well.
+
+    They are files of the cache, or of ``folder`` where there is no cache.
+    """
+    clang = llvm_toolchain().clang
     with as_file(files("volery.cost.native").joinpath("runtime")) as runtime:
-        for name in RUNTIME:
-            compiled = ["-x", "c", "-c", str(runtime / name), "-o", str(folder / f"{name}.o")]
-            run_tool([llvm_toolchain().clang, "-O2", "-fPIC", *compiled])
-    return [folder / f"{name}.o" for name in RUNTIME]
+        sources = [runtime / name for name in RUNTIME]
+        made_of = digest(clang, *(one.read_bytes() for one in sorted(runtime.iterdir()) if one.is_file()))
+
+        def compiled(source: Path) -> Path:
+            command = [clang, "-O2", "-fPIC", "-x", "c", "-c", str(source), "-o"]
+            name = f"{made_of}.{source.name}.o"
+            return cached_file(name, folder, lambda out: run_tool([*command, str(out)]))
+
+        return [compiled(source) for source in sources]
 
 
 def _link_options(program: Program, invocation: Invocation) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from volery.cost.native.block_costs import BlockCosts, blocks_of, save_costs, traced_costs
+from volery.cost.native.build_cache import cached_file
 from volery.cost.native.compilation import Program
 from volery.cost.native.instrumented_run import (
     WINDOW,
@@ -74,12 +75,12 @@ def estimate_program(program: Program, invocation: Invocation) -> ProgramEstimat
         counting, tracing = folder / "counting", folder / "tracing"
         for one in (counting, tracing):
             one.mkdir()
-        program.counted_object(counting / "code.o")
-        counted = build_executable(program, invocation, counting / "code.o", counting)
+        code = cached_file(f"{program.key}.counted.o", counting, program.counted_object)
+        counted = build_executable(program, invocation, code, counting)
         counts = block_counts(counted, invocation, counting)
-        program.traced_object(tracing / "code.o")
         stride = WINDOW * max(1, -(-int(counts.sum()) // MOST_TRACED))
-        traced = build_executable(program, invocation, tracing / "code.o", tracing)
+        code = cached_file(f"{program.key}.traced.o", tracing, program.traced_object)
+        traced = build_executable(program, invocation, code, tracing)
         trace = trace_blocks(traced, invocation, tracing, stride, program.law.memory)
     costs, path = traced_costs(program, trace)
     save_costs(program.key, costs)

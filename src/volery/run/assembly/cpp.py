@@ -169,11 +169,8 @@ class TracingCompiler:
         with TemporaryDirectory(dir=cache_folder()) as scratch:
             code = Path(scratch, "code.o")
             self.program.traced_object(code)
-            made = [code, *runtime_objects(Path(scratch))]
-            kept = [cache_folder() / f"{self.program.key}.{one.name}" for one in made]
-            for one, place in zip(made, kept, strict=True):
-                one.replace(place)
-        return kept
+            made = code.replace(cache_folder() / f"{self.program.key}.{code.name}")
+        return [made, *runtime_objects(cache_folder())]
 
     def begin(self, library: LoadedLibrary, file: Path) -> None:
         """Make a library record its blocks to *file* until its ``volery_end`` is called."""

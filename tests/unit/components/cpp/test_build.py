@@ -131,11 +131,6 @@ def test_a_meter_returns_the_steps_since_the_last_reading():
     assert meter() == 0
 
 
-def test_a_make_rule_names_its_files():
-    rule = "x.o: /a/b.cpp \\\n /usr/in\\ clude/c.h \\\n d.h\n"
-    assert compiler._read_dependencies(rule) == ["/a/b.cpp", "/usr/in clude/c.h", "d.h"]
-
-
 def test_a_cache_that_cannot_be_made(monkeypatch, tmp_path):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))

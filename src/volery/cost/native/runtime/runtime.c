@@ -9,6 +9,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/personality.h>
+#include <unistd.h>
 
 extern uint64_t volery_counters[] __attribute__((weak));
 extern const uint64_t volery_counters_length __attribute__((weak));
@@ -63,6 +65,14 @@ void volery_trace_into(const char *name, uint64_t blocks, uint64_t of_blocks) {
     window = blocks;
     stride = of_blocks;
     trace = fopen(name, "wb");
+}
+
+/* Restart the program at the same addresses as in every run, if the system allows it: its caches then miss at
+ * the same accesses. */
+void volery_fix_addresses(char **arguments) {
+    int now = personality(0xffffffff);
+    if (now != -1 && !(now & ADDR_NO_RANDOMIZE) && personality(now | ADDR_NO_RANDOMIZE) != -1)
+        execv("/proc/self/exe", arguments);
 }
 
 void volery_begin(void) {
