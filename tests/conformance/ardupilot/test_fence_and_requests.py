@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import hypot, pi
 from typing import Any
 
 import pytest
@@ -44,8 +44,9 @@ def test_points_are_stored_read_back_and_cleared(kind: int, points: list[Any], b
     rig = bench()
     rig.run(0.5)
     assert upload(rig, kind, points) == ACCEPTED
-    name = "FENCE_TOTAL" if kind == FENCE else "RALLY_TOTAL"
-    assert rig.vehicle.parameters[name] == len(points)
+    corners = sum(point["command"] in (5001, 5002) for point in points)
+    name, total = ("FENCE_TOTAL", corners + 2) if kind == FENCE else ("RALLY_TOTAL", len(points))
+    assert rig.vehicle.parameters[name] == total
     rig.send("MISSION_REQUEST_LIST", **TARGET, mission_type=kind)
     rig.run(0.05)
     assert rig.latest["MISSION_COUNT"]["count"] == len(points)
@@ -125,7 +126,7 @@ def test_standing_outside_the_fence_forbids_arming(bench: Any) -> None:
     assert upload(rig, FENCE, [{**corner, "command": 5002} for corner in SQUARE]) == ACCEPTED
     assert rig.command(207, 1) == ACCEPTED
     assert rig.command(401) == ACCEPTED
-    assert rig.texts()[-1] == "PreArm: Vehicle outside fence"
+    assert rig.texts()[-1] == "PreArm: vehicle outside fence"
     assert rig.command(400, 1) == FAILED
 
 
@@ -146,11 +147,30 @@ def test_guided_pauses_and_continues(bench: Any) -> None:
     assert rig.command(193, 0) == ACCEPTED
     rig.run(6.0)
     stopped = rig.vehicle.estimate.position[0]
-    assert stopped < 40.0
+    assert stopped < 45.0  # 1 m/s^2 from 8 m/s
     assert rig.command(193, 2) == 2
     assert rig.command(193, 1) == ACCEPTED
     rig.run(15.0)
     assert rig.vehicle.estimate.position[0] == pytest.approx(60.0, abs=1.0)
+
+
+def test_a_mission_pauses_twice_and_continues_twice(bench: Any) -> None:
+    rig = bench(parameters={"AUTO_OPTIONS": 3})
+    rig.run(0.5)
+    items = [point(16, 0, 0), {**point(22, 0, 0), "z": 10.0}, point(16, 200, 0)]
+    assert upload(rig, 0, items) == ACCEPTED
+    rig.mode(3)
+    assert rig.command(400, 1) == ACCEPTED
+    rig.run_until(lambda: rig.vehicle.mission.current == 2)
+    rig.run(3.0)
+    assert [rig.command(193, 0), rig.command(193, 0)] == [ACCEPTED, ACCEPTED]
+    rig.run(6.0)
+    stopped = rig.vehicle.estimate.position[0]
+    rig.run(4.0)
+    assert rig.vehicle.estimate.position[0] == pytest.approx(stopped, abs=0.5)  # and not back
+    assert [rig.command(193, 1), rig.command(193, 1)] == [ACCEPTED, ACCEPTED]
+    rig.run(5.0)
+    assert hypot(*rig.vehicle.estimate.velocity) > 3.0
 
 
 def test_a_mode_without_pause_says_so(bench: Any) -> None:

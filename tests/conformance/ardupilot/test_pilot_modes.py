@@ -48,6 +48,19 @@ def test_a_circle_is_flown_about_a_point_ahead(bench: Any) -> None:
     assert rig.height == pytest.approx(10.0, abs=1.0)
 
 
+@pytest.mark.parametrize("mode", [2, 5, POSHOLD])
+def test_a_climb_from_the_ground_goes_on_to_the_height_of_the_pilots_takeoff(mode: int, bench: Any) -> None:
+    rig = bench(parameters={"PILOT_TKOFF_ALT": 700})
+    rig.run(0.5)
+    rig.mode(mode)
+    rig.hold_sticks(0.5, 1500, 1500, 1000, 1500)
+    assert rig.command(400, 1) == 0
+    rig.hold_sticks(3.0, 1500, 1500, 1000, 1500)
+    rig.hold_sticks(0.5, 1500, 1500, 1750, 1500)
+    rig.hold_sticks(9.0, *MIDDLE)
+    assert rig.height == pytest.approx(7.0, abs=0.5)
+
+
 def test_acro_leans_by_stick_and_levels_out(bench: Any) -> None:
     rig = bench()
     rig.airborne(20.0)

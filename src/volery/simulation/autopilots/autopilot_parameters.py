@@ -157,6 +157,8 @@ class Tuning:
     pilot_down: float = 2.5
     pilot_accel_z: float = 2.5
     pilot_yaw_rate: float = radians(202.5)
+    pilot_takeoff: float = 0.0
+    """Height [m] to which a climb from the ground by the throttle goes on by itself; 0: it does not."""
     throttle_dead: float = 0.1
     """Half width of the throttle's dead zone about its middle, on a scale of 0..1."""
     hover_throttle: float = 0.39

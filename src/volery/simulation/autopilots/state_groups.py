@@ -180,7 +180,19 @@ class ReportState:
     """Uptime at which operating hours were last stored [ns]."""
     contacts: int = 0
     """Number of touch-downs reported."""
-    fence_breaches: int = 0
-    """Number of times that the vehicle has left the fence."""
-    fence_breached_at: Ns = 0
+
+
+@dataclass
+class FenceState:
+    """Breaches of the fence."""
+
+    floor: bool = False
+    """Whether the floor counts."""
+    breached: dict[int, float] = field(default_factory=dict)
+    """Limits beyond which the vehicle is, to the distance beyond [m] at which the breach counts anew."""
+    count: int = 0
+    """Number of breaches."""
+    breached_at: Ns = 0
     """Uptime of the last of them [ns]."""
+    total: int = 0
+    """Number of points that was stated last."""

@@ -26,6 +26,7 @@ from volery.simulation.autopilots.state_groups import (
     ArmingState,
     CommandedLimits,
     FailsafeState,
+    FenceState,
     GroundState,
     Home,
     OutputState,
@@ -252,6 +253,7 @@ class Vehicle:
         self.outputs = OutputState()
         self.switches = SwitchState()
         self.failsafes = FailsafeState()
+        self.fence = FenceState()
         self.reports = ReportState(arming_checks_at=self.uptime(), counters_at=self.uptime())
         self.home: Home | None = None
         self._setpoint: Setpoint = OFF

@@ -8,7 +8,7 @@ from math import isfinite, isnan, pi, radians
 
 from volery.base.frames import wrap
 from volery.simulation.autopilots.ardupilot import payload
-from volery.simulation.autopilots.ardupilot.failsafes import fence_admits, on_fence_enable
+from volery.simulation.autopilots.ardupilot.fence import fence_admits, on_fence_enable
 from volery.simulation.autopilots.ardupilot.modes import (
     CRITICAL,
     FORCE,

@@ -8,7 +8,8 @@ from math import acos, cos, degrees, hypot, radians, sin
 from volery.base.frames import Vector
 from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
-from volery.simulation.autopilots.ardupilot.failsafes import COPTER_FAILSAFES, outside_fence
+from volery.simulation.autopilots.ardupilot.failsafes import COPTER_FAILSAFES
+from volery.simulation.autopilots.ardupilot.fence import FENCE_CHECKS, check_fence, respond_copter
 from volery.simulation.autopilots.ardupilot.firmware import (
     ardupilot_mavlink,
     builders,
@@ -156,7 +157,7 @@ CHECKS = (
     Check("AHRS: waiting for home", in_position_modes(0.0, 19.852)),
     Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
     *SHARED_CHECKS,
-    Check("Vehicle outside fence", outside_fence),
+    *FENCE_CHECKS,
 )
 
 HEALTH = Health(0x5371FC2F, 0x53619C2F, 0x57719C2F, round(22.0 * S), round(22.0 * S))
@@ -212,6 +213,7 @@ def on_step(vehicle: Vehicle) -> None:
         pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
         pilot_input.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
     pilot_input.keep_track(vehicle)
+    check_fence(vehicle, respond_copter)
     commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))
     if not vehicle.armed:
         return

@@ -10,9 +10,16 @@ from functools import partial
 from typing import Any
 
 from volery.base.time import MS, Ns, S
-from volery.simulation.autopilots.ardupilot import failsafes, mission, payload, pilot_input, rally, telemetry
+from volery.simulation.autopilots.ardupilot import (
+    fence_points,
+    mission,
+    payload,
+    pilot_input,
+    rally,
+    telemetry,
+)
 from volery.simulation.autopilots.ardupilot.commands import go_to_item
-from volery.simulation.autopilots.ardupilot.failsafes import FENCE
+from volery.simulation.autopilots.ardupilot.fence import fence_status
 from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED
 from volery.simulation.autopilots.ardupilot.telemetry import Health
@@ -52,16 +59,6 @@ def on_terrain_check(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) ->
     sender.send("TERRAIN_REPORT", {"lat": fields["lat"], "lon": fields["lon"], "spacing": 0, "pending": 0})
 
 
-def on_fence_fetch(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
-    """Handle FENCE_FETCH_POINT, the deprecated form."""
-    points, index = vehicle.points.get(FENCE, []), fields["idx"]
-    if index >= len(points):
-        vehicle.send_text(WARNING, f"Invalid fence point, index past end({index} >= {len(points)})")
-        return
-    place = {"lat": points[index].x / 1e7, "lng": points[index].y / 1e7}
-    sender.answer("FENCE_POINT", idx=index, count=len(points), **place)
-
-
 def accepts(vehicle: Vehicle, name: str, system: int) -> bool:
     """Return whether a message called *name* from a system counts: SYSID_ENFORCE admits SYSID_MYGCS only.
 
@@ -80,7 +77,7 @@ def questions(version: Builder) -> dict[str, QuestionHandler]:
 
     return {
         "AUTOPILOT_VERSION_REQUEST": on_version,
-        "FENCE_FETCH_POINT": on_fence_fetch,
+        "FENCE_FETCH_POINT": fence_points.on_fence_fetch,
         "FILE_TRANSFER_PROTOCOL": onboard_files.on_file_transfer_with_parameters,
         "LOG_REQUEST_LIST": on_log_list,
         "RALLY_FETCH_POINT": rally.on_rally_fetch,
@@ -106,7 +103,7 @@ BUILDERS: Mapping[str, Builder] = {
     "BATTERY_STATUS": telemetry.battery_status,
     "DISTANCE_SENSOR": telemetry.distance_sensor,
     "EKF_STATUS_REPORT": telemetry.ekf_status,
-    "FENCE_STATUS": failsafes.fence_status,
+    "FENCE_STATUS": fence_status,
     "EXTENDED_SYS_STATE": telemetry.extended_sys_state,
     "GLOBAL_POSITION_INT": telemetry.global_position,
     "GPS_GLOBAL_ORIGIN": telemetry.origin,
@@ -289,6 +286,7 @@ def builders(
 
 MESSAGE_HANDLERS = {
     "HEARTBEAT": pilot_input.on_heartbeat,
+    "FENCE_POINT": fence_points.on_fence_point,
     "RALLY_POINT": rally.on_rally_point,
     "MANUAL_CONTROL": pilot_input.on_manual_control,
     "RC_CHANNELS_OVERRIDE": pilot_input.on_override,
@@ -339,8 +337,9 @@ def ardupilot_mavlink(
             home_item=mission.home_item,
             go_to_item=go_to_item,
             grew=mission.mission_grew,
-            stored_point=failsafes.stored_fence_point,
-            points_changed=failsafes.points_changed,
+            stored_point=fence_points.stored_fence_point,
+            refuses_points=fence_points.refuse_points,
+            points_changed=fence_points.points_changed,
             writes_parts=True,
         ),
         parameters=ParameterPolicy(

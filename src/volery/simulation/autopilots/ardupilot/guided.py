@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from volery.base.frames import Vector
 from volery.simulation.autopilots.ardupilot.commands import FARTHEST_POINT
-from volery.simulation.autopilots.ardupilot.failsafes import fence_admits
+from volery.simulation.autopilots.ardupilot.fence import fence_admits
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
 from volery.simulation.autopilots.manoeuvres.rover_driving import GuidedRover
 from volery.simulation.autopilots.mavlink.messages import all_within

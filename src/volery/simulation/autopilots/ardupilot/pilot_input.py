@@ -13,11 +13,11 @@ from math import cos, dist, radians, sin
 from typing import Any
 
 from volery.base.time import MS, Ns, from_seconds
-from volery.simulation.autopilots.ardupilot.failsafes import on_fence_enable, radio_lost
+from volery.simulation.autopilots.ardupilot.failsafes import radio_lost
+from volery.simulation.autopilots.ardupilot.fence import enable_fence
 from volery.simulation.autopilots.ardupilot.modes import arm, change_mode, disarm
 from volery.simulation.autopilots.ardupilot.payload import GRAB, LET_GO, move_gripper, set_relay
 from volery.simulation.autopilots.manual_control import ChannelRange
-from volery.simulation.autopilots.mavlink.messages import Command
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 IGNORE, RELEASE = 65_535, 65_534
@@ -247,8 +247,7 @@ def read_rudder(
 
 
 def _switch_fence(vehicle: Vehicle, position: int) -> None:
-    on = float(position > 0)
-    on_fence_enable(vehicle, Command(207, on, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, is_int=False))
+    enable_fence(vehicle, on=position > 0)
 
 
 def _switch_gripper(vehicle: Vehicle, position: int) -> None:

@@ -9,7 +9,7 @@ from math import hypot
 from typing import Any
 
 from volery.base.frames import Vector
-from volery.simulation.autopilots.ardupilot.failsafes import RALLY, RALLY_POINT
+from volery.simulation.autopilots.ardupilot.fence_points import RALLY, RALLY_POINT
 from volery.simulation.autopilots.ardupilot.modes import WARNING
 from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, MissionItem

@@ -6,7 +6,8 @@ from functools import cache, partial
 
 from volery.base.time import MS, S
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
-from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES, outside_fence
+from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES
+from volery.simulation.autopilots.ardupilot.fence import FENCE_CHECKS, check_fence, respond_rover
 from volery.simulation.autopilots.ardupilot.firmware import (
     ALL,
     ardupilot_mavlink,
@@ -156,7 +157,7 @@ CHECKS = (
     Check("AHRS: waiting for home", between_uptimes(0.0, 10.36)),
     Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
     *SHARED_CHECKS,
-    Check("Vehicle outside fence", outside_fence),
+    *FENCE_CHECKS,
 )
 
 HEALTH = Health(0x1330DC2F, 0x1320802F, 0x1330812F, round(22.4 * S), round(42.0 * S))
@@ -207,6 +208,7 @@ def on_step(vehicle: Vehicle) -> None:
         pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
         pilot_input.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
     pilot_input.keep_track(vehicle)
+    check_fence(vehicle, respond_rover)
     if vehicle.armed:
         vehicle.ground.flight_time += ROVER.periodic.tick
 

@@ -378,8 +378,8 @@ def sys_status(vehicle: Vehicle, health: Health) -> Fields:
     if not vehicle.arming.checks_passed:
         healthy &= ~PREARM
     if vehicle.parameters["FENCE_ENABLE"]:
-        enabled |= GEOFENCE
-        healthy = healthy & ~GEOFENCE if "fence" in vehicle.failsafes.active else healthy | GEOFENCE
+        enabled |= GEOFENCE if vehicle.parameters["FENCE_ACTION"] else 0
+        healthy = healthy & ~GEOFENCE if vehicle.fence.breached else healthy | GEOFENCE
     if age > FIX_AFTER and vehicle.estimate.fix_type == 0:
         healthy &= ~GPS
     volts, amps, left = _battery(vehicle)

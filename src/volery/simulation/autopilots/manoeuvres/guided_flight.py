@@ -8,7 +8,7 @@ from typing import NamedTuple
 from volery.base.frames import Quaternion, Vector, quaternion_to_euler
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.manoeuvres.to_point import TakeOff, ToPoint, direction_of_flight
+from volery.simulation.autopilots.manoeuvres.to_point import Brake, TakeOff, ToPoint, direction_of_flight
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 from volery.simulation.world.arithmetic import wrap_angle
 
@@ -169,13 +169,12 @@ class Guided(Manoeuvre):
         self._doing: Manoeuvre = ToPoint(vehicle)
         self._kind: type[Manoeuvre] | None = None
         """Kind of command; another kind ends the speeds that DO_CHANGE_SPEED has set."""
-        self._waiting: Manoeuvre | None = None
+        self._waiting: Brake | None = None
         """What is flown during a pause."""
 
     def pause(self) -> bool:
         """Stop; commands that arrive meanwhile are kept until ``resume``."""
-        self._waiting = ToPoint(self.vehicle)
-        self._waiting.enter()
+        self._waiting = Brake(self.vehicle, self.vehicle.tuning.accel)
         return True
 
     def resume(self) -> bool:

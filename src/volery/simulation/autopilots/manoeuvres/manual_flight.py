@@ -82,15 +82,47 @@ class Stabilize(ManualFlight):
         return min(1.0, max(0.0, centred * (1.0 - bend) + bend * centred**3))
 
 
-class AltitudeHold(ManualFlight):
+class ClimbByThrottle(ManualFlight):
+    """Common part of the modes whose throttle commands a climb rate, with the take-off to a height."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._height: float | None = None
+        """Height of the take-off [m]."""
+
+    def take_off(self, height: float) -> None:
+        """Climb to a height above home [m], unless the throttle commands a descent."""
+        self._height = height
+        self.taking_off = True
+
+    def takeoff_requested(self) -> bool:
+        """Return whether the pilot commands a climb, or a take-off was commanded.
+
+        The climb goes on to the height of the pilot's take-off, if there is one.
+        """
+        climbs = self.climb(self.pilot.throttle) > 0.0
+        if climbs and not self.taking_off and self.vehicle.tuning.pilot_takeoff > 0.0:
+            self.take_off(self.vehicle.height + self.vehicle.tuning.pilot_takeoff)
+        return self.taking_off or climbs
+
+    def commanded_climb(self) -> float:
+        """Return the climb rate now [m/s], by the throttle or by the take-off."""
+        climb = self.climb(self.pilot.throttle)
+        if self._height is None:
+            return climb
+        left = self._height - self.vehicle.height
+        if climb < 0.0 or left < CLOSE:  # the pilot commands a descent, or the height is reached
+            self._height = None
+            self.taking_off = False
+            return climb
+        return max(climb, min(self.vehicle.tuning.speed_up, root_speed(left, self.vehicle.tuning.accel_z)))
+
+
+class AltitudeHold(ClimbByThrottle):
     """Sticks command tilt angles, yaw rate and climb rate.
 
     In the throttle's dead zone the height is held.
     """
-
-    def takeoff_requested(self) -> bool:
-        """Return whether the pilot commands a climb."""
-        return self.climb(self.pilot.throttle) > 0.0
 
     def step(self) -> None:
         """Pass the sticks on."""
@@ -101,7 +133,7 @@ class AltitudeHold(ManualFlight):
                 roll=pilot.roll * tuning.tilt,
                 pitch=pilot.pitch * tuning.tilt,
                 yaw_rate=pilot.yaw * tuning.pilot_yaw_rate,
-                climb=self.climb(pilot.throttle),
+                climb=self.commanded_climb(),
                 speed_up=tuning.pilot_up,
                 speed_down=tuning.pilot_down,
                 accel_z=tuning.pilot_accel_z,
@@ -109,7 +141,7 @@ class AltitudeHold(ManualFlight):
         )
 
 
-class Loiter(ManualFlight):
+class Loiter(ClimbByThrottle):
     """Sticks command accelerations over the ground.
 
     With the sticks centred the vehicle brakes and holds its position.
@@ -121,12 +153,6 @@ class Loiter(ManualFlight):
         self._last: Ns = 0
         self._centred_at: Ns = 0
         self._held: Vector | None = None
-        self._height: float | None = None  # of a commanded take-off [m]
-
-    def take_off(self, height: float) -> None:
-        """Climb to a height above home [m], unless the throttle commands a descent."""
-        self._height = height
-        self.taking_off = True
 
     def enter(self) -> None:
         """Begin with the present velocity."""
@@ -135,13 +161,9 @@ class Loiter(ManualFlight):
         self._last = self._centred_at = self.vehicle.kernel.now()
         self._held = None
 
-    def takeoff_requested(self) -> bool:
-        """Return whether the pilot commands a climb, or a take-off was commanded."""
-        return self.taking_off or self.climb(self.pilot.throttle) > 0.0
-
     def step(self) -> None:
         """Update the velocity from the sticks, and give the set-point."""
-        pilot, climb = self.pilot, self._climb()
+        pilot, climb = self.pilot, self.commanded_climb()
         now = self.vehicle.kernel.now()
         passed, self._last = to_seconds(now - self._last), now
         if pilot.roll or pilot.pitch:
@@ -151,17 +173,6 @@ class Loiter(ManualFlight):
         else:
             self._let_go(now, passed)
         self._drive(pilot, climb)
-
-    def _climb(self) -> float:
-        climb = self.climb(self.pilot.throttle)
-        if self._height is None:
-            return climb
-        left = self._height - self.vehicle.height
-        if climb < 0.0 or left < CLOSE:  # the pilot commands a descent, or the height is reached
-            self._height = None
-            self.taking_off = False
-            return climb
-        return max(climb, min(self.vehicle.tuning.speed_up, root_speed(left, self.vehicle.tuning.accel_z)))
 
     def _push(self, pilot: StickPositions, passed: float) -> None:
         """Accelerate as the commanded tilt would, less a drag that balances it at the largest speed."""

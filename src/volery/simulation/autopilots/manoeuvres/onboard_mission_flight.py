@@ -14,7 +14,7 @@ from math import atan2, cos, hypot, pi, sin, sqrt
 from volery.base.frames import Vector
 from volery.base.time import Ns, from_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
-from volery.simulation.autopilots.manoeuvres.to_point import Land, Return, TakeOff, ToPoint, bearing
+from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return, TakeOff, ToPoint, bearing
 from volery.simulation.autopilots.onboard_mission import (
     CONDITION_DELAY,
     CONDITION_DISTANCE,
@@ -100,7 +100,7 @@ class FlyMission(Manoeuvre):
         self._jumps: dict[int, int] = {}
         self._held: deque[MissionItem] = deque()
         self._condition_since: Ns = 0
-        self._waiting: ToPoint | None = None
+        self._waiting: Brake | None = None
         """What is flown during a pause."""
         self.started = False
         """Whether the mission may leave the ground: by a start command, or by *leaves_ground*."""
@@ -135,19 +135,19 @@ class FlyMission(Manoeuvre):
             self._mirror(self._leg.manoeuvre)
 
     def pause(self) -> bool:
-        """Stop on the way to a waypoint; other items do not pause."""
+        """Stop on the way to a waypoint; other items do not pause. A second pause changes nothing."""
         leg = self._leg
         flies = leg is not None and isinstance(leg.manoeuvre, ToPoint) and not leg.manoeuvre.taking_off
-        if not flies or self._waiting is not None or self._reached_at is not None or self.vehicle.landed:
+        if not flies or self._reached_at is not None or self.vehicle.landed:
             return False
-        self._waiting = ToPoint(self.vehicle)
-        self._waiting.enter()
+        if self._waiting is None:
+            self._waiting = Brake(self.vehicle, self.vehicle.tuning.accel)
         return True
 
     def resume(self) -> bool:
         """Continue on the way to the waypoint."""
-        waited, self._waiting = self._waiting is not None, None
-        return waited
+        self._waiting = None
+        return True
 
     def on_ground(self) -> None:
         """Continue the mission: a leg may end on the ground."""

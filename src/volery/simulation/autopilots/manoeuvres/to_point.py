@@ -285,15 +285,21 @@ class Return(Manoeuvre):
 
 
 class Brake(Manoeuvre):
-    """Stop as fast as possible, and hold the position."""
+    """Stop, and hold the position that is reached.
+
+    Args:
+        vehicle: The vehicle.
+        accel: Deceleration [m/s^2]; by default that of BRAKE.
+    """
 
     ACCEL = 7.5
     """BRAKE_MODE_DECEL_RATE of ArduCopter [m/s^2]."""
     STANDS = 0.3
     """Speed below which it holds its position [m/s]."""
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    def __init__(self, vehicle: Vehicle, accel: float = ACCEL) -> None:
         super().__init__(vehicle)
+        self._accel = accel
         self._held: Vector | None = None
 
     def step(self) -> None:
@@ -306,7 +312,7 @@ class Brake(Manoeuvre):
             Setpoint(
                 Control.VELOCITY if self._held is None else Control.POSITION,
                 position=self._held or (0.0, 0.0, 0.0),
-                accel=self.ACCEL,
+                accel=self._accel,
                 accel_z=tuning.pilot_accel_z,
                 tilt=tuning.tilt,
             )

@@ -31,6 +31,11 @@ def _ignore(*_event: object) -> None:
     """Do nothing: the default of events."""
 
 
+def _admit(*_list: object) -> bool:
+    """Return False: no list is refused."""
+    return False
+
+
 def _plain_request(_number: int) -> str:
     return "MISSION_REQUEST"
 
@@ -173,6 +178,8 @@ class MissionPolicy:
     """The same as ``stored_item`` for the points of the fence and for rally points, by MAV_MISSION_TYPE;
     ``None``: they are not supported.
     """
+    refuses_points: Callable[[Vehicle, int, list[MissionItem]], bool] = _admit
+    """Reports why a complete list of points is refused, and returns whether it is."""
     names_lists: bool = True
     """Whether items of the fence and rally points are sent with their MAV_MISSION_TYPE."""
     points_changed: Callable[[Vehicle, int], None] = _ignore

@@ -384,6 +384,9 @@ class MissionService:
         """Put a complete upload in force and acknowledge it."""
         self._upload = None
         if upload.kind != MISSION:
+            if self._firmware.missions.refuses_points(self._vehicle, upload.kind, upload.items):
+                self._acknowledge(upload.peer, MISSION_ERROR, upload.kind)
+                return
             self._store_points(upload.kind, upload.items)
         elif upload.part:
             self._vehicle.mission.items[upload.first : upload.first + upload.count] = upload.items

@@ -1,0 +1,269 @@
+"""ArduPilot's fence: its limits, the arming checks, and the response to a breach.
+
+The fence is also checked while disarmed. A breach counts anew once the vehicle is 20 m further out. The floor
+counts only after DO_FENCE_ENABLE or its switch, not by FENCE_ENABLE alone. A guided point beyond the fence is
+ignored without a text. Avoidance (slowing down at the fence) is not modelled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from math import hypot, inf
+
+from volery.base.frames import Vector
+from volery.simulation.autopilots.ardupilot.fence_points import (
+    CIRCLE_EXCLUSION,
+    CIRCLE_INCLUSION,
+    EXCLUSION,
+    FENCE,
+    INCLUSION,
+    clear_if_emptied,
+)
+from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, Check, change_mode, disarm
+from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+CEILING, CIRCLE, POLYGON, FLOOR = 1, 2, 4, 8
+"""Bits of FENCE_TYPE."""
+
+NO_BREACH, BELOW, ABOVE, BOUNDARY = 0, 1, 2, 3
+"""FENCE_BREACH."""
+
+GIVE_UP = 100.0
+"""Distance beyond the fence [m] at which a copter lands and a rover stops."""
+
+BACKUP = 20.0
+"""Distance [m] after which a breach counts anew."""
+
+NOTICE = 5
+"""MAV_SEVERITY."""
+
+Respond = Callable[[Vehicle, float], None]
+"""Responds to a new breach at a distance beyond the fence [m]."""
+
+
+def on_fence_enable(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_FENCE_ENABLE: 0 switches off, 1 on, the floor included."""
+    if command.param1 not in (0.0, 1.0):
+        return FAILED
+    enable_fence(vehicle, on=command.param1 == 1.0)
+    return ACCEPTED
+
+
+def enable_fence(vehicle: Vehicle, *, on: bool) -> None:
+    """Switch the fence and its floor on or off."""
+    vehicle.parameters.set("FENCE_ENABLE", float(on))
+    vehicle.fence.floor = on
+    vehicle.fence.breached.clear()
+
+
+def _types(vehicle: Vehicle) -> int:
+    return round(vehicle.parameters["FENCE_TYPE"])
+
+
+def _inside(corners: list[Vector], point: Vector) -> bool:
+    """Return whether a point lies within a polygon, seen from above."""
+    inside = False
+    for (north, east, _), (before_north, before_east, _) in pairwise([*corners, corners[0]]):
+        if (east > point[1]) != (before_east > point[1]):
+            along = (point[1] - east) / (before_east - east)
+            inside ^= point[0] < north + along * (before_north - north)
+    return inside
+
+
+def _beyond_polygons(vehicle: Vehicle, point: Vector) -> bool:
+    """Return whether a point is outside an inclusion or inside an exclusion."""
+    corners: list[Vector] = []
+    for item in vehicle.points.get(FENCE, []):
+        place = vehicle.point(item.frame, item.x / 1e7, item.y / 1e7, item.z)
+        if item.command in (CIRCLE_INCLUSION, CIRCLE_EXCLUSION):
+            within = hypot(point[0] - place[0], point[1] - place[1]) <= item.param1
+            if within != (item.command == CIRCLE_INCLUSION):
+                return True
+        elif item.command in (INCLUSION, EXCLUSION):
+            corners.append(place)
+            if len(corners) == round(item.param1):
+                if _inside(corners, point) != (item.command == INCLUSION):
+                    return True
+                corners = []
+    return False
+
+
+def _beyond(vehicle: Vehicle, point: Vector, *, floor: bool) -> dict[int, float]:
+    """Return how far a point is beyond each limit.
+
+    Args:
+        vehicle: The vehicle, whose fence is on and whose home position is known.
+        point: North, east, down about the estimator's origin [m].
+        floor: Whether the floor counts.
+
+    Returns:
+        Distances [m] by bit of FENCE_TYPE, for those limits that the point is beyond; 0 for polygons.
+    """
+    home, types, parameters = vehicle.home, _types(vehicle), vehicle.parameters
+    if home is None:
+        return {}
+    found: dict[int, float] = {}
+    if vehicle.flies:
+        height = home.ned[2] - point[2]
+        if types & CEILING:
+            found[CEILING] = height - parameters["FENCE_ALT_MAX"]
+        if types & FLOOR and floor:
+            found[FLOOR] = parameters["FENCE_ALT_MIN"] - height
+    if types & CIRCLE:
+        away = hypot(point[0] - home.ned[0], point[1] - home.ned[1])
+        found[CIRCLE] = away - parameters["FENCE_RADIUS"]
+    if types & POLYGON and _beyond_polygons(vehicle, point):
+        found[POLYGON] = 0.0
+    return {limit: distance for limit, distance in found.items() if distance >= 0.0}
+
+
+def fence_admits(vehicle: Vehicle, point: Vector) -> bool:
+    """Return whether a guided point may be flown to."""
+    return not (vehicle.parameters["FENCE_ENABLE"] and _beyond(vehicle, point, floor=True))
+
+
+def check_fence(vehicle: Vehicle, respond: Respond) -> None:
+    """Check the fence; respond to a new breach of an armed vehicle."""
+    fence = vehicle.fence
+    clear_if_emptied(vehicle)
+    if not vehicle.parameters["FENCE_ENABLE"]:
+        fence.breached.clear()
+        return
+    if not vehicle.estimate.position_ok:
+        return
+    found = _beyond(vehicle, vehicle.estimate.position, floor=fence.floor)
+    new = [limit for limit, distance in found.items() if distance >= fence.breached.get(limit, 0.0)]
+    if new and not fence.breached:
+        fence.breached_at = vehicle.uptime()
+        vehicle.output.send_message("FENCE_STATUS")
+    fence.count += len(new)
+    renewed = {limit: inf if limit == POLYGON else found[limit] + BACKUP for limit in new}
+    fence.breached = {limit: renewed.get(limit, fence.breached.get(limit, 0.0)) for limit in found}
+    if new and vehicle.armed:
+        respond(vehicle, max(found[limit] for limit in new))
+
+
+def fence_status(vehicle: Vehicle) -> Fields | None:
+    """Return FENCE_STATUS while the fence is enabled."""
+    if not vehicle.parameters["FENCE_ENABLE"]:
+        return None
+    fence = vehicle.fence
+    kinds = {FLOOR: BELOW, CEILING: ABOVE, CIRCLE: BOUNDARY, POLYGON: BOUNDARY}
+    return {
+        "breach_status": int(bool(fence.breached)),
+        "breach_count": fence.count,
+        "breach_type": next((kind for limit, kind in kinds.items() if limit in fence.breached), NO_BREACH),
+        "breach_time": fence.breached_at // 1_000_000,
+    }
+
+
+# -- arming
+
+
+def _first_problem(vehicle: Vehicle) -> str:
+    """Return the text of the first check of the fence that fails; empty if none does."""
+    parameters, types = vehicle.parameters, _types(vehicle)
+    if not parameters["FENCE_ENABLE"]:
+        return ""
+    present = types & (CEILING | CIRCLE | FLOOR) or (types & POLYGON and vehicle.points.get(FENCE))
+    if not present:
+        return "Fences enabled, but none selected"
+    radius, margin = parameters["FENCE_RADIUS"], parameters["FENCE_MARGIN"]
+    if types & (CIRCLE | POLYGON) and not vehicle.has_position:
+        return "Fence requires position"
+    if radius < 0.0:
+        return "Invalid FENCE_RADIUS value"
+    if radius < margin:
+        return "FENCE_MARGIN is less than FENCE_RADIUS"
+    return _height_problem(vehicle, margin) if vehicle.flies else _breach_problem(vehicle, margin)
+
+
+def _breach_problem(vehicle: Vehicle, margin: float) -> str:
+    if vehicle.fence.breached:
+        return "vehicle outside fence"
+    return "Invalid FENCE_MARGIN value" if margin < 0.0 else ""
+
+
+def _height_problem(vehicle: Vehicle, margin: float) -> str:
+    ceiling, floor = vehicle.parameters["FENCE_ALT_MAX"], vehicle.parameters["FENCE_ALT_MIN"]
+    if ceiling < 0.0:
+        return "Invalid FENCE_ALT_MAX value"
+    if floor < -100.0:
+        return "Invalid FENCE_ALT_MIN value"
+    problem = _breach_problem(vehicle, margin)
+    if not problem and ceiling < floor:
+        return "FENCE_ALT_MAX < FENCE_ALT_MIN"
+    return "FENCE_MARGIN too big" if not problem and ceiling - floor <= 2.0 * margin else problem
+
+
+_TEXTS = (
+    "Fences enabled, but none selected",
+    "Fence requires position",
+    "Invalid FENCE_RADIUS value",
+    "FENCE_MARGIN is less than FENCE_RADIUS",
+    "Invalid FENCE_ALT_MAX value",
+    "Invalid FENCE_ALT_MIN value",
+    "vehicle outside fence",
+    "Invalid FENCE_MARGIN value",
+    "FENCE_ALT_MAX < FENCE_ALT_MIN",
+    "FENCE_MARGIN too big",
+)
+
+
+def _check(text: str) -> Check:
+    return Check(text, lambda vehicle: _first_problem(vehicle) == text)
+
+
+FENCE_CHECKS = tuple(_check(text) for text in _TEXTS)
+"""Arming checks of the fence; at most one of them fails."""
+
+# -- response
+
+RTL, LAND, BRAKE, SMART_RTL = 6, 9, 17, 21
+COPTER_ACTIONS = {
+    2: (LAND,),
+    3: (SMART_RTL, RTL, LAND),
+    4: (BRAKE, LAND),
+    5: (SMART_RTL, LAND),
+}
+"""FENCE_ACTION to the modes of a copter that are tried in order; all other values: RTL, LAND."""
+
+
+def respond_copter(vehicle: Vehicle, distance: float) -> None:
+    """Respond as FENCE_ACTION demands; on the ground, or falling with the throttle closed, disarm."""
+    if not vehicle.landed:
+        vehicle.send_text(NOTICE, "Fence Breached")
+    action = round(vehicle.parameters["FENCE_ACTION"])
+    if not action:
+        return
+    closed = vehicle.mode.manual_throttle and Stabilize(vehicle).pilot.throttle <= 0.0
+    falls = closed and "radio" not in vehicle.failsafes.active and CEILING not in vehicle.fence.breached
+    if vehicle.landed or falls:
+        disarm(vehicle, COPTER_DISARMED, force=True)
+        return
+    modes = (LAND,) if distance > GIVE_UP else COPTER_ACTIONS.get(action, (RTL, LAND))
+    any(change_mode(vehicle, mode) for mode in modes)
+
+
+ROVER_HOLD, ROVER_RTL, ROVER_SMART_RTL = 4, 11, 12
+ROVER_ACTIONS = {
+    1: (ROVER_RTL, ROVER_HOLD),
+    2: (ROVER_HOLD,),
+    3: (ROVER_SMART_RTL, ROVER_RTL, ROVER_HOLD),
+    4: (ROVER_SMART_RTL, ROVER_HOLD),
+}
+"""FENCE_ACTION to the modes of a rover that are tried in order."""
+TERMINATE = 5
+
+
+def respond_rover(vehicle: Vehicle, distance: float) -> None:
+    """Respond as FENCE_ACTION demands, without a text."""
+    action = round(vehicle.parameters["FENCE_ACTION"])
+    if action == TERMINATE and distance <= GIVE_UP:
+        disarm(vehicle, "Throttle disarmed", force=True)
+    elif action:
+        modes = (ROVER_HOLD,) if distance > GIVE_UP else ROVER_ACTIONS.get(action, ())
+        any(change_mode(vehicle, mode) for mode in modes)
