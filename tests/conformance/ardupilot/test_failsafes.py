@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from volery.base.time import S
+from volery.simulation.autopilots.onboard_mission import MissionItem
 
 RTL, LAND, BRAKE, GUIDED, SMART_RTL = 6, 9, 17, 4, 21
 
@@ -178,3 +179,26 @@ def test_the_crash_check_can_be_switched_off(bench: Any) -> None:
         rig.flight.weaken_motor(motor, 0.0)
     rig.run(15.0)
     assert rig.vehicle.armed
+
+
+@pytest.mark.parametrize(
+    ("enabled", "mode", "ends_in"),
+    [(1, 10, 11), (2, 10, 10), (2, 0, 11), (1, 4, 4)],
+    ids=["AUTO", "AUTO goes on", "MANUAL", "HOLD"],
+)
+def test_a_rover_without_its_station(enabled: int, mode: int, ends_in: int, bench: Any) -> None:
+    """The action follows FS_TIMEOUT after the loss, not in HOLD, and not in AUTO with FS_GCS_ENABLE 2."""
+    rig = bench(
+        "rover", parameters={"FS_GCS_ENABLE": enabled, "FS_GCS_TIMEOUT": 5, "FS_ACTION": 1, "FS_TIMEOUT": 4}
+    )
+    rig.send("HEARTBEAT", type=6, autopilot=8)
+    rig.run(0.5)
+    rig.vehicle.mission.replace([MissionItem(16), MissionItem(16, x=-353_600_000, y=1_491_600_000)])
+    rig.mode(mode)
+    rig.command(400, 1)
+    rig.run(8.0)
+    assert "GCS Failsafe" not in rig.texts()
+    rig.run(3.0)
+    assert rig.vehicle.mode.number == ends_in
+    assert ("GCS Failsafe" in rig.texts()) == (mode != 4)
+    assert ("Failsafe - Continuing Auto Mode" in rig.texts()) == (mode == ends_in == 10)

@@ -135,13 +135,10 @@ def test_hold_stands_as_standby(bench: Any) -> None:
     assert rig.vehicle.estimate.motor_pwm[2] == 1500
 
 
-def test_a_mission_is_driven(bench: Any) -> None:
-    rig = bench("rover")
-    rig.beat()
-    rig.run(0.5)
+def upload(rig: Any, *points: tuple[float, float]) -> None:
+    """Upload a mission of waypoints, north and east of the rover [m]; the first stands for home."""
     latitude, longitude, _ = rig.vehicle.estimate.geodetic
-    points = [(0.0, 0.0), (20.0, 0.0), (20.0, 15.0)]
-    rig.send("MISSION_COUNT", target_system=1, target_component=1, count=3)
+    rig.send("MISSION_COUNT", target_system=1, target_component=1, count=len(points))
     for sequence, (north, east) in enumerate(points):
         rig.run(0.05)
         rig.send(
@@ -155,12 +152,39 @@ def test_a_mission_is_driven(bench: Any) -> None:
             y=round((longitude + east / 90_780.0) * 1e7),
         )
     rig.run(0.2)
+
+
+def test_a_mission_is_driven_and_driven_again_from_its_start(bench: Any) -> None:
+    rig = bench("rover")
+    rig.beat()
+    rig.run(0.5)
+    upload(rig, (0.0, 0.0), (20.0, 0.0), (20.0, 15.0))
     assert rig.mode(AUTO) == 0
     assert rig.command(400, 1) == 0
     rig.run(30.0)
     assert [one.fields["seq"] for one in rig.of("MISSION_ITEM_REACHED")] == [1, 2]
     assert "Mission: 1 WP" in rig.texts()
     assert rig.vehicle.estimate.position[1] == pytest.approx(15.0, abs=2.5)
+    rig.mode(HOLD)
+    rig.mode(AUTO)
+    rig.run(30.0)
+    assert [one.fields["seq"] for one in rig.of("MISSION_ITEM_REACHED")] == [1, 2, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("after", "mode", "target"), [(0, AUTO, False), (1, AUTO, True), (2, 1, False), (3, MANUAL, False)]
+)
+def test_what_follows_a_mission(after: int, mode: int, target: bool, bench: Any) -> None:
+    rig = bench("rover", parameters={"MIS_DONE_BEHAVE": after})
+    rig.beat()
+    rig.run(0.5)
+    upload(rig, (0.0, 0.0), (5.0, 0.0))
+    rig.mode(AUTO)
+    rig.command(400, 1)
+    rig.run_until(lambda: "Mission Complete" in rig.texts())
+    rig.run(0.5)
+    assert rig.vehicle.mode.number == mode
+    assert (rig.vehicle.manoeuvre.target is not None) == target
 
 
 def test_rates_that_were_asked_for_are_stored(bench: Any) -> None:

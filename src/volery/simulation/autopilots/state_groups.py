@@ -164,8 +164,8 @@ class FailsafeState:
     """Changes of parameters when these were last compared."""
     crashing_since: Ns = NEVER
     """Since when [ns] a vehicle leans far from where it should."""
-    low_voltage_since: dict[str, Ns] = field(default_factory=dict)
-    """Since when [ns] the battery has been below a voltage, by the name of the parameter that holds it."""
+    true_since: dict[str, Ns] = field(default_factory=dict)
+    """Since when [ns] a condition has been true that must last before a failsafe acts, by its name."""
 
 
 @dataclass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 from volery.base.time import S, from_seconds
@@ -45,9 +46,9 @@ def _battery_below(vehicle: Vehicle, volts: str, charge: str) -> bool:
     left = parameters["BATT_CAPACITY"] - estimate.battery_used_mah
     sagged = parameters[volts] > 0.0 and estimate.battery_volts < parameters[volts]
     if not sagged:
-        vehicle.failsafes.low_voltage_since.pop(volts, None)
+        vehicle.failsafes.true_since.pop(volts, None)
         return parameters[charge] > 0.0 and left < parameters[charge]
-    since = vehicle.failsafes.low_voltage_since.setdefault(volts, vehicle.kernel.now())
+    since = vehicle.failsafes.true_since.setdefault(volts, vehicle.kernel.now())
     return vehicle.kernel.now() - since >= from_seconds(parameters["BATT_LOW_TIMER"])
 
 
@@ -194,27 +195,51 @@ COPTER_FAILSAFES = (
 
 # -- rover
 
-ROVER_HOLD, ROVER_RTL = 4, 11
+ROVER_HOLD, ROVER_RTL, ROVER_SMART_RTL = 4, 11, 12
 ROVER_ACTIONS = {
     1: (ROVER_RTL, ROVER_HOLD),
     2: (ROVER_HOLD,),
-    3: (ROVER_RTL, ROVER_HOLD),
-    4: (ROVER_HOLD,),
+    3: (ROVER_SMART_RTL, ROVER_RTL, ROVER_HOLD),
+    4: (ROVER_SMART_RTL, ROVER_HOLD),
     6: (ROVER_HOLD,),
 }
 """FS_ACTION and the battery actions to the modes that are tried in order."""
 
 
 def _act_on_rover(vehicle: Vehicle, action: int) -> None:
-    if vehicle.armed and action == DISARM_ACTION:
+    if action == DISARM_ACTION:
         disarm(vehicle, ROVER_DISARMED, force=True)
-    elif vehicle.armed:
+    else:
         _enter_first(vehicle, ROVER_ACTIONS.get(action, ()))
 
 
-def _on_rover_link_lost(vehicle: Vehicle, what: str) -> None:
+CONTINUE_MISSION = 2
+"""Value of FS_THR_ENABLE and FS_GCS_ENABLE that continues in AUTO."""
+ACTIVE_IN_HOLD = 1 << 0
+"""Bit of FS_OPTIONS."""
+
+
+def _lost_for_long(vehicle: Vehicle, name: str, lost: Callable[[Vehicle], bool]) -> bool:
+    """Return whether a link is lost for FS_TIMEOUT in a mode that a failsafe may end."""
+    since = vehicle.failsafes.true_since
+    if not lost(vehicle):
+        since.pop(name, None)
+        return False
+    if name in vehicle.failsafes.active:
+        return True
+    now = vehicle.kernel.now()
+    stands = vehicle.mode.name == "HOLD" and not round(vehicle.parameters["FS_OPTIONS"]) & ACTIVE_IN_HOLD
+    long = now - since.setdefault(name, now) > from_seconds(vehicle.parameters["FS_TIMEOUT"])
+    return long and not stands and vehicle.mode.name != "RTL"
+
+
+def _on_rover_link_lost(vehicle: Vehicle, what: str, enabled_by: str) -> None:
     vehicle.send_text(WARNING, f"{what} Failsafe")
-    _act_on_rover(vehicle, round(vehicle.parameters["FS_ACTION"]))
+    vehicle.rc.release()
+    if vehicle.mode.name == "AUTO" and vehicle.parameters[enabled_by] == CONTINUE_MISSION:
+        vehicle.send_text(WARNING, "Failsafe - Continuing Auto Mode")
+    else:
+        _act_on_rover(vehicle, round(vehicle.parameters["FS_ACTION"]))
 
 
 def _on_rover_battery(vehicle: Vehicle, level: str) -> None:
@@ -224,14 +249,14 @@ def _on_rover_battery(vehicle: Vehicle, level: str) -> None:
 ROVER_FAILSAFES = (
     Failsafe(
         "station",
-        station_lost,
-        partial(_on_rover_link_lost, what="GCS"),
+        partial(_lost_for_long, name="station", lost=station_lost),
+        partial(_on_rover_link_lost, what="GCS", enabled_by="FS_GCS_ENABLE"),
         partial(_report_cleared, what="GCS"),
     ),
     Failsafe(
         "radio",
-        radio_lost,
-        partial(_on_rover_link_lost, what="Radio"),
+        partial(_lost_for_long, name="radio", lost=radio_lost),
+        partial(_on_rover_link_lost, what="Radio", enabled_by="FS_THR_ENABLE"),
         partial(_report_cleared, what="Radio"),
     ),
     Failsafe("battery low", battery_low, partial(_on_rover_battery, level="low")),

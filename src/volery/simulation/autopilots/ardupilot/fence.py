@@ -20,7 +20,7 @@ from volery.simulation.autopilots.ardupilot.fence_points import (
     INCLUSION,
     clear_if_emptied,
 )
-from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, Check, change_mode, disarm
+from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, NOTICE, Check, change_mode, disarm
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -36,9 +36,6 @@ GIVE_UP = 100.0
 
 BACKUP = 20.0
 """Distance [m] after which a breach counts anew."""
-
-NOTICE = 5
-"""MAV_SEVERITY."""
 
 Respond = Callable[[Vehicle, float], None]
 """Responds to a new breach at a distance beyond the fence [m]."""

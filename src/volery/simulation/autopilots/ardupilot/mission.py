@@ -5,9 +5,11 @@ from __future__ import annotations
 from math import isinf, isnan
 
 from volery.simulation.autopilots.ardupilot.commands import HIGHEST, change_speed, turn_to
-from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, INFO, disarm
+from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, INFO, NOTICE, change_mode, disarm
 from volery.simulation.autopilots.ardupilot.payload import GRIPPER, SET_RELAY, SET_SERVO, act_on_payload
+from volery.simulation.autopilots.manoeuvres.manual_flight import HoldPlace
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import MissionRules
+from volery.simulation.autopilots.manoeuvres.rover_driving import Stand
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint
 from volery.simulation.autopilots.mavlink.messages import finite
 from volery.simulation.autopilots.onboard_mission import (
@@ -36,7 +38,7 @@ from volery.simulation.autopilots.onboard_mission import (
     WAYPOINT,
     MissionItem,
 )
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 UNSUPPORTED_FRAME, UNSUPPORTED, INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_Z = 2, 3, 6, 10, 11, 12
 """MAV_MISSION_RESULT."""
@@ -197,20 +199,30 @@ def runs(vehicle: Vehicle) -> bool:
     return vehicle.armed and vehicle.mode.name == "AUTO" and plan.current > 0 and not plan.complete
 
 
-def copter_ended(vehicle: Vehicle) -> None:
+def copter_ended(vehicle: Vehicle) -> Manoeuvre | None:
     """Disarm on the ground; hold the position in the air."""
     if vehicle.landed and vehicle.armed:
         disarm(vehicle, COPTER_DISARMED, force=True)
-    elif vehicle.armed:
-        stay = ToPoint(vehicle)
-        stay.enter()
-        stay.step()
+    return ToPoint(vehicle) if vehicle.armed else None
 
 
-def rover_ended(vehicle: Vehicle) -> None:
-    """Report the end; the rover stops."""
-    vehicle.send_text(INFO, "Mission Complete")
+DONE_LOITER = 1
+DONE_MODES = {2: 1, 3: 0}
+"""MIS_DONE_BEHAVE to the number of the mode that is entered: ACRO, MANUAL."""
 
 
-COPTER_MISSION = MissionRules(item_begins=item_begins, item_done=item_done, act=act, ended=copter_ended)
-ROVER_MISSION = MissionRules(item_begins=item_begins, item_done=item_done, act=act, ended=rover_ended)
+def rover_ended(vehicle: Vehicle) -> Manoeuvre | None:
+    """Report the end, and stop, loiter or change the mode as MIS_DONE_BEHAVE demands."""
+    vehicle.send_text(NOTICE, "Mission Complete")
+    after = round(vehicle.parameters["MIS_DONE_BEHAVE"])
+    if after in DONE_MODES:
+        vehicle.kernel.call_at(vehicle.kernel.now(), lambda: change_mode(vehicle, DONE_MODES[after]))
+    return HoldPlace(vehicle) if after == DONE_LOITER else Stand(vehicle)
+
+
+COPTER_MISSION = MissionRules(
+    restarts=True, item_begins=item_begins, item_done=item_done, act=act, ended=copter_ended
+)
+ROVER_MISSION = MissionRules(
+    restarts=True, item_begins=item_begins, item_done=item_done, act=act, ended=rover_ended
+)

@@ -15,7 +15,7 @@ from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAIL
 from volery.simulation.autopilots.onboard_mission import DELAY, TAKEOFF
 from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
 
-CRITICAL, WARNING, INFO = 2, 4, 6
+CRITICAL, WARNING, NOTICE, INFO = 2, 4, 5, 6
 """MAV_SEVERITY."""
 
 FORCE, SKIP_CHECKS = 21_196, 2_989
@@ -119,12 +119,17 @@ def arm(vehicle: Vehicle, problems: Callable[[Vehicle], list[str]], words: str, 
 
 
 def disarm(vehicle: Vehicle, words: str, force: bool) -> int:
-    """Disarm, in flight only by force, and return a MAV_RESULT. A copter stores its hover throttle."""
+    """Disarm, in flight only by force, and return a MAV_RESULT. The mission begins anew then.
+
+    A rover in AUTO keeps its item; a copter stores its hover throttle.
+    """
     if not vehicle.armed:
         return ACCEPTED
     if vehicle.flies and not vehicle.landed and not force:
         return FAILED
     vehicle.disarm()
+    if vehicle.flies or vehicle.mode.name != "AUTO":
+        vehicle.mission.current = 0
     vehicle.send_text(INFO, words)
     if vehicle.flies:
         vehicle.set_parameter("MOT_THST_HOVER", vehicle.estimate.hover_throttle)

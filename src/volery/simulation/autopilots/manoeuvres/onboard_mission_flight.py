@@ -61,13 +61,16 @@ class MissionRules:
 
     first_item: int = 1
     """Index of the first item that is flown: 1 where item 0 is the home position."""
+    restarts: bool = False
+    """Whether a mission that has ended begins anew when its mode is entered again."""
     reports_actions: bool = False
     """Whether ``item_done`` is called for items that do not navigate, too."""
     item_begins: Callable[[Vehicle, int, MissionItem], None] = _ignore
     item_done: Callable[[Vehicle, int, MissionItem], None] = _ignore
     act: Callable[[Vehicle, MissionItem], None] = _ignore
     """Execute an item that does not navigate."""
-    ended: Callable[[Vehicle], None] = _ignore
+    ended: Callable[[Vehicle], Manoeuvre | None] = _ignore
+    """Called at the end; returns what is flown then, or ``None``."""
 
 
 class FlyMission(Manoeuvre):
@@ -108,6 +111,8 @@ class FlyMission(Manoeuvre):
     def enter(self) -> None:
         """Wait for the next step: the mission begins once the vehicle is armed."""
         self._leg = None
+        if self._rules.restarts and self.vehicle.mission.complete:
+            self.vehicle.mission.restart()
         self.started = self.started or (self.vehicle.armed and not self.vehicle.landed)
 
     def start(self) -> None:
@@ -199,7 +204,11 @@ class FlyMission(Manoeuvre):
         plan.complete = True
         plan.current = 0
         self.target, self.landing, self.taking_off = None, False, False
-        self._rules.ended(vehicle)
+        after = self._rules.ended(vehicle)
+        if after is not None:
+            self._leg, self._reached_at = Leg(after, lambda: False), None
+            after.enter()
+            self._mirror(after)
 
     def _begin(self, index: int, item: MissionItem) -> None:
         vehicle = self.vehicle
