@@ -44,6 +44,7 @@ class Airstrip:
         warm: bool = True,
         faults: WireFaults | None = None,
         parameters: dict[str, float] | None = None,
+        logging: bool = False,
     ) -> None:
         self.events: list[Any] = []
         self.kernel = VirtualKernel(record=self.events.append)
@@ -51,7 +52,13 @@ class Airstrip:
         _, (self.flight,) = make_world(self.kernel.now, [body], seed=7, frame=FRAME)
         firmware = dialects.load(self.firmware)
         self.autopilot = Autopilot(
-            self.kernel, self.flight, firmware, warm=warm, name="craft_1", parameters=parameters
+            self.kernel,
+            self.flight,
+            firmware,
+            warm=warm,
+            name="craft_1",
+            parameters=parameters,
+            logging=logging,
         )
         self.link = self._connect(faults)
         self._pilot, theirs = in_process_pair(self.kernel, name="pilot")

@@ -38,7 +38,8 @@ class SimulatedFleet:
     """Simulated vehicles in one world, by name, in the order of the model.
 
     System ids count from 1, except for the vehicles in *systems*. The links of the vehicles in
-    *through_bytes* can be given faults: see ``faulty_links``.
+    *through_bytes* can be given faults: see ``faulty_links``. With *logging* the autopilots keep logs of their
+    flights.
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class SimulatedFleet:
         *,
         systems: Mapping[str, int] | None = None,
         through_bytes: Collection[str] = (),
+        logging: bool = False,
     ) -> None:
         self._kernel = kernel
         self._seed = seed
@@ -76,6 +78,7 @@ class SimulatedFleet:
                 parameters=vehicle.parameters,
                 warm=vehicle.started == "warm",
                 name=vehicle.name,
+                logging=logging,
             )
 
     @property
@@ -223,7 +226,7 @@ def fleet_of(kernel: Kernel, wanted: Sequence[SimulatedVehicle], seed: int) -> S
     first = wanted[0]
     vehicles = [_placed(one.vehicle, first.frame) for one in wanted]
     systems = {one.vehicle.name: one.system for one in wanted if one.system is not None}
-    fleet = SimulatedFleet(kernel, vehicles, first.frame, first.wind, seed, systems=systems)
+    fleet = SimulatedFleet(kernel, vehicles, first.frame, first.wind, seed, systems=systems, logging=True)
     for one in wanted:
         for at, channel, pulse in one.transmitter:
             fleet.move_transmitter(one.vehicle.name, at, channel, pulse)

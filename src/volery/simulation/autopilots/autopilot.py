@@ -30,6 +30,7 @@ from volery.kernel.task import ExecutionContext
 from volery.links.link import Codec, Link
 from volery.links.mavlink_codec import MAVLINK
 from volery.ros.graph import RosGraph
+from volery.simulation.autopilots.flight_recorder import FlightRecorder
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.protocol_endpoint import GraphEndpoint, LinkEndpoint, ProtocolEndpoint
 from volery.simulation.autopilots.vehicle_state import (
@@ -143,6 +144,7 @@ class Autopilot:
         warm: Whether it is booted and has a position before the run begins. A cold autopilot boots when its
             first link is connected, and takes as long as the firmware does.
         name: Name in texts and traces; by default firmware and system id.
+        logging: Whether flights are recorded as logs on board.
 
     Raises:
         UsageError: The firmware has no such parameter or no such kind of vehicle.
@@ -158,6 +160,7 @@ class Autopilot:
         parameters: Mapping[str, float] | None = None,
         warm: bool = False,
         name: str = "",
+        logging: bool = False,
     ) -> None:
         self._kernel = kernel
         self._flight = flight
@@ -169,6 +172,7 @@ class Autopilot:
         )
         self.endpoint: ProtocolEndpoint = chosen.endpoint(self.vehicle)
         self.vehicle.output = self.endpoint
+        self._recorder = FlightRecorder(self.vehicle) if logging else None
         self.on_reboot: Action = _nothing
         """Called when a station restarts the autopilot, so that the server of its links can close them."""
         self._timers: list[Handle] = []
@@ -281,6 +285,8 @@ class Autopilot:
             vehicle.update_ground()
             vehicle.run_manoeuvre()
         firmware.periodic.on_step(vehicle)
+        if self._recorder is not None:
+            self._recorder.on_tick()
         if self._ticks % firmware.periodic.failsafe_ticks == 0:
             self._check_failsafes()
 

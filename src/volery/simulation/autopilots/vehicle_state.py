@@ -19,6 +19,7 @@ from volery.kernel.api import Action, Kernel
 from volery.simulation.autopilots.autopilot_parameters import Parameter, Parameters, Tuning
 from volery.simulation.autopilots.flight_stack.flight import Control, Estimate, Flight, Setpoint
 from volery.simulation.autopilots.manual_control import RcChannels
+from volery.simulation.autopilots.onboard_log import FlightLog
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, MissionItem, OnboardMission
 from volery.simulation.autopilots.protocol_endpoint import VehicleOutput
 from volery.simulation.autopilots.state_groups import (
@@ -239,6 +240,8 @@ class Vehicle:
         self.mission = OnboardMission()
         self.points: dict[int, list[MissionItem]] = {}
         """Points of the fence and rally points, by MAV_MISSION_TYPE; they persist like the mission."""
+        self.logs: list[FlightLog] = []
+        """Recorded flights, oldest first; they persist, too."""
         self.firmware_state: Any = rules.firmware_state(self)
         """State that only the firmware uses."""
         self.boot_at: Ns = kernel.now()

@@ -11,6 +11,7 @@ from typing import Any
 
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.ardupilot import (
+    dataflash,
     fence_points,
     mission,
     payload,
@@ -37,21 +38,11 @@ from volery.simulation.autopilots.mavlink.firmware import (
     QuestionHandler,
     TelemetryPolicy,
 )
+from volery.simulation.autopilots.mavlink.log_service import LogPolicy
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED, Command, Handler
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
 
-WARNING = 4
-"""MAV_SEVERITY."""
-
 SEND_BANNER = 42_428
-
-
-def on_log_list(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
-    """Handle LOG_REQUEST_LIST: an armed vehicle sends no list."""
-    if vehicle.armed:
-        vehicle.send_text(WARNING, "Disarm for log download")
-    else:
-        onboard_files.on_log_list(vehicle, fields, sender)
 
 
 def on_terrain_check(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:
@@ -79,7 +70,6 @@ def questions(version: Builder) -> dict[str, QuestionHandler]:
         "AUTOPILOT_VERSION_REQUEST": on_version,
         "FENCE_FETCH_POINT": fence_points.on_fence_fetch,
         "FILE_TRANSFER_PROTOCOL": onboard_files.on_file_transfer_with_parameters,
-        "LOG_REQUEST_LIST": on_log_list,
         "RALLY_FETCH_POINT": rally.on_rally_fetch,
         "TERRAIN_CHECK": on_terrain_check,
     }
@@ -345,5 +335,6 @@ def ardupilot_mavlink(
         parameters=ParameterPolicy(
             refuses=lambda name: name.startswith("SIM_") and name not in COPTER_SUPPORTED
         ),
+        logs=LogPolicy(dataflash.encode, first=1, while_armed=False),
         on_parameter_list=on_parameter_list,
     )

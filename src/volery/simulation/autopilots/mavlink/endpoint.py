@@ -18,6 +18,7 @@ from volery.links.link import Frame, Link
 from volery.links.mavlink_messages import MessageStreams, status_text_chunks
 from volery.simulation.autopilots.mavlink.channel import AUTOPILOT, MavlinkChannel, Peer, StatusTextQueue
 from volery.simulation.autopilots.mavlink.firmware import MavlinkFirmware
+from volery.simulation.autopilots.mavlink.log_service import LogService
 from volery.simulation.autopilots.mavlink.microservices import (
     CommandService,
     MissionService,
@@ -52,10 +53,15 @@ class MavlinkEndpoint:
         self._timers: list[Handle] = []
         self._parameters = parameters = ParameterService(vehicle, firmware.parameters)
         missions = MissionService(vehicle, firmware)
+        logs = LogService(vehicle, firmware.logs)
         self._commands = CommandService(vehicle, firmware)
         self._handlers: dict[str, Handler] = {
             "COMMAND_INT": self._commands.on_int,
             "COMMAND_LONG": self._commands.on_long,
+            "LOG_ERASE": logs.on_erase,
+            "LOG_REQUEST_DATA": logs.on_data,
+            "LOG_REQUEST_END": logs.on_end,
+            "LOG_REQUEST_LIST": logs.on_list,
             "MISSION_ACK": missions.on_ack,
             "MISSION_CLEAR_ALL": missions.on_clear,
             "MISSION_COUNT": missions.on_count,

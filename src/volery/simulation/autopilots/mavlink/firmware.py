@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.mavlink.channel import Peer, StatusTextPolicy
+from volery.simulation.autopilots.mavlink.log_service import LogPolicy
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, Handler
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction, do_nothing
@@ -198,5 +199,6 @@ class MavlinkFirmware:
     missions: MissionPolicy
     parameters: ParameterPolicy = field(default_factory=ParameterPolicy)
     texts: StatusTextPolicy = field(default_factory=StatusTextPolicy)
+    logs: LogPolicy
     on_parameter_list: VehicleAction = do_nothing
     """Called when a station lists the parameters."""

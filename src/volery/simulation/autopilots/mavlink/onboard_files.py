@@ -1,9 +1,8 @@
-"""Files, logs and the shell of a simulated autopilot. There are none, and each request is answered so.
+"""Files and the shell of a simulated autopilot. There are none, and each request is answered so.
 
 The exception is ``@PARAM/param.pck`` of an ArduPilot, its parameters packed into one file, which ground
 stations read in place of a list of 1,400 messages. A request without an answer makes a client wait for its
-time-out, or for ever. What an original leaves unanswered for what does not exist (LOG_REQUEST_DATA of a log
-that is not in the list) is not answered here either.
+time-out, or for ever.
 """
 
 from __future__ import annotations
@@ -120,11 +119,6 @@ def on_file_transfer(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) ->
     asked = [int(byte) for byte in fields["payload"]]
     asked += [0] * (FTP_SIZE - len(asked))
     sender.answer("FILE_TRANSFER_PROTOCOL", target_network=0, payload=_ftp_reply(asked, _ftp_error(asked)))
-
-
-def on_log_list(_vehicle: Vehicle, _fields: dict[str, Any], sender: Peer) -> None:
-    """Handle LOG_REQUEST_LIST: one LOG_ENTRY says that there is no log."""
-    sender.send("LOG_ENTRY", {"id": 0, "num_logs": 0, "last_log_num": 0, "time_utc": 0, "size": 0})
 
 
 def on_shell(_vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:

@@ -24,8 +24,9 @@ from volery.simulation.autopilots.mavlink.firmware import (
     ParameterPolicy,
     TelemetryPolicy,
 )
+from volery.simulation.autopilots.mavlink.log_service import LogPolicy
 from volery.simulation.autopilots.mavlink.messages import DENIED, FAILED, Handler
-from volery.simulation.autopilots.px4 import failsafes, mission, telemetry
+from volery.simulation.autopilots.px4 import failsafes, mission, telemetry, ulog
 from volery.simulation.autopilots.px4.commands import DO_SET_MODE, MESSAGE_HANDLERS, set_mode
 from volery.simulation.autopilots.px4.follow_target import on_follow_target
 from volery.simulation.autopilots.px4.modes import LOITER, READY_AFTER, Commander, commander_of
@@ -214,7 +215,6 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
             handlers={**MESSAGE_HANDLERS, "FOLLOW_TARGET": on_follow_target},
             questions={
                 "FILE_TRANSFER_PROTOCOL": onboard_files.on_file_transfer,
-                "LOG_REQUEST_LIST": onboard_files.on_log_list,
                 "SERIAL_CONTROL": onboard_files.on_shell,
             },
             set_mode=set_mode,
@@ -233,6 +233,7 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
         ),
         parameters=PARAMETERS,
         texts=TEXTS,
+        logs=LogPolicy(ulog.encode, first=0, while_armed=True),
     )
 
 

@@ -1,0 +1,74 @@
+"""What a simulated autopilot records while it is armed, for the logs that a ground station downloads.
+
+Five samples a second are kept as numbers; a firmware encodes them in its own format when a log is requested,
+so that a flight whose log is never read costs next to nothing. Logs persist over a reboot, as on a card.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from volery.base.time import US
+from volery.simulation.autopilots.onboard_log import FlightLog, LogSample
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+EACH = 2
+"""One tick of the autopilot in so many is recorded."""
+
+
+class FlightRecorder:
+    """Records the flights of one vehicle.
+
+    Args:
+        vehicle: The vehicle.
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        self._vehicle = vehicle
+        self._open: FlightLog | None = None
+        self._ticks = 0
+
+    def on_tick(self) -> None:
+        """Record a sample if one is due; called at each tick of the autopilot."""
+        vehicle = self._vehicle
+        if not vehicle.armed:
+            if self._open is not None:
+                vehicle.logs.append(self._open)
+                self._open = None
+            return
+        if self._open is None:
+            self._open = self._begin()
+        if self._ticks % EACH == 0:
+            self._open.values.extend(self._sample())
+        self._ticks += 1
+
+    def _begin(self) -> FlightLog:
+        vehicle = self._vehicle
+        self._ticks = 0
+        return FlightLog(
+            vehicle.kernel.now(),
+            vehicle.flies,
+            vehicle.estimate.origin,
+            vehicle.home.ned[2] if vehicle.home else 0.0,
+            tuple(vehicle.parameters),
+        )
+
+    def _sample(self) -> LogSample:
+        vehicle = self._vehicle
+        estimate = vehicle.estimate
+        return LogSample(
+            vehicle.uptime() / US,
+            vehicle.mode.number,
+            *estimate.position,
+            *estimate.velocity,
+            *estimate.attitude,
+            *estimate.rates,
+            estimate.battery_volts,
+            estimate.battery_amps,
+            estimate.battery_used_mah,
+            estimate.battery_left,
+            estimate.gps.fix_type,
+            estimate.gps.satellites,
+            estimate.gps.eph if isfinite(estimate.gps.eph) else 99.99,
+            *estimate.geodetic,
+        )

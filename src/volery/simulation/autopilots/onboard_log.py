@@ -1,0 +1,83 @@
+"""A flight as numbers, from which a firmware writes a log in its own format."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from volery.base.frames import Vector
+from volery.base.time import US, Ns
+from volery.simulation.autopilots.autopilot_parameters import Parameter
+
+
+class LogSample(NamedTuple):
+    """One sample: SI units, angles in rad, positions north, east, down about the estimator's origin."""
+
+    time_us: float
+    """Since the boot of the autopilot."""
+    mode: float
+    """Number of the mode on the wire."""
+    north: float
+    east: float
+    down: float
+    v_north: float
+    v_east: float
+    v_down: float
+    roll: float
+    pitch: float
+    yaw: float
+    roll_rate: float
+    pitch_rate: float
+    yaw_rate: float
+    volts: float
+    amps: float
+    used_mah: float
+    left: float
+    """Fraction of the charge, 0..1."""
+    fix: float
+    """GPS_FIX_TYPE."""
+    satellites: float
+    hdop: float
+    latitude: float
+    longitude: float
+    amsl: float
+
+
+@dataclass
+class FlightLog:
+    """One log, from arming to disarming.
+
+    Args:
+        started_at: Time of the run [ns].
+        flies: Whether it is the log of a multirotor; else of a rover.
+        origin: Latitude, longitude [degrees] and height AMSL [m] of the estimator's origin.
+        home_down: Home below the estimator's origin [m].
+        parameters: The parameters at the start.
+    """
+
+    started_at: Ns
+    flies: bool
+    origin: Vector
+    home_down: float
+    parameters: tuple[Parameter, ...]
+    values: array[float] = field(default_factory=lambda: array("d"))
+    encoded: bytes | None = None
+    """The file, once it has been requested."""
+
+    @property
+    def ended_at(self) -> Ns:
+        """Time of the run of the last sample [ns]."""
+        width = len(LogSample._fields)
+        return (
+            self.started_at + round(self.values[-width] - self.values[0]) * US
+            if self.values
+            else self.started_at
+        )
+
+    def samples(self) -> Iterator[LogSample]:
+        """Yield the samples in order."""
+        width = len(LogSample._fields)
+        for at in range(0, len(self.values), width):
+            yield LogSample(*self.values[at : at + width])
