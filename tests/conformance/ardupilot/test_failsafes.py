@@ -54,7 +54,9 @@ def test_without_the_parameter_it_hovers_on(bench: Any) -> None:
     assert rig.texts() == []
 
 
-@pytest.mark.parametrize(("value", "mode"), [(1, RTL), (3, SMART_RTL), (4, SMART_RTL), (5, LAND), (7, BRAKE)])
+@pytest.mark.parametrize(
+    ("value", "mode"), [(1, RTL), (3, SMART_RTL), (4, SMART_RTL), (5, LAND), (7, BRAKE), (99, RTL)]
+)
 def test_the_parameter_chooses_what_happens(value: int, mode: int, bench: Any) -> None:
     rig = bench(parameters={"FS_GCS_ENABLE": value})
     airborne_without_a_station(rig)

@@ -95,16 +95,14 @@ def _enter_first(vehicle: Vehicle, modes: tuple[int, ...]) -> None:
 
 RTL, LAND, BRAKE, ALT_HOLD, SMART_RTL = 6, 9, 17, 2, 21
 STATION_ACTIONS = {
-    1: (RTL, LAND),
     3: (SMART_RTL, RTL, LAND),
     4: (SMART_RTL, LAND),
     5: (LAND,),
-    6: (RTL, LAND),
     7: (BRAKE, LAND),
 }
-"""FS_GCS_ENABLE to the modes that are tried in order."""
-RADIO_ACTIONS = {1: (RTL, LAND), 2: (RTL, LAND), 3: (LAND,), 4: (SMART_RTL, RTL, LAND), 5: (SMART_RTL, LAND)}
-"""The same for FS_THR_ENABLE."""
+"""FS_GCS_ENABLE to the modes that are tried in order; all other values: RTL, LAND."""
+RADIO_ACTIONS = {1: (RTL, LAND), 2: (RTL, LAND), 4: (SMART_RTL, RTL, LAND), 5: (SMART_RTL, LAND)}
+"""The same for FS_THR_ENABLE; all other values: LAND."""
 BATTERY_ACTIONS = {
     1: (LAND,),
     2: (RTL, LAND),
@@ -125,7 +123,12 @@ def _on_station_lost(vehicle: Vehicle) -> None:
         exception = "Continuing Auto Mode"
     elif options & CONTINUE_PILOT_ON_STATION and vehicle.mode.pilot:
         exception = "Continuing Pilot Control"
-    _respond(vehicle, "GCS", STATION_ACTIONS.get(round(vehicle.parameters["FS_GCS_ENABLE"]), ()), exception)
+    _respond(
+        vehicle,
+        "GCS",
+        STATION_ACTIONS.get(round(vehicle.parameters["FS_GCS_ENABLE"]), (RTL, LAND)),
+        exception,
+    )
 
 
 def _on_radio_lost(vehicle: Vehicle) -> None:
@@ -135,7 +138,9 @@ def _on_radio_lost(vehicle: Vehicle) -> None:
         exception = "Continuing Auto"
     elif options & CONTINUE_GUIDED_ON_RADIO and vehicle.mode.name == "GUIDED":
         exception = "Continuing Guided Mode"
-    _respond(vehicle, "Radio", RADIO_ACTIONS.get(round(vehicle.parameters["FS_THR_ENABLE"]), ()), exception)
+    _respond(
+        vehicle, "Radio", RADIO_ACTIONS.get(round(vehicle.parameters["FS_THR_ENABLE"]), (LAND,)), exception
+    )
 
 
 def _on_copter_battery(vehicle: Vehicle, level: str) -> None:

@@ -118,8 +118,9 @@ def _beyond(vehicle: Vehicle, point: Vector, *, floor: bool) -> dict[int, float]
 
 
 def fence_admits(vehicle: Vehicle, point: Vector) -> bool:
-    """Return whether a guided point may be flown to."""
-    return not (vehicle.parameters["FENCE_ENABLE"] and _beyond(vehicle, point, floor=True))
+    """Return whether a guided point may be flown to; a rover drives to any."""
+    checked = vehicle.flies and vehicle.parameters["FENCE_ENABLE"]
+    return not (checked and _beyond(vehicle, point, floor=True))
 
 
 def check_fence(vehicle: Vehicle, respond: Respond) -> None:
