@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from random import Random
+from typing import Any
 
 import pytest
 
@@ -14,7 +15,19 @@ from volery.kernel.network import Network
 from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext, Task
 from volery.kernel.virtual import VirtualKernel
-from volery.kernel.waiting import Event, Lock, Queue, Rate, Signal, executing_in, read_clock, sleep
+from volery.kernel.waiting import (
+    Event,
+    Lock,
+    Queue,
+    Rate,
+    Signal,
+    _place_of_caller,
+    current_task,
+    end_activation,
+    executing_in,
+    read_clock,
+    sleep,
+)
 from volery.trace.events import NONE, Activation
 from volery.trace.events import Event as Recorded
 
@@ -586,3 +599,40 @@ def test_a_meter_is_pulled_at_every_interaction_point(
     virtual.spawn(body, "counted", ExecutionContext("counted", core, meter=meter))
     virtual.run(S)
     assert [(start, end) for start, end, *_ in slices()] == [(0, 2), (2, 5), (15, 19)]
+
+
+def test_a_lock_is_what_it_is_entered_as(virtual: VirtualKernel, spawn: Spawn) -> None:
+    lock = Lock(virtual, "l")
+    entered: list[Lock] = []
+
+    def body() -> None:
+        with lock as one:
+            entered.append(one)
+
+    spawn(body)
+    virtual.run(LONG)
+    assert entered == [lock]
+
+
+@pytest.mark.parametrize(
+    "wait",
+    [
+        current_task,
+        end_activation,
+        lambda kernel: sleep(kernel, MS),
+        lambda kernel: Lock(kernel, "l").__enter__(),
+        lambda kernel: Queue(kernel, "q").get(MS),
+        lambda kernel: Event(kernel, "e").wait(MS),
+    ],
+)
+def test_outside_of_tasks_no_wait_begins(virtual: VirtualKernel, wait: Callable[[Kernel], object]) -> None:
+    with pytest.raises(UsageError, match="only a task can wait"):
+        wait(virtual)
+
+
+def test_a_place_is_where_component_code_calls_the_framework() -> None:
+    framework: dict[str, Any] = {"__name__": "volery.somewhere", "place": _place_of_caller}
+    exec("def read(): return place()", framework)
+    first = [framework["read"]() for _ in range(2)]
+    second = framework["read"]()
+    assert first[0] == first[1] != second

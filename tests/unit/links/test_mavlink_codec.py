@@ -5,7 +5,7 @@ from pymavlink.dialects.v10 import ardupilotmega as dialect_v1
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.links.link import Frame
-from volery.links.mavlink_codec import CHECKSUM, HEADER, MavlinkParser, encode, frame_length
+from volery.links.mavlink_codec import CHECKSUM, HEADER, MavlinkParser, encode, frame_length, quantised
 
 BEAT = encode(Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "base_mode": 81, "mavlink_version": 3}, 1, 1), 0)
 BOOT = b"\n\nInit ArduCopter V4.5.6 (7ce11b41)\n\nFree RAM: 131072\nBooting 0/0\n"
@@ -124,3 +124,13 @@ def test_a_frame_or_two_of_an_unknown_kind_are_chance_and_three_another_dialect(
     for unknown, said in ((2, "no MAVLink: another protocol"), (3, "3 of unknown kind")):
         parser.statistics.unknown = unknown
         assert said in parser.problem()
+
+
+def test_a_quantised_frame_is_what_arrives():
+    sent = Frame("STATUSTEXT", {"severity": 4, "text": "x" * 60}, 7, 3)
+    assert quantised(sent) == MavlinkParser().feed(encode(sent, 5))[0]
+    assert quantised(sent).fields["text"] == "x" * 50
+    third = quantised(Frame("ATTITUDE", {"roll": 1 / 3}, 1, 1)).fields
+    assert third["roll"] != 1 / 3
+    assert third["roll"] == pytest.approx(1 / 3)
+    assert third["yaw"] == 0.0

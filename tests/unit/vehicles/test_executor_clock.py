@@ -82,3 +82,9 @@ def test_the_programs_clock_counts_where_both_agree(rate: float) -> None:
 
 def test_the_programs_clock_counts_where_there_is_no_other() -> None:
     assert timed_out_after(10.0, 20 * S, sends_its_clock=False) == (20.0, [])
+
+
+def test_clocks_are_compared_from_five_seconds_on() -> None:
+    assert timed_out_after(10.0, 4900 * MS) == (4.9, [])
+    after, texts = timed_out_after(10.0, 5500 * MS)
+    assert (after, len(texts)) == (5.0, 1)

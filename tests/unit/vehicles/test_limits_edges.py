@@ -310,3 +310,67 @@ def test_without_a_home_nothing_is_out_of_bounds() -> None:
     flown = Flown()
     flown.seen.update_position(above(500.0))
     assert BoundsMonitor(flown.seen, None).check("goto", 0) is None
+
+
+# -- within a metre
+
+
+def outline(*points: tuple[float, float]) -> tuple[tuple[float, float], ...]:
+    found = [FRAME.from_enu((east, north, 0.0)) for east, north in points]
+    return tuple((latitude, longitude) for latitude, longitude, _ in found)
+
+
+def home_violation(*zones: Zone, **fence: Any) -> str:
+    return Bounds(HOME, Limits(), Fence(no_fly=zones, **fence)).home_violation
+
+
+def test_home_is_checked_to_a_fraction_of_a_metre() -> None:
+    near = square(10.0, east=10.5)
+    assert home_violation(Zone("z", square(0.5), ceiling=AboveHome(0.5))).endswith("in the no-fly zone 'z'")
+    assert home_violation(Zone("z", square(0.5), floor=AboveHome(-0.5))).endswith("in the no-fly zone 'z'")
+    assert home_violation(Zone("z", square(0.5), floor=AboveHome(0.5), ceiling=AboveHome(9))) == ""
+    assert home_violation(Zone("z", square(0.5), floor=AboveHome(-9), ceiling=AboveHome(-0.5))) == ""
+    assert home_violation(Zone("z", near)) == ""
+    assert home_violation(polygon=square(0.5)) == ""
+    assert "is outside the fence's polygon" in home_violation(polygon=near)
+    assert home_violation(polygon=square(50.0), ceiling=AboveHome(0.5)) == ""
+    assert "is not below" in home_violation(polygon=square(50.0), ceiling=AboveHome(-0.5))
+    for east, north in ((0.5, 0.0), (-0.5, 0.0), (0.0, 0.5), (0.0, -0.5)):
+        beside = outline(
+            *((east + x, north + y) for x, y in ((-0.4, -0.4), (0.4, -0.4), (0.4, 0.4), (-0.4, 0.4)))
+        )
+        assert home_violation(Zone("z", beside)) == ""
+        assert "outside" in home_violation(polygon=beside)
+
+
+def test_a_small_zone_has_a_tolerance_of_a_quarter_of_its_width() -> None:
+    bounds = Bounds(HOME, Limits(), Fence(no_fly=(Zone("z", square(2.0, east=20.0)),)))
+    assert bounds.violations(place(18.9, 0.0, AMSL(910.0))) == {}
+    assert list(bounds.violations(place(19.2, 0.0, AMSL(910.0)))) == ["zone z"]
+
+
+def test_a_zone_that_is_left_may_not_be_grazed_by_half_a_metre() -> None:
+    hook = outline((-5, -5), (5, -5), (5, 5), (20, 5), (20, -0.1), (20.5, -0.1), (20.5, 10), (-5, 10))
+    fence = Fence(no_fly=(Zone("hook", hook),))
+    bounds = Bounds(HOME, Limits(), fence)
+    out, beyond = place(12.0, 0.0, AMSL(910.0)), place(30.0, 0.0, AMSL(910.0))
+    assert bounds.path_violation(bounds.path(AT_HOME, out), out) == ""
+    assert "no-fly zone 'hook'" in bounds.path_violation(bounds.path(AT_HOME, beyond), beyond)
+
+
+def test_what_is_violated_at_the_start_counts_once_it_has_been_met() -> None:
+    telemetry = Telemetry(VirtualKernel(), "craft")
+    bounds = Bounds(HOME, Limits(highest=50.0), None)
+    telemetry.position = above(60.0)
+    monitor = BoundsMonitor(telemetry, bounds)
+    seen = []
+    for up in (61.0, 52.0, 40.0, 60.0):
+        telemetry.position = above(up)
+        seen.append(monitor.check("go to a place", 0))
+    assert seen[:3] == [None, None, None]
+    assert isinstance(seen[3], OutOfBounds)
+    telemetry.position = above(60.0)
+    ignoring = BoundsMonitor(telemetry, bounds, frozenset({"highest"}))
+    for up in (40.0, 60.0):
+        telemetry.position = above(up)
+        assert ignoring.check("go to a place", 0) is None
