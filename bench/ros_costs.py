@@ -1,9 +1,9 @@
 """ROS calls, estimated and measured on this machine: the paper's Tables III and IV for other nodes.
 
-Ten rounds. In each, a probe of roscpp and one of rospy measure what calls cost (calibration), while five
+Ten rounds. In each, a probe of roscpp and one of rospy measure what calls cost (calibration), while eight
 nodes of each library run on a real master and are measured from outside: both see the same machine, whatever
 else it does. What is estimated is a simulation of the
-same models, priced with the medians of the calibration. The nodes stand in bench/ros_nodes and were committed
+same models, priced with the medians of the calibration. The nodes stand in bench/ros_nodes and were written
 before anything was calibrated. No coefficient is fitted to them, but what a law distinguishes was extended
 after looking at their differences (docs/calibration.md). An estimate holds if it is off by at most 15 % or
 half the inter-quartile range of the measured runs.
@@ -136,7 +136,7 @@ def show(console: Console, one: Campaign) -> None:
     )
     for call, cost in one.costs().items():
         sure = f"known to {cost.half_width:.0%}, quartiles ±{cost.spread / 2:.0%}"
-        console.print(f"  {call:<18}{format_line(cost.whole, call):<20}{sure}", highlight=False)
+        console.print(f"  {call:<20}{format_line(cost.whole, call):<20}{sure}", highlight=False)
     system, found = one.result()
     console.print(*comparison_tables(found, system))
     off = median(abs(node.difference) for node in found)

@@ -55,11 +55,16 @@ connection; x microseconds pass in ``spin``.
 SERVICE_CALLS = ("call_service", "serve")
 """A request, for its caller and for its server: they cost nothing where a law has no figure."""
 
-WARM_CALLS = {"publish_next": "publish"}
-"""Calls shortly after the library has sent or received, when its threads are awake, and the call whose price
-holds where a law does not distinguish them."""
+WARMER_CALLS = {
+    "publish_next": "publish",
+    "publish_often": "publish",
+    "publish_next_often": "publish_next",
+}
+"""Calls shortly after the library has sent or received (``next``), when its threads are awake, and in loops
+of some 20 ms (``often``), where caches are warmer; each with the call whose price holds where a law does not
+distinguish them."""
 
-_DEPENDENT = ("publish", "publish_next", "sleep", "wait")
+_DEPENDENT = ("publish", *WARMER_CALLS, "sleep", "wait")
 _SPIN = {1.0: "spin_once_first", 0.0: "spin_once_next"}
 _MAX_CACHED = 4096
 """Prices that a tariff keeps; sleeps of many different lengths must not fill the memory."""
@@ -183,8 +188,8 @@ class Tariff:
         name = _SPIN.get(x, call) if call == "spin_once" else call
         if name in (*BACKGROUND_EVENTS, *SERVICE_CALLS) and name not in self._parts:
             return self._keep(call, x, NO_PRICE)
-        if name not in self._parts:
-            name = WARM_CALLS.get(name, name)
+        while name not in self._parts and name in WARMER_CALLS:
+            name = WARMER_CALLS[name]
         if name not in self._parts:
             raise EstimateError(
                 f"no figure for the ROS call {name!r} of {self.law.client} on {self.law.processor}; "

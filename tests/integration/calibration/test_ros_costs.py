@@ -30,7 +30,7 @@ pytestmark = pytest.mark.integration
 VOLERY = str(Path(sys.executable).with_name("volery"))
 PACE = Pace(block_ms=100.0, period_ms=10.0, sleeps_ms=(5.0, 20.0), counts=(1, 2))
 MACHINE = Machine("here", "this machine", 2, 2000.0)
-SAID = {"publish", "publish_next", "sleep", "wait", "receive", "connect", "accept", "init", "node_handle"}
+SAID = {"publish_often", "publish_next_often", "sleep", "wait", "receive", "connect", "accept", "init", "node_handle"}
 SAID |= {"advertise", "subscribe", "service_client", "advertise_service", "call_service", "serve"}
 
 NODE = """
@@ -91,11 +91,11 @@ def test_both_libraries_are_calibrated(ros: None, tmp_path: Path) -> None:
     assert set(found["roscpp"]) == SAID | {"spin_once_first", "spin_once_next"}
     assert set(found["rospy"]) == SAID
     for client, these in found.items():
-        assert set(these["publish"].points) == {1.0, 2.0}
+        assert set(these["publish_often"].points) == {1.0, 2.0}
         assert set(these["sleep"].points) == {5000.0, 20000.0}
         assert these["init"].typical > 0.0
         assert these["sleep"].typical > 0.0
-        assert set(these["publish_next"].points) == {2.0, 8.0}
+        assert set(these["publish_next_often"].points) == {2.0, 8.0}
         assert these["call_service"].typical > 0.0
         assert these["serve"].typical > 0.0
         under = Conditions(client, MACHINE.description, MACHINE.frequency_mhz)

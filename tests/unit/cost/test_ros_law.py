@@ -184,6 +184,9 @@ def test_a_warm_publish_costs_the_same_without_a_separate_figure() -> None:
     text = MEASURED + "          publish_next: {provenance: measured, source: s, constant: {offset: 7000}}\n"
     apart = parse_catalogue(text).processor("here").ros_law("rospy").price("publish_next", 3, 2600)
     assert (apart.caller, apart.background) == (7000, 0)
+    often = parse_catalogue(text).processor("here").ros_law("rospy").at(2600)
+    assert often("publish_next_often", 3) == apart
+    assert often("publish_often", 3) == often("publish", 3)
 
 
 def test_service_requests_cost_what_a_law_states_and_nothing_where_it_has_no_figure() -> None:

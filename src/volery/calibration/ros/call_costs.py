@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 
 from volery.base.errors import LinkError
 from volery.base.seeds import stream
-from volery.base.time import S
+from volery.base.time import MS, S
 
 Clock = Literal["process_ns", "caller_ns"]
 """CPU time of the whole process, or of the calling thread."""
@@ -28,6 +28,10 @@ ONCE = ("init", "node_handle", "advertise", "subscribe", "service_client", "adve
 
 
 SECOND_US = 1e6
+FOLLOWING = 4
+"""Topics that probes publish just after another."""
+OFTEN_NS = 32 * MS
+"""Cycles below this are frequent: halfway between the two periods of campaigns, 20 and 50 ms."""
 
 
 class Sample(NamedTuple):
@@ -128,13 +132,14 @@ class _RoundAnalysis:
             yield "wait", SECOND_US, one.each(self._clock) * S / one.waited_ns
 
     def publishing(self) -> Iterable[Point]:
-        """Yield publishing cycles less the idle cycles before them."""
+        """Yield publishing cycles less the idle cycles before them, by their period."""
         idle, publish = self._by_name.get("idle", []), self._by_name.get("publish", [])
         for without, whole in zip(idle, publish, strict=False):
-            yield "publish", whole.x, whole.each(self._clock) - without.each(self._clock)
+            yield f"publish{_by_period(whole)}", whole.x, whole.each(self._clock) - without.each(self._clock)
         alone, both = self._by_name.get("publish_alone", []), self._by_name.get("publish_both", [])
         for without, whole in zip(alone, both, strict=False):
-            yield "publish_next", whole.x, whole.each(self._clock) - without.each(self._clock)
+            value = (whole.each(self._clock) - without.each(self._clock)) / FOLLOWING
+            yield f"publish_next{_by_period(whole)}", whole.x, value
 
     def hearing(self) -> Iterable[Point]:
         """Cycles that publish and spin, minus those that publish; waiting with messages, minus without."""
@@ -156,6 +161,11 @@ class _RoundAnalysis:
             yield "serve", 0.0, (getattr(one, self._clock) - anyway) / one.cycles
 
 
+def _by_period(one: Sample) -> str:
+    """Return the ending of the names of calls in cycles as short as these."""
+    return "_often" if one.waited_ns < OFTEN_NS * one.cycles else ""
+
+
 def _grouped(samples: Round) -> dict[str, list[Sample]]:
     found: dict[str, list[Sample]] = {}
     for one in samples:
@@ -163,7 +173,14 @@ def _grouped(samples: Round) -> dict[str, list[Sample]]:
     return found
 
 
-TYPICAL_X = {"publish": 4.0, "publish_next": 2.0, "sleep": 50_000.0, "wait": 1_000_000.0}
+TYPICAL_X = {
+    "publish": 4.0,
+    "publish_often": 4.0,
+    "publish_next": 2.0,
+    "publish_next_often": 2.0,
+    "sleep": 50_000.0,
+    "wait": 1_000_000.0,
+}
 """x at which a law is judged: four subscribers (two), 50 ms, a second."""
 
 DRAWS = 200

@@ -23,7 +23,8 @@ from volery.calibration.ros.probe_environment import Pace, ProbeSetup
 from volery.cost import CallFigures, Line, RosLaw, line_through, read_catalogue
 
 PERIODS_MS = (20.0, 50.0)
-"""Periods of measured cycles, ms, in turn by round: caches are colder after a longer sleep."""
+"""Periods of measured cycles, ms, in turn by round: caches are colder after a longer sleep. A law has the
+publications of both."""
 
 LEAST_ROUNDS = 3
 """Least number of rounds that shows their spread."""
@@ -132,9 +133,9 @@ def uncertain_costs(rounds: Iterable[Round], within: float) -> tuple[CallCost, .
 CALLBACK = ("spin_once_first", "spin_once_next")
 """Calls that the embedded graph prices when a callback begins."""
 
+_PUBLICATIONS = (("publish", "publish_next"), ("publish_often", "publish_next_often"))
 _UNITS = {
-    "publish": "subscriber",
-    "publish_next": "subscriber",
+    **{call: "subscriber" for pair in _PUBLICATIONS for call in pair},
     "sleep": "microsecond slept",
     "wait": "microsecond",
 }
@@ -163,17 +164,23 @@ def ros_law(costs: Mapping[str, CallCost], under: Conditions) -> RosLaw:
 
 def _with_slope(costs: Mapping[str, CallCost]) -> dict[str, CallCost]:
     """Give ``publish_next`` the slope of ``publish`` where it was measured at one number of subscribers."""
-    first, following = costs.get("publish"), costs.get("publish_next")
-    if first is None or following is None or following.typical <= 0.0:
-        return {call: cost for call, cost in costs.items() if call != "publish_next"}
-    if len(following.points) > 1:
-        return dict(costs)
-    [x] = following.points
-    whole, caller = (
-        _through_point(x, getattr(following, part).at(x), getattr(first, part).per_x)
-        for part in ("whole", "caller")
-    )
-    return {**costs, "publish_next": replace(following, whole=whole, caller=caller)}
+    found = dict(costs)
+    for name, next_name in _PUBLICATIONS:
+        first, following = costs.get(name), costs.get(next_name)
+        if first is None or following is None or following.typical <= 0.0:
+            found.pop(next_name, None)
+        elif len(following.points) == 1:
+            [x] = following.points
+            whole, caller = (
+                _through_point(x, getattr(following, part).at(x), getattr(first, part).per_x)
+                for part in ("whole", "caller")
+            )
+            found[next_name] = replace(following, whole=whole, caller=caller)
+    if "publish" not in found and "publish_often" in found:  # rounds of short cycles only
+        for name, often in zip(*_PUBLICATIONS, strict=True):
+            if often in found:
+                found[name] = replace(found[often], call=name)
+    return found
 
 
 def _through_point(x: float, value: float, per_x: float) -> CostLine:

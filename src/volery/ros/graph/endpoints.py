@@ -224,7 +224,7 @@ class EmbeddedSubscription:
         if not node.graph.unrecorded:
             kernel.record(Message(sent, now, self.topic, publisher, node.name, size))
         if node.processor is not None:
-            node.last_traffic = now
+            node.note_traffic(now)
             node.charge_background("receive")
         queue = self._queue
         if len(queue) == self.qos.depth:

@@ -195,6 +195,9 @@ WAIT_PERIOD: Ns = S
 WARM: Ns = MS
 """Time after sending or receiving during which a node's threads and caches are still warm."""
 
+REST: Ns = 32 * MS
+"""Rest after which a node's caches are cold: halfway between the cycles of calibrations, 20 and 50 ms."""
+
 _KINDS = {call: f"ros:{call}" for call in ("publish", "sleep", "spin_once")}
 """Texts of the most frequent charges, made once."""
 
@@ -204,8 +207,8 @@ class NodeContext:
     """A node as its publishers, subscriptions and services use it: their owner, which is charged."""
 
     __slots__ = (
-        "_free", "_since", "_slept", "_tariff", "_waited",
-        "closed", "context", "graph", "id", "kernel", "last_traffic", "name", "processor",
+        "_free", "_last_traffic", "_rest", "_since", "_slept", "_tariff", "_waited",
+        "closed", "context", "graph", "id", "kernel", "name", "processor",
     )  # fmt: skip
 
     def __init__(self, graph: GraphContext, name: str, context: ExecutionContext) -> None:
@@ -216,7 +219,8 @@ class NodeContext:
         self._tariff = graph.tariffs(self.id)
         self._free = graph.unrecorded and self.processor is None  # neither executed nor recorded
         self._since = self.kernel.now()
-        self.last_traffic: Ns = -WARM
+        self._last_traffic: Ns = -REST
+        self._rest: Ns = REST
         self._slept = self._waited = 0.0
 
     def consume(self, call: str, x: float = 0.0) -> Ns:
@@ -239,9 +243,7 @@ class NodeContext:
         if call == "sleep":
             self._slept += x
         elif call == "publish":
-            if now - self.last_traffic < WARM:
-                priced = "publish_next"
-            self.last_traffic = now
+            priced = self._publication(now)
         caller = background = 0
         if self._tariff is not None:
             cost = self._tariff(priced, x)
@@ -266,8 +268,7 @@ class NodeContext:
             return now
         caller = background = 0
         for connections in subscribers:
-            priced = "publish_next" if at - self.last_traffic < WARM else "publish"
-            self.last_traffic = at
+            priced = self._publication(at)
             if tariff is not None:
                 cost = tariff(priced, float(connections))
                 caller += cost.caller
@@ -277,6 +278,20 @@ class NodeContext:
             kind = f"ros:publish*{len(subscribers)}"
             kernel.record(Charge(now, self.id.component, self.id.processor, kind, caller, background, 0.0))
         return self._execute(now, caller, background)
+
+    def note_traffic(self, at: Ns) -> bool:
+        """Record that the node sends or receives at ``at``; return whether it rested before."""
+        rest = at - self._last_traffic
+        self._last_traffic = at
+        if rest < WARM:
+            return False
+        self._rest = rest
+        return True
+
+    def _publication(self, at: Ns) -> str:
+        """Return the name by which a law prices a publication at ``at``."""
+        name = "publish" if self.note_traffic(at) else "publish_next"
+        return name if self._rest >= REST else f"{name}_often"
 
     def _execute(self, now: Ns, caller: Ns, background: Ns) -> Ns:
         """Execute what has been charged at *now*; return the time at which the caller's part has been."""

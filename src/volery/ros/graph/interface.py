@@ -91,6 +91,7 @@ Tariff = Callable[[str, float], Cost]
 """``tariff(call, x)``: the cost of one call of a node. The calls are ``init``, ``node_handle``,
 ``advertise``, ``subscribe``, ``advertise_service``, ``service_client``, ``publish`` (x = subscribers of the
 topic), ``publish_next`` (a ``publish`` less than a millisecond after the node has sent or received),
+``publish_often`` and ``publish_next_often`` (the same where the node rested for less than 32 ms before),
 ``sleep`` (x = microseconds slept) and ``spin_once`` (x = 1 for the first of a group, 0 after it). Costs
 beside the calls are ``receive`` (a message arrives), ``connect`` (a subscription is connected to a
 publisher), ``accept`` (a publisher to a subscription) and ``wait`` (x = microseconds without sleep)."""

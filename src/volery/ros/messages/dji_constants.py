@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import IntEnum
+from enum import IntEnum, IntFlag
 from typing import NamedTuple
 
 OLD_NAMES, NEW_NAMES = "dji_sdk", "dji_osdk_ros"
@@ -221,3 +221,18 @@ NO_CODE = 255
 def ack_name(table: type[IntEnum], code: int) -> str:
     """Return the words for a code, or an empty text if the table does not have it."""
     return table(code).name.lower().replace("_", " ") if code in set(table) else ""
+
+
+class GimbalMode(IntFlag):
+    """Bits of ``mode`` in ``dji_sdk/Gimbal``: absolute angles, and the axes that keep theirs."""
+
+    ABSOLUTE = 1
+    KEEPS_YAW = 2
+    KEEPS_ROLL = 4
+    KEEPS_PITCH = 8
+
+
+GIMBAL_PITCHES = (-90.0, 30.0)
+"""Least and greatest pitch of a gimbal [degrees], up positive: Zenmuse X3 to Z30."""
+TAKE_PICTURE = 0
+"""``camera_action`` of ``dji_sdk/CameraAction``."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from volery.base.seeds import stream
-from volery.calibration.ros.call_costs import Round, Sample
+from volery.calibration.ros.call_costs import FOLLOWING, Round, Sample
 
 OWN, IDLE = 40_000.0, 0.001
 """ns that the probe's own looking takes; ns of the library's threads for each ns on the wall."""
@@ -21,16 +21,23 @@ PUBLISH, PER_SUBSCRIBER, AGAIN = 75_000.0, 18_000.0, 40_000.0
 SLEEP, PER_US = 14_000.0, 1.05
 ACCEPT, SPIN, RECEIVE = 480_000.0, 5_000.0, 90_000.0
 PERIOD_US = 50_000.0
+WARMER = 0.75
+"""Cost of a publication in cycles of less than 32 ms, relative to longer ones."""
+CYCLES = 12
 
 
 class Probe:
     """``noise`` is relative, on every sample of its own."""
 
-    def __init__(self, seed: int = 1, noise: float = 0.0, spins: bool = True) -> None:
+    def __init__(
+        self, seed: int = 1, noise: float = 0.0, spins: bool = True, period_us: float = PERIOD_US
+    ) -> None:
         self._random = stream(seed, "probe")
-        self._noise, self._spins = noise, spins
+        self._noise, self._spins, self._period_us = noise, spins, period_us
 
     def _sample(self, what: str, x: float, cycles: int, each: float, waited: float = 1e8) -> Sample:
+        if cycles == CYCLES:
+            waited = CYCLES * self._period_us * 1e3
         process = each * cycles * (1.0 + self._random.gauss(0.0, self._noise))
         return Sample(what, x, cycles, round(waited), round(process), round(process / 2))
 
@@ -38,24 +45,25 @@ class Probe:
         return self._sample(what, x, 1, OWN + cost + IDLE * 1e8)
 
     def round(self, counts: tuple[int, ...] = (1, 2, 4, 8)) -> Round:
+        warmth = 1.0 if self._period_us >= PERIOD_US else WARMER
         idle = SLEEP + PER_US * PERIOD_US
         samples = [self._sample("nothing", 0, 1, OWN)]
         samples += [self._once(what, cost) for what, cost in ONCE.items()]
         samples += [self._once("settle", 0.0), self._once("settle", 0.0)]
         for ms in (10, 20, 50, 100):
-            samples.append(self._sample("sleep", ms * 1000, 12, SLEEP + PER_US * ms * 1000))
+            samples.append(self._sample("sleep", ms * 1000, CYCLES, SLEEP + PER_US * ms * 1000))
         for count in counts:
-            cost = PUBLISH + PER_SUBSCRIBER * count
+            cost = warmth * (PUBLISH + PER_SUBSCRIBER * count)
             samples.append(self._once("accept", ONCE["advertise"] + ACCEPT * count, count))
-            samples.append(self._sample("idle", 0, 12, idle))
-            samples.append(self._sample("publish", count, 12, idle + cost))
-        alone = idle + PUBLISH + PER_SUBSCRIBER
-        both = alone + AGAIN + 2 * PER_SUBSCRIBER
-        samples.append(self._sample("publish_alone", 0, 12, alone))
-        samples.append(self._sample("publish_both", 2, 12, both))
+            samples.append(self._sample("idle", 0, CYCLES, idle))
+            samples.append(self._sample("publish", count, CYCLES, idle + cost))
+        alone = idle + warmth * (PUBLISH + PER_SUBSCRIBER)
+        both = alone + warmth * FOLLOWING * (AGAIN + 2 * PER_SUBSCRIBER)
+        samples.append(self._sample("publish_alone", 0, CYCLES, alone))
+        samples.append(self._sample("publish_both", 2, CYCLES, both))
         if self._spins:
             samples.append(self._sample("spin_once_first", 0, 1, 20_000.0))
-            samples.append(self._sample("spin_once", 0, 12, both + SPIN))
+            samples.append(self._sample("spin_once", 0, CYCLES, both + SPIN))
         samples.append(self._sample("wait", 0, 1, 2e6, 1e9))
         samples.append(self._sample("receive", 0, 20, 1e5 + RECEIVE, 1e9))
         return tuple(samples)

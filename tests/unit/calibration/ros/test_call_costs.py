@@ -6,7 +6,19 @@ import pytest
 from volery.base.errors import LinkError
 from volery.calibration.ros.call_costs import call_costs, fit, points_of, read_round
 
-from .ros_rounds import ACCEPT, AGAIN, ONCE, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, SLEEP, SPIN, Probe
+from .ros_rounds import (
+    ACCEPT,
+    AGAIN,
+    ONCE,
+    PER_SUBSCRIBER,
+    PER_US,
+    PUBLISH,
+    RECEIVE,
+    SLEEP,
+    SPIN,
+    WARMER,
+    Probe,
+)
 
 
 def test_an_exact_probe_gives_back_its_law() -> None:
@@ -20,6 +32,16 @@ def test_an_exact_probe_gives_back_its_law() -> None:
         assert found[call].typical == pytest.approx(cost, rel=1e-3), call
     assert found["publish_next"].typical == pytest.approx(AGAIN + 2 * PER_SUBSCRIBER, rel=1e-3)
     assert found["wait"].typical == pytest.approx(2e6, rel=1e-3)
+
+
+def test_publications_in_short_cycles_have_figures_of_their_own() -> None:
+    found = call_costs([Probe(period_us=period).round() for period in (20_000.0, 50_000.0)])
+    for call, cost in (
+        ("publish", PUBLISH + 4 * PER_SUBSCRIBER),
+        ("publish_next", AGAIN + 2 * PER_SUBSCRIBER),
+    ):
+        assert found[call].typical == pytest.approx(cost, rel=1e-3)
+        assert found[f"{call}_often"].typical == pytest.approx(WARMER * cost, rel=1e-3)
 
 
 def test_exact_points_leave_no_residual_and_are_tight() -> None:

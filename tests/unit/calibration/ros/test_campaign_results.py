@@ -36,6 +36,14 @@ def test_an_entry_prices_as_was_measured(tmp_path: Path) -> None:
     assert publish.flags == ()
 
 
+def test_rounds_of_one_period_price_all_publications() -> None:
+    for period_us in (20_000.0, 50_000.0):
+        rounds = [Probe(period_us=period_us).round() for _ in range(3)]
+        prices = ros_law(call_costs(rounds), Conditions("rospy", MACHINE.description, 2600.0)).at(2600)
+        for call in ("publish", "publish_next"):
+            assert prices(call, 3) == prices(f"{call}_often", 3)
+
+
 def test_it_holds_at_its_frequency_only(tmp_path: Path) -> None:
     write_entry(tmp_path / "one.yaml", MACHINE, law())
     entry = load_catalogue(tmp_path / "one.yaml").processor("my-computer")

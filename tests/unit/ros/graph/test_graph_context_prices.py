@@ -190,6 +190,22 @@ def test_a_second_publish_within_a_millisecond_is_priced_as_publish_next(rig: An
     assert {event.kind for event in rig.of(Charge) if "publish" in event.kind} == {"ros:publish"}
 
 
+def test_publications_of_a_fast_loop_are_priced_as_often(rig: Any) -> None:
+    def talker() -> None:
+        node = rig.graph.node("talker")
+        publishers = [node.advertise(topic, STRING) for topic in ("chat", "talk")]
+        for pause in (50, 20, 20, 50):
+            rig.kernel.sleep_until(rig.kernel.now() + pause * MS)
+            for publisher in publishers:
+                publisher.publish(messages.new(STRING))
+
+    rig.task(talker, "talker", on_processor=True)
+    rig.kernel.run(S)
+    calls = [call for _, call, _ in rig.asked if call.startswith("publish")]
+    slow, fast = ["publish", "publish_next"], ["publish_often", "publish_next_often"]
+    assert calls == [*slow, *fast, *fast, *slow]
+
+
 @pytest.mark.parametrize("priced", [True, False])
 def test_a_request_costs_its_caller_and_its_server_what_the_law_says(rig: Any, priced: bool) -> None:
     if priced:

@@ -18,7 +18,9 @@ SPIN_BLOCKS = 2.5
 """Blocks of receiving, which are longer since messages are rarer than cycles."""
 HALF_S = 0.5
 FEW, MANY = 2.0, 8.0
-"""Subscribers of a topic that is published just after another."""
+"""Subscribers of topics that are published just after another."""
+FOLLOWING = 4
+"""Topics that are published just after another: more than one, for a difference above the noise."""
 NODE, DEPTH = "calibration_probe", 10
 
 received = [0]
@@ -237,8 +239,8 @@ def _until(done: Callable[[], bool]) -> None:
         time.sleep(GLANCE_S)
 
 
-def _connected(first: Ends, other: Ends, count: float) -> Callable[[], bool]:
-    return lambda: first.peers() > 0 and other.peers() >= count
+def _connected(first: Ends, others: list[Ends], count: float) -> Callable[[], bool]:
+    return lambda: first.peers() > 0 and all(other.peers() >= count for other in others)
 
 
 def _together(calls: list[Callable[[], Any]]) -> Callable[[], Any]:
@@ -319,19 +321,23 @@ class Probe:
             time.sleep(SETTLE_S)
 
     def spinning(self, counts: list[float]) -> None:
-        """Measure cycles that publish once, twice, and twice with a spin: later calls find warm threads."""
+        """Measure cycles that publish once, on several topics, and spin: later calls find warm threads."""
         first = self._client.advertise("calibration/to_1")
         spin = self._client.spin_once
         for count in counts:
-            other = self._client.advertise(f"calibration/to_{count:.0f}")
-            _until(_connected(first, other, count))
+            others = [
+                self._client.advertise(f"calibration/next_{number}_{count:.0f}")
+                for number in range(FOLLOWING)
+            ]
+            _until(_connected(first, others, count))
             time.sleep(SETTLE_S)
-            both = [first.publish, other.publish]
+            both = [first.publish, *(other.publish for other in others)]
             self._block("publish_alone", 0, self._period_s, first.publish)
             self._block("publish_both", count, self._period_s, _together(both))
             if spin is not None and count == counts[0]:
                 self._block("spin_once", 0, self._period_s, _together([*both, spin]))
-            other.close()
+            for other in others:
+                other.close()
             time.sleep(SETTLE_S)
         first.close()
 

@@ -24,7 +24,8 @@ using Action = std::function<void()>;
 const int kConnectMs = 10000;
 const int kGlanceMs = 50;  // a check costs some CPU time, so there are few
 const int kSettleMs = 100;
-const int kFew = 2, kMany = 8;  // subscribers of a topic that is published just after another
+const int kFew = 2, kMany = 8;  // subscribers of topics that are published just after another
+const int kFollowing = 4;       // and how many topics, for a difference above the noise
 const double kSpinBlocks = 2.5;  // messages are rarer than cycles
 
 long received = 0;
@@ -135,18 +136,25 @@ void publishing(ros::NodeHandle& node, double period_ms, double block_ms, const 
   }
 }
 
-// Measures cycles that publish once, twice, and twice with a spin: later calls find warm threads.
+// Measures cycles that publish once, on several topics, and then spin: later calls find warm threads.
 void spinning(ros::NodeHandle& node, double period_ms, double block_ms) {
   Message message;
   message.data.resize(4);
   ros::Publisher first = node.advertise<Message>("calibration/to_1", 10);
   for (int count : {kFew, kMany}) {
-    ros::Publisher next = node.advertise<Message>("calibration/to_" + std::to_string(count), 10);
-    until([&] { return first.getNumSubscribers() > 0 && next.getNumSubscribers() >= uint32_t(count); });
+    std::vector<ros::Publisher> others;
+    for (int number = 0; number < kFollowing; ++number)
+      others.push_back(node.advertise<Message>(
+          "calibration/next_" + std::to_string(number) + "_" + std::to_string(count), 10));
+    until([&] {
+      return first.getNumSubscribers() > 0 && std::all_of(others.begin(), others.end(), [&](const ros::Publisher& one) {
+               return one.getNumSubscribers() >= uint32_t(count);
+             });
+    });
     pause(kSettleMs);
     const auto both = [&] {
       first.publish(message);
-      next.publish(message);
+      for (ros::Publisher& other : others) other.publish(message);
     };
     block("publish_alone", 0, period_ms, block_ms, [&] { first.publish(message); });
     block("publish_both", count, period_ms, block_ms, both);
@@ -156,7 +164,7 @@ void spinning(ros::NodeHandle& node, double period_ms, double block_ms) {
         ros::spinOnce();
       });
     }
-    next.shutdown();
+    for (ros::Publisher& other : others) other.shutdown();
     pause(kSettleMs);
   }
 }

@@ -1,10 +1,10 @@
 """Peers of a probe: a program that runs during a campaign until its standard input ends.
 
 ``sinks.py rospy`` or ``sinks.py rclpy``: eight nodes in one process. Topic ``calibration/to_N`` has N
-subscribers, ``calibration/quiet`` a publisher that never publishes, ``calibration/feed`` one that publishes
-twenty times a second. Service ``calibration/served`` answers; ``calibration/answer``, a service of the probe,
-is called twenty times a second while it is there. For rclpy it does not import volery: that runs in the
-Python that has rclpy.
+subscribers, and so has ``calibration/next_K_N`` for each K; ``calibration/quiet`` has a publisher that never
+publishes, ``calibration/feed`` one that publishes twenty times a second. Service ``calibration/served``
+answers; ``calibration/answer``, a service of the probe, is called twenty times a second while it is there.
+For rclpy it does not import volery: that runs in the Python that has rclpy.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from importlib import import_module
 from typing import Any
 
 MOST = 8
+FOLLOWING, COUNTS = 4, (2, 8)
+"""Topics that probes publish just after another, and their numbers of subscribers."""
 FEED_S, ABSENT_S = 0.05, 0.25
 
 
@@ -36,11 +38,19 @@ def _over() -> threading.Event:
     return over
 
 
+def _topics(number: int) -> list[str]:
+    """Return the topics of a probe that a node subscribes to."""
+    after = [
+        f"calibration/next_{one}_{count}" for one in range(FOLLOWING) for count in COUNTS if count >= number
+    ]
+    return [*(f"calibration/to_{count}" for count in range(number, MOST + 1)), *after]
+
+
 def _rospy_node(number: int) -> Any:
     rospy = import_module("volery.ros.transports.ros1.rospy_copy").rospy_copy()
     rospy.init_node(f"calibration_sink_{number}", disable_signals=True)
-    for count in range(number, MOST + 1):
-        rospy.Subscriber(f"calibration/to_{count}", rospy.AnyMsg, _ignore)
+    for topic in _topics(number):
+        rospy.Subscriber(topic, rospy.AnyMsg, _ignore)
     return rospy
 
 
@@ -81,8 +91,8 @@ def run_rclpy() -> None:
     executor = rclpy.executors.SingleThreadedExecutor()
     for number, node in enumerate(nodes, 1):
         executor.add_node(node)
-        for count in range(number, MOST + 1):
-            node.create_subscription(kind, f"calibration/to_{count}", _ignore, 10)
+        for topic in _topics(number):
+            node.create_subscription(kind, topic, _ignore, 10)
     quiet = nodes[0].create_publisher(kind, "calibration/quiet", 10)
     feed = nodes[0].create_publisher(kind, "calibration/feed", 10)
     nodes[0].create_timer(FEED_S, lambda: feed.publish(kind(data=[0.0] * 4)))
