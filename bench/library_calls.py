@@ -3,7 +3,7 @@
 The programs in ``bench/library_programs`` take no part in the measurement of the table. As a reference the
 same programs are estimated without the table: then a library call takes no time.
 
-    python bench/library_calls.py [--unseen]
+    python bench/library_calls.py [--unseen] [program ...]
 
 With --unseen the programs of ``bench/unseen_library_programs``, written when the table was finished.
 """
@@ -30,8 +30,11 @@ def shipped_ns(one: TimedCode) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--unseen", action="store_true")
-    folder = UNSEEN if parser.parse_args().unseen else PROGRAMS
-    programs = [timed_program(file.stem, file.read_text(), SEED) for file in sorted(folder.glob("*.py"))]
+    parser.add_argument("programs", nargs="*", metavar="program", help="by default all of the folder")
+    wanted = parser.parse_args()
+    folder = UNSEEN if wanted.unseen else PROGRAMS
+    files = [folder / f"{name}.py" for name in wanted.programs] or sorted(folder.glob("*.py"))
+    programs = [timed_program(file.stem, file.read_text(), SEED) for file in files]
     own = timed_programs()
     measure([*own, *programs], Rounds(9, 15, 0.03))
     slowdown = median(one.median / shipped_ns(one) for one in own)

@@ -12,6 +12,7 @@ import hashlib
 import json
 import pickle
 import re
+import struct
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from statistics import median
@@ -36,6 +37,12 @@ SIDES = (1, 4, 16, 64, 256, 1024)
 SMALL_SIDES = (2, 4, 8, 16, 64, 128)
 """Sides of the matrices of linear algebra."""
 LENGTHS = (16, 256, 4096, 65536)
+BY_ITEMS = frozenset((
+    "sum", "mean", "std", "var", "cumsum", "array", "tolist", "nonzero", "take", "exp", "sin", "cos",
+    "interp", "polyfit", "polyval", "median", "argsort", "random", "normal", "uniform", "integers", "hypot",
+    "arctan2", "power", "diff", "unique",
+))  # fmt: skip
+"""Functions of numpy that take their time by elements whatever the type: they work on one at a time."""
 
 
 class Snippet(NamedTuple):
@@ -87,7 +94,8 @@ _LINEAR = ("inv", "solve", "det", "norm", "eig", "svd")
 def snippets() -> Iterator[Snippet]:
     """Yield all calls that are timed."""
     generator = np.random.default_rng(1)
-    yield from _arrays(generator)
+    for one in _arrays(generator):
+        yield one._replace(size="items") if one.name.removeprefix("numpy.") in BY_ITEMS else one
     yield from _linear_algebra(generator)
     yield from _texts()
 
@@ -106,6 +114,8 @@ def _arrays(generator: np.random.Generator) -> Iterator[Snippet]:
         for name in ("sort", "argsort", "median"):
             yield Snippet(f"numpy.{name}", "elements", getattr(np, name), (row,))
         yield Snippet("numpy.nonzero", "elements", np.nonzero, (row > 0.99,))
+        numbers = generator.integers(0, 20 * row.size, row.size)
+        yield Snippet("numpy.unique", "elements", lambda a: np.unique(a, return_index=True), (numbers,))
         triples = generator.random((side * side // 3 + 1, 3))
         yield Snippet("numpy.sum", "elements", lambda a: a.sum(axis=1), (triples,))
         array = generator.random((side, side)) + 0.5
@@ -177,12 +187,24 @@ def _texts() -> Iterator[Snippet]:
         yield Snippet("re.groups", "text", hit.groups, ())
         yield Snippet("re.group", "text", hit.group, (1,))
         packed = zlib.compress(text.encode())
-        yield Snippet("zlib.compress", "text", zlib.compress, (text.encode(),))
-        yield Snippet("zlib.decompress", "text", zlib.decompress, (packed,))
+        yield Snippet("zlib.compress", "packed", zlib.compress, (text.encode(),))
+        yield Snippet("zlib.decompress", "packed", zlib.decompress, (packed,))
         yield Snippet("zlib.crc32", "text", zlib.crc32, (data,))
         yield Snippet("hashlib.*", "text", lambda d: hashlib.sha256(d).digest(), (data,))
         yield Snippet("pickle.dumps", "text", pickle.dumps, (rows,))
         yield Snippet("pickle.loads", "text", pickle.loads, (pickle.dumps(rows),))
+    for fields in (1, 4, 16, 64):
+        record = struct.Struct(f"<{fields}d")
+        values = tuple(range(fields))
+        yield Snippet("struct.pack", "fields", record.pack, values)
+        yield Snippet("struct.unpack", "fields", record.unpack, (record.pack(*values),))
+        yield Snippet("struct.unpack_from", "fields", record.unpack_from, (record.pack(*values), 0))
+    for length in LENGTHS:
+        rows_of_8 = bytes(length // 64 * 64 + 64)
+        yield Snippet(
+            "struct.iter_unpack", "text", lambda b: list(struct.iter_unpack("<8d", b)), (rows_of_8,)
+        )
+    yield Snippet("struct.*", "fields", struct.calcsize, ("<8d",))
     yield Snippet("json.*", "text", json.dumps, ([1],))
     yield Snippet("re.*", "text", re.compile, ("a",))
     yield Snippet("pickle.*", "text", pickle.dumps, (1,))

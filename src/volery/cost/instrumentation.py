@@ -16,6 +16,7 @@ table (numpy, json, re); for others it has to be stated with ``volery.add_time``
 from __future__ import annotations
 
 import ast
+import copy
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import repeat
@@ -44,6 +45,18 @@ TICK = "__volery_tick_"
 ITERATED = "__volery_iterated_by_"
 LIBRARY_CALL = "__volery_call__"
 LIBRARY_OPERATOR = "__volery_operator_"
+LIBRARY_STORE = "__volery_store__"
+_READ_TWICE = (
+    ast.Name,
+    ast.Attribute,
+    ast.Subscript,
+    ast.Slice,
+    ast.Tuple,
+    ast.Constant,
+    ast.UnaryOp,
+    ast.BinOp,
+)
+_READ_TWICE += (ast.expr_context, ast.operator, ast.unaryop)
 SLICE = "__volery_slice__"
 """Names (or their beginnings) in the namespace of instrumented code: the cell that statements add to, the
 counters inside expressions by weight, the functions that count the items of an argument, and those that
@@ -305,6 +318,46 @@ class _CounterInserter(ast.NodeTransformer):
             return node
         return self._operated(node, "Subscript", node.value, _index(node.slice))
 
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        self.generic_visit(node)
+        name = type(node.op).__name__
+        if not self._libraries or name not in OPERATORS or isinstance(node.operand, ast.Constant):
+            return node
+        return ast.copy_location(_call(f"{LIBRARY_OPERATOR}{name}__", node.operand), node)
+
+    def visit_Assign(self, node: ast.Assign) -> ast.AST:
+        """Price an assignment into an array (``array[..] = value``) with its value."""
+        self.generic_visit(node)
+        return self._stored(node, node.targets[0] if len(node.targets) == 1 else None)
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
+        """Price ``array += value`` and ``array[..] += value`` with the value."""
+        self.generic_visit(node)
+        return self._stored(node, node.target)
+
+    def _stored(self, node: Any, target: ast.expr | None) -> ast.AST:
+        """Let the value pass through ``LibraryCalls`` with its target, which is read again.
+
+        That is done only where a second reading changes nothing: a target of names, attributes and items.
+        """
+        item = isinstance(target, ast.Subscript)
+        if not self._libraries or target is None or not (item or isinstance(node, ast.AugAssign)):
+            return node  # type: ignore[no-any-return] # it is one of two kinds of node
+        read = copy.deepcopy(target)
+        read.ctx = ast.Load()  # type: ignore[attr-defined] # what can be assigned to has a context
+        if not all(isinstance(one, _READ_TWICE) for one in ast.walk(read)):
+            return node  # type: ignore[no-any-return]
+        index: ast.expr = ast.Constant(None)
+        kind = "Item"
+        if isinstance(read, ast.Subscript):
+            index, read = _index(read.slice), read.value
+        else:
+            kind = type(node.op).__name__
+        node.value = ast.copy_location(
+            _call(LIBRARY_STORE, node.value, read, ast.Constant(kind), index), node.value
+        )
+        return node  # type: ignore[no-any-return]
+
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
         """Leave the annotation as it is."""
         if node.value is not None:
@@ -313,7 +366,7 @@ class _CounterInserter(ast.NodeTransformer):
 
     def _operated(self, node: ast.expr, name: str, left: ast.expr, right: ast.expr) -> ast.expr:
         """Let an operator pass through ``LibraryCalls``."""
-        if not self._libraries or name not in OPERATORS or isinstance(left, ast.Constant):
+        if not self._libraries or name not in OPERATORS or _is_text(left) or _are_constants(left, right):
             return node
         return ast.copy_location(_call(f"{LIBRARY_OPERATOR}{name}__", left, right), node)
 
@@ -354,6 +407,14 @@ class _CounterInserter(ast.NodeTransformer):
 
 def _call(name: str, *arguments: ast.expr, keywords: list[ast.keyword] | None = None) -> ast.Call:
     return ast.Call(ast.Name(name, ast.Load()), list(arguments), keywords or [])
+
+
+def _is_text(operand: ast.expr) -> bool:
+    return isinstance(operand, ast.Constant) and isinstance(operand.value, (str, bytes))
+
+
+def _are_constants(*operands: ast.expr) -> bool:
+    return all(isinstance(one, ast.Constant) for one in operands)
 
 
 def _index(index: ast.expr) -> ast.expr:
@@ -480,7 +541,8 @@ class StepCounter:
             return {}
         operators = self.libraries.operators()
         named = {f"{LIBRARY_OPERATOR}{name}__": one for name, one in operators.items()}
-        return {LIBRARY_CALL: self.libraries.call, SLICE: slice, **named}
+        calls = {LIBRARY_CALL: self.libraries.call, LIBRARY_STORE: self.libraries.store}
+        return {**calls, SLICE: slice, **named}
 
     def _item_counter(self, name: str) -> Callable[[Any], Any]:
         """Return the function that counts the items of an argument of ``name`` and passes it on."""

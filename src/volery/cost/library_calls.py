@@ -2,7 +2,8 @@
 
 Law: time of a call = a function of its size, interpolated between measured points on logarithmic axes; each
 entry states what its size is. It depends on nothing else, so that the same run has the same times. Left out
-are types, strides and whether the data lie in a cache; that is its error. The points in ``libraries.json``
+are strides and whether the data lie in a cache; that is its error. A function without points of its own is
+priced by one that computes alike. The points in ``libraries.json``
 are in nanoseconds of the machine of ``operation_table``; ``CodeLaw`` scales them to other processors.
 
 Calls are found when they happen: in a file that imports one of the libraries every call, operator and
@@ -18,7 +19,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
-from math import exp, log
+from math import exp, log, sqrt
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
@@ -26,7 +27,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from volery.cost.figures import WithProvenance
 from volery.cost.python_operations import STEPS_PER_NS
 
-OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
+OPERATORS: Mapping[str, Callable[..., Any]] = {
+    "USub": operator.neg, "Invert": operator.invert,
     "Add": operator.add, "Sub": operator.sub, "Mult": operator.mul, "Div": operator.truediv,
     "FloorDiv": operator.floordiv, "Mod": operator.mod, "Pow": operator.pow, "MatMult": operator.matmul,
     "BitAnd": operator.and_, "BitOr": operator.or_, "BitXor": operator.xor,
@@ -35,14 +37,43 @@ OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
 }  # fmt: skip
 """Functions of the operators that pass through, by the name of the syntax node."""
 
+UNARY = ("USub", "Invert")
+
 ENTRIES: Mapping[str, str] = {
     "MatMult": "numpy.matmul", "Subscript": "numpy.subscript", "Pow": "numpy.power", "Mod": "numpy.remainder",
 }  # fmt: skip
 """Entries of operators on arrays that differ from that of all others."""
 
-SIZES = ("elements", "bytes", "products", "cube", "text")
-"""Meanings of a size: elements of the largest array among arguments and result; their bytes; multiplications
-of a matrix product; elements of a matrix to the power of 1.5; length of the argument or result as text."""
+SIZES = ("elements", "items", "bytes", "products", "cube", "text", "packed", "fields")
+"""Meanings of a size: elements of the largest array among arguments and result, in units of 8 bytes, because
+what takes the time are vectors of so many bytes; elements whatever their type (``items``); bytes;
+multiplications of a matrix product; elements of a matrix to the power of 1.5; length of the argument or
+result as text; mean of the logarithms of their lengths (``packed``: the search of a packer takes the time by
+what it reads, the coding by what it writes); values of a record."""
+
+ALIKE: Mapping[str, str] = {
+    name: f"numpy.{entry}"
+    for entry, names in {
+        "exp": "log log2 log10 log1p expm1 exp2 tan arcsin arccos arctan sinh cosh tanh cbrt logaddexp",
+        "add": "negative square conjugate sign floor_divide logical_and logical_or logical_not logical_xor "
+        "bitwise_and bitwise_or bitwise_xor invert left_shift right_shift isinf greater less equal not_equal "
+        "greater_equal less_equal fmax fmin rint ceil trunc reciprocal deg2rad rad2deg radians degrees",
+        "copy": "full arange tile repeat flip empty_like full_like ones_like flatten fill compress "
+        "ascontiguousarray tobytes frombuffer triu tril diag pad",
+        "argsort": "lexsort partition argpartition searchsorted digitize histogram",
+        "median": "percentile quantile nanmedian nanpercentile nanquantile",
+        "mean": "bincount nanmean nansum nanmax nanmin nanstd average prod ptp trace cov",
+        "ravel": "reshape transpose squeeze view swapaxes expand_dims moveaxis real imag item",
+        "dot": "einsum tensordot inner vdot",
+        "outer": "kron multi_dot",
+        "inv": "cholesky qr pinv matrix_rank matrix_power",
+        "eig": "eigh eigvals eigvalsh",
+        "fft": "ifft irfft fft2 ifft2 rfft2 fftn",
+        "random": "standard_normal choice shuffle permutation rand randn",
+    }.items()
+    for name in names.split()
+}
+"""Entries that price numpy's functions without an entry of their own, by what they compute."""
 
 
 class LibraryCall(BaseModel):
@@ -112,6 +143,12 @@ def _array_elements(value: Any) -> int:
     return size if isinstance(size, int) else 0
 
 
+def _words(value: Any) -> int:
+    """Return the elements of an array in units of 8 bytes, or of a list."""
+    size = getattr(value, "itemsize", 8)
+    return _elements(value) * (size if isinstance(size, int) else 8) // 8 or 1
+
+
 def _elements(value: Any) -> int:
     """Return the elements of an array, or of a list of lists as their product."""
     if isinstance(value, (list, tuple)) and value:
@@ -130,20 +167,39 @@ def _products(values: tuple[Any, ...]) -> float:
 
 
 def _text(values: tuple[Any, ...], result: Any) -> int:
-    return max((len(one) for one in (*values, result) if isinstance(one, (str, bytes, bytearray))), default=1)
+    return max(_lengths(values, result), default=1)
+
+
+def _lengths(values: tuple[Any, ...], result: Any) -> list[int]:
+    return [len(one) for one in (*values, result) if isinstance(one, (str, bytes, bytearray))]
+
+
+def _packed(values: tuple[Any, ...], result: Any) -> float:
+    lengths = _lengths(values, result) or [1]
+    return max(1.0, sqrt(max(lengths) * min(lengths)))
+
+
+def _fields(values: tuple[Any, ...], result: Any) -> int:
+    """Return the values of a record that is packed or unpacked."""
+    return max(len(values), len(result) if isinstance(result, tuple) else 1)
 
 
 def call_size(kind: str, arguments: tuple[Any, ...], result: Any) -> float:
     """Return the size of a call. See ``SIZES``."""
-    if kind == "products":
-        return _products(arguments)
-    if kind == "cube":
-        return float(max(map(_elements, arguments), default=1) ** 1.5)
-    if kind == "text":
-        return float(_text(arguments, result))
-    if kind == "bytes":
-        return float(max((getattr(one, "nbytes", 0) for one in (*arguments, result)), default=0) or 1)
-    return float(max(map(_elements, (*arguments, result))))
+    values = (*arguments, result)
+    if kind in ("elements", "items"):
+        return float(max(map(_elements if kind == "items" else _words, values)))
+    return float(_SIZES[kind](arguments, result))
+
+
+_SIZES: Mapping[str, Callable[[tuple[Any, ...], Any], float]] = {
+    "products": lambda arguments, result: _products(arguments),
+    "cube": lambda arguments, result: max(map(_elements, arguments), default=1) ** 1.5,
+    "text": _text,
+    "packed": _packed,
+    "fields": _fields,
+    "bytes": lambda arguments, result: max(getattr(one, "nbytes", 0) for one in (*arguments, result)) or 1,
+}
 
 
 class LibraryCalls:
@@ -197,7 +253,8 @@ class LibraryCalls:
         entry = self._calls.get(name)
         if entry is None:
             self.unpriced[name] = self.unpriced.get(name, 0) + 1
-            entry = self._calls.get(f"{library}.*")
+            like = ALIKE.get(name.removeprefix("numpy."), "") if library == "numpy" else ""
+            entry = self._calls.get(like) or self._calls.get(f"{library}.*")
             if entry is None:
                 return
         size = call_size(entry.size, arguments, result)
@@ -209,17 +266,57 @@ class LibraryCalls:
         """Return the functions that execute operators, by the name of the syntax node."""
         return {name: self._operator(name, function) for name, function in OPERATORS.items()}
 
-    def _operator(self, name: str, function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    def store(self, value: Any, target: Any, kind: str, index: Any = None) -> Any:
+        """Add the time of storing a value in an array or of an operator in place; return the value.
+
+        Args:
+            value: What is stored.
+            target: What it is stored into.
+            kind: ``Item`` for an item, else the operator's name.
+            index: The item.
+        """
+        if kind != "Item":
+            if _is_numpy(target) or _is_numpy(value):
+                self._add(_entry(_operator_entry(kind, value), target), (target, value), None)
+        elif _is_numpy(target):
+            if getattr(index, "shape", ()):
+                self._add("numpy.take", (index, value), None)
+            elif isinstance(index, slice) or (isinstance(index, tuple) and slice in map(type, index)):
+                self._add("numpy.copy", (target[index],), None)
+            else:
+                self._add("numpy.scalar", (value,), None)
+        return value
+
+    def _operator(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         key = ENTRIES.get(name, "numpy.operator")
+        if name in UNARY:
+
+            def change(one: Any) -> Any:
+                result = function(one)
+                if _is_numpy(one):
+                    self._add(_entry(key, result), (one,), result)
+                return result
+
+            return change
 
         def operate(left: Any, right: Any) -> Any:
             result = function(left, right)
             if _is_numpy(left) or _is_numpy(right):
-                arguments = (result,) if name == "Subscript" else (left, right)
-                self._add(_entry(key, result), arguments, result)
+                if name == "Subscript":
+                    index = right if getattr(right, "shape", ()) else result
+                    self._add(_entry(key, result), (index,), result)
+                else:
+                    self._add(_entry(_operator_entry(name, right), result), (left, right), result)
             return result
 
         return operate
+
+
+def _operator_entry(name: str, right: Any) -> str:
+    """Return the entry of an operator on arrays; numpy squares and takes roots without ``power``."""
+    if name == "Pow" and isinstance(right, (int, float)) and right in (2, 1, 0.5, -1):
+        return "numpy.operator"
+    return ENTRIES.get(name, "numpy.operator")
 
 
 def _entry(key: str, result: Any) -> str:

@@ -100,3 +100,69 @@ def test_the_law_between_and_beyond_its_points() -> None:
 
 def test_a_table_is_written_as_it_is_read() -> None:
     assert LibraryTable.model_validate_json(library_table().as_text()) == library_table()
+
+
+def numpy_ns(setup: str, statement: str) -> float:
+    """Return what a statement costs in calls of numpy, ns."""
+    whole, before = (
+        executed(f"import numpy as np\n{setup}\n{text}\n")[1].libraries for text in (statement, "pass")
+    )
+    assert whole is not None
+    assert before is not None
+    return (whole.steps.get("numpy", 0) - before.steps.get("numpy", 0)) / STEPS_PER_NS
+
+
+@pytest.mark.parametrize(
+    "statement",
+    ["b = 2.0 * a", "b = 1.0 - a", "b = -a", "b = ~(a > 0.5)", "a += 1.0", "a[10:] *= a[:-10]", "a[:] = 3.0"],
+)
+def test_every_form_of_an_operation_on_an_array_is_priced(statement: str) -> None:
+    small, large = (numpy_ns(f"a = np.zeros({size})", statement) for size in (20, 200_000))
+    assert small > 50.0
+    assert large > 50.0 * small
+
+
+def test_a_store_through_a_mask_is_priced_by_the_mask() -> None:
+    masked = numpy_ns("a = np.zeros(40_000)\nm = a > 1.0", "a[m] = 1.0")
+    single = numpy_ns("a = np.zeros(40_000)\nm = 7", "a[m] = 1.0")
+    assert masked > 100.0 * single > 0.0
+
+
+def test_stores_change_nothing_and_read_their_target_once_where_it_matters() -> None:
+    module, _ = executed(
+        "import numpy as np\n"
+        "calls = []\n"
+        "def which():\n    calls.append(1)\n    return 1\n"
+        "class Holder:\n    pass\n"
+        "h = Holder()\nh.x = np.zeros(4)\nh.x[1:3] += 2.0\nh.x += 1.0\n"
+        "a = np.arange(6.0).reshape(2, 3)\na[which()] = 7.0\na[which(), 2] -= 1.0\na[1:][a[1:] > 6.5] = 0.0\n"
+        "words = {'n': 1}\nwords['n'] += 1\nwords['m'] = [0]\nwords['m'][0] -= 5\nx, y = 1, 2\ny += x\n"
+    )
+    assert module.calls == [1, 1]
+    assert module.h.x.tolist() == [1.0, 3.0, 3.0, 1.0]
+    assert module.a.tolist() == [[0.0, 1.0, 2.0], [0.0, 0.0, 6.0]]
+    assert (module.words, module.y) == ({"n": 2, "m": [-5]}, 3)
+
+
+def test_sums_of_narrow_types_take_their_time_by_bytes() -> None:
+    wide, narrow = (numpy_ns(f"a = np.ones(65536, dtype='{kind}')", "b = a + a") for kind in ("f8", "u1"))
+    assert wide > 5.0 * narrow
+    assert numpy_ns("a = np.ones(65536)", "b = a ** 2") < 0.5 * numpy_ns("a = np.ones(65536)", "b = a ** a")
+
+
+def test_functions_without_points_are_priced_by_one_that_computes_alike() -> None:
+    setup = "a = np.ones(40_000)"
+    assert numpy_ns(setup, "b = np.log(a)") == numpy_ns(setup, "b = np.exp(a)")
+    assert numpy_ns(setup, "b = np.negative(a)") == numpy_ns(setup, "b = np.add(a, a)")
+
+
+def test_sizes_of_records_and_packed_text() -> None:
+    assert call_size("fields", (1, 2.0, 3), b"...") == 3.0
+    assert call_size("fields", (b"....",), (1, 2, 3, 4)) == 4.0
+    assert call_size("packed", (bytes(900),), bytes(4)) == 60.0
+    _, counter = executed(
+        "import struct\nb = struct.pack('<3d', 1.0, 2.0, 3.0)\nc = struct.unpack('<3d', b)\n"
+    )
+    assert counter.libraries is not None
+    assert 100.0 < counter.libraries.steps["struct"] / STEPS_PER_NS < 2000.0
+    assert not counter.libraries.unpriced
