@@ -110,6 +110,10 @@ class SwitchState:
     """That end: 1 right, -1 left."""
     options: dict[int, int] = field(default_factory=dict)
     """Position of the switch by channel: 1 up, 0 in the middle, -1 down."""
+    emergency_stop: bool = False
+    interlock_closed: bool = False
+    motors_stopped_at: Ns = NEVER
+    """Since when one of the two has kept the motors from turning."""
     overrides_denied: bool = False
     """Whether a switch denies the sticks of a ground station."""
     read_from: tuple[list[int], int] | None = None

@@ -411,7 +411,7 @@ class Vehicle:
 
     def run_manoeuvre(self) -> None:
         """Let the manoeuvre update the set-point; called at every tick and when the RC channels move."""
-        if not self.armed:
+        if not self.armed or self.switches.motors_stopped_at != NEVER:
             self.drive(OFF)
         elif self.flies and self.landed:
             self._run_on_ground()

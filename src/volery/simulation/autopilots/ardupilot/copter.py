@@ -8,6 +8,7 @@ from math import acos, cos, degrees, hypot, radians, sin
 from volery.base.frames import Vector
 from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, AuxiliaryFunctions
 from volery.simulation.autopilots.ardupilot.failsafes import COPTER_FAILSAFES
 from volery.simulation.autopilots.ardupilot.fence import FENCE_CHECKS, check_fence, respond_copter
 from volery.simulation.autopilots.ardupilot.firmware import (
@@ -59,8 +60,10 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import (
 )
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
 from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return
+from volery.simulation.autopilots.manoeuvres.zigzag import ZigZag
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import LinkStart
+from volery.simulation.autopilots.onboard_mission import DO_AUX_FUNCTION
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import (
     ArmingTimes,
@@ -106,7 +109,7 @@ MODES = {
             3,
             "AUTO",
             AUTO_BITS,
-            lambda vehicle: FlyMission(vehicle, copter_leg, mission.COPTER_MISSION, mission.leaves_ground),
+            lambda vehicle: FlyMission(vehicle, copter_leg, COPTER_MISSION, mission.leaves_ground),
             LEVEL_AND_HEIGHT,
             needs_position=True,
             armable=False,
@@ -141,7 +144,7 @@ MODES = {
         Mode(19, "AVOID_ADSB", AUTO_BITS, Guided, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
         Mode(20, "GUIDED_NOGPS", MANUAL_BITS, GuidedAttitude, Z_CONTROL, starts_high=True),
         Mode(21, "SMART_RTL", AUTO_BITS, ReturnAlongTrack, LEVEL_AND_HEIGHT, True, armable=False),
-        Mode(24, "ZIGZAG", AUTO_BITS, Loiter, LEVEL_AND_HEIGHT, needs_position=True, pilot=True),
+        Mode(24, "ZIGZAG", AUTO_BITS, ZigZag, LEVEL_AND_HEIGHT, needs_position=True, pilot=True),
         Mode(17, "BRAKE", AUTO_BITS, Brake, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
     )
 }
@@ -158,6 +161,7 @@ CHECKS = (
     Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
     *SHARED_CHECKS,
     *FENCE_CHECKS,
+    *STOP_CHECKS,
 )
 
 HEALTH = Health(0x5371FC2F, 0x53619C2F, 0x57719C2F, round(22.0 * S), round(22.0 * S))
@@ -188,6 +192,10 @@ def _throttle_is_high(vehicle: Vehicle) -> bool:
     return sticks.climb(throttle) > 0.0 or (vehicle.mode.manual_throttle and throttle > 0.0)
 
 
+AUXILIARY = AuxiliaryFunctions(OPTION_MODES, arming_problems, ARMING_TEXTS)
+COPTER_MISSION = mission.copter_rules({DO_AUX_FUNCTION: AUXILIARY.act})
+
+
 def finish_setup(vehicle: Vehicle) -> None:
     """Finish the set-up: on the ground, in the mode that INITIAL_MODE names."""
     vehicle.ground.landed = True
@@ -211,12 +219,13 @@ def on_step(vehicle: Vehicle) -> None:
     if not pilot_input.sticks_rest(vehicle):
         pilot_input.read_mode_switch(vehicle, "FLTMODE_CH", "FLTMODE")
         pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
-        pilot_input.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
+        AUXILIARY.read_switches(vehicle)
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_copter)
     commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))
     if not vehicle.armed:
         return
+    _disarm_stopped_motors(vehicle)
     if not vehicle.landed:
         vehicle.ground.idle_since = vehicle.kernel.now()
         vehicle.ground.flight_time += COPTER.periodic.tick
@@ -285,6 +294,14 @@ def _check_crash(vehicle: Vehicle) -> None:
         disarm(vehicle, COPTER_DISARMED, force=True)
 
 
+def _disarm_stopped_motors(vehicle: Vehicle) -> None:
+    """Disarm, also in flight, once a switch has kept the motors from turning for half of DISARM_DELAY."""
+    stopped, delay = vehicle.switches.motors_stopped_at, vehicle.parameters["DISARM_DELAY"]
+    since = max(stopped, vehicle.arming.armed_at)
+    if stopped != NEVER and delay > 0.0 and vehicle.kernel.now() - since >= from_seconds(delay / 2.0):
+        disarm(vehicle, COPTER_DISARMED, force=True)
+
+
 def _disarm_automatically(vehicle: Vehicle) -> None:
     now = vehicle.kernel.now()
     finished = vehicle.mode.name == "LAND" or (
@@ -335,12 +352,15 @@ _MAVLINK = ardupilot_mavlink(
         "WIND": telemetry.wind,
     },
     streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
-    commands=commands.copter_commands(
-        arming_problems,
-        failing_prearm_checks,
-        ARMING_TEXTS,
-        {mode.name: mode.number for mode in MODES.values()},
-    ),
+    commands={
+        **commands.copter_commands(
+            arming_problems,
+            failing_prearm_checks,
+            ARMING_TEXTS,
+            {mode.name: mode.number for mode in MODES.values()},
+        ),
+        DO_AUX_FUNCTION: AUXILIARY.on_command,
+    },
     handlers={
         "SET_ATTITUDE_TARGET": copter_attitude,
         "SET_POSITION_TARGET_GLOBAL_INT": copter_global,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from math import isinf, isnan
 
 from volery.simulation.autopilots.ardupilot.commands import HIGHEST, change_speed, turn_to
@@ -18,6 +19,7 @@ from volery.simulation.autopilots.onboard_mission import (
     CONDITION_DISTANCE,
     CONDITION_YAW,
     DELAY,
+    DO_AUX_FUNCTION,
     GLOBAL,
     GLOBAL_INT,
     GLOBAL_RELATIVE,
@@ -64,12 +66,13 @@ NAMES = {
     SET_RELAY: "SetRelay",
     SET_SERVO: "SetServo",
     GRIPPER: "Gripper",
+    DO_AUX_FUNCTION: "AuxFunction",
 }
 """Names of the items in the firmware's status texts."""
 
-KEPT_ONLY = frozenset({92, 94, 189, 195, 197, 201, 203, 205, 206, 182, 184, 207, 208, 212, 218, 222})
+KEPT_ONLY = frozenset({92, 94, 189, 195, 197, 201, 203, 205, 206, 182, 184, 207, 208, 212, 222})
 """Items that are stored and read back without effect: cameras, repeated servos and relays, fences, regions of
-interest, payload places, auxiliary functions and limits of GUIDED.
+interest, payload places and limits of GUIDED.
 """
 
 PLACED = frozenset(
@@ -220,9 +223,22 @@ def rover_ended(vehicle: Vehicle) -> Manoeuvre | None:
     return HoldPlace(vehicle) if after == DONE_LOITER else Stand(vehicle)
 
 
-COPTER_MISSION = MissionRules(
-    restarts=True, item_begins=item_begins, item_done=item_done, act=act, ended=copter_ended
-)
-ROVER_MISSION = MissionRules(
-    restarts=True, item_begins=item_begins, item_done=item_done, act=act, ended=rover_ended
-)
+Actions = Mapping[int, Callable[[Vehicle, MissionItem], None]]
+"""Command to what executes its item."""
+
+
+def _rules(ended: Callable[[Vehicle], Manoeuvre | None], actions: Actions) -> MissionRules:
+    def execute(vehicle: Vehicle, item: MissionItem) -> None:
+        actions.get(item.command, act)(vehicle, item)
+
+    return MissionRules(restarts=True, item_begins=item_begins, item_done=item_done, act=execute, ended=ended)
+
+
+def copter_rules(actions: Actions) -> MissionRules:
+    """Return the rules of a copter's missions, with actions beside the shared ones."""
+    return _rules(copter_ended, actions)
+
+
+def rover_rules(actions: Actions) -> MissionRules:
+    """Return the rules of a rover's missions, with actions beside the shared ones."""
+    return _rules(rover_ended, actions)

@@ -35,7 +35,7 @@ _SHARED = {
     **_STICKS,
     "ARMING_CHECK": "0 skips all checks; any other value runs all of them",
     **{
-        f"RC{channel}_OPTION": "switch: a mode, fence, gripper, relay, overrides, arming; others: nothing"
+        f"RC{channel}_OPTION": "switch: modes, arming, stop, interlock, fence, gripper, relays, mission"
         for channel in range(5, 17)
     },
     "ARMING_RUDDER": "0: the yaw stick does not arm; 1 arms, 2 disarms, too",

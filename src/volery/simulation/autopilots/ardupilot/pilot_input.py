@@ -7,16 +7,13 @@ three for a rover.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Callable
 from math import cos, dist, radians, sin
 from typing import Any
 
 from volery.base.time import MS, Ns, from_seconds
 from volery.simulation.autopilots.ardupilot.failsafes import radio_lost
-from volery.simulation.autopilots.ardupilot.fence import enable_fence
 from volery.simulation.autopilots.ardupilot.modes import arm, change_mode, disarm
-from volery.simulation.autopilots.ardupilot.payload import GRAB, LET_GO, move_gripper, set_relay
 from volery.simulation.autopilots.manual_control import ChannelRange
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -53,7 +50,7 @@ def on_override(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
                 vehicle.rc.override(channel, pulse, now)
         elif pulse not in (0, IGNORE):
             vehicle.rc.override(channel, 0 if pulse == RELEASE else pulse, now)
-    _sticks_moved(vehicle)
+    sticks_moved(vehicle)
 
 
 def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
@@ -79,7 +76,7 @@ def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> 
     _give(
         vehicle, sticks.throttle, throttle, _share(fields["z"]) if middle else _share(2 * fields["z"] - 1000)
     )
-    _sticks_moved(vehicle)
+    sticks_moved(vehicle)
 
 
 def _share(axis: int) -> float | None:
@@ -94,7 +91,7 @@ def _give(vehicle: Vehicle, channel: int, travel: ChannelRange, share: float | N
     vehicle.rc.override(channel, pulse, vehicle.kernel.now())
 
 
-def _sticks_moved(vehicle: Vehicle) -> None:
+def sticks_moved(vehicle: Vehicle) -> None:
     """Let a mode that the pilot flies act at once; other modes act at the next tick."""
     if vehicle.armed and vehicle.mode.pilot:
         vehicle.run_manoeuvre()
@@ -134,7 +131,7 @@ def expire_overrides(vehicle: Vehicle) -> None:
     """Release overrides that are older than RC_OVERRIDE_TIME; a negative time keeps them."""
     seconds = vehicle.parameters["RC_OVERRIDE_TIME"]
     if seconds > 0.0 and vehicle.rc.expire(vehicle.kernel.now(), from_seconds(seconds)):
-        _sticks_moved(vehicle)
+        sticks_moved(vehicle)
 
 
 def simulate_rc_failure(vehicle: Vehicle) -> None:
@@ -154,12 +151,10 @@ POSITIONS = (1230, 1360, 1490, 1620, 1749)
 LOWEST, HIGHEST = 900, 2200
 """Pulse widths outside are no position."""
 SETTLED: Ns = 200 * MS
-UP, DOWN = 1800, 1200
 FULL_RUDDER = 0.89
 TRACK_SPACING, TRACK_POINTS = 2.0, 300
 """SRTL_ACCURACY [m] and SRTL_POINTS."""
 
-ARM_OPTION = 153
 NEVER_AGAIN: Ns = 1 << 62
 
 
@@ -244,74 +239,6 @@ def read_rudder(
         arm(vehicle, problems, words[0], force=False)
     elif side < 0 and permitted == 2 and vehicle.armed and (vehicle.landed or not vehicle.flies):
         disarm(vehicle, words[1], force=False)
-
-
-def _switch_fence(vehicle: Vehicle, position: int) -> None:
-    enable_fence(vehicle, on=position > 0)
-
-
-def _switch_gripper(vehicle: Vehicle, position: int) -> None:
-    if position:
-        move_gripper(vehicle, GRAB if position > 0 else LET_GO)
-
-
-def _switch_relay(vehicle: Vehicle, position: int, number: int) -> None:
-    set_relay(vehicle, number, int(position > 0))
-
-
-def _switch_overrides(vehicle: Vehicle, position: int) -> None:
-    """Admit or deny the sticks of a ground station; denied ones go back to the transmitter at once."""
-    if position:
-        vehicle.switches.overrides_denied = position < 0
-    if position < 0:
-        vehicle.rc.release()
-        _sticks_moved(vehicle)
-
-
-RELAY_OPTIONS = (28, 34, 35, 36, 66, 67)
-SWITCHES: Mapping[int, Callable[[Vehicle, int], None]] = {
-    11: _switch_fence,
-    19: _switch_gripper,
-    46: _switch_overrides,
-    **{option: partial(_switch_relay, number=number) for number, option in enumerate(RELAY_OPTIONS)},
-}
-"""RCn_OPTION to what its switch does at a position: 1 up, 0 in the middle, -1 down."""
-
-
-def read_options(
-    vehicle: Vehicle,
-    modes: Mapping[int, int],
-    problems: Callable[[Vehicle], list[str]],
-    words: tuple[str, str],
-) -> None:
-    """Act on channels whose RCn_OPTION is a mode, arming or one of ``SWITCHES``, when their switch moves.
-
-    Args:
-        vehicle: The vehicle.
-        modes: RCn_OPTION to the number of a mode.
-        problems: Returns the texts that forbid arming.
-        words: Status texts of arming and disarming.
-    """
-    for channel in range(5, len(vehicle.rc.transmitter) + 1):
-        option, pulse = round(vehicle.parameters[f"RC{channel}_OPTION"]), vehicle.rc[channel]
-        if not LOWEST < pulse < HIGHEST:
-            continue
-        position = (pulse > UP) - (pulse < DOWN)
-        before = vehicle.switches.options.get(channel)
-        vehicle.switches.options[channel] = position
-        if before is None or before == position:
-            continue
-        up, down = position > 0, position < 0
-        if option in SWITCHES:
-            SWITCHES[option](vehicle, position)
-        elif option == ARM_OPTION and up:
-            arm(vehicle, problems, words[0], force=False)
-        elif option == ARM_OPTION and down:
-            disarm(vehicle, words[1], force=False)
-        elif option in modes and up:
-            change_mode(vehicle, modes[option])
-        elif option in modes and vehicle.mode.number == modes[option]:
-            vehicle.switches.mode = -1  # the mode switch counts again
 
 
 def keep_track(vehicle: Vehicle) -> None:

@@ -6,6 +6,7 @@ from functools import cache, partial
 
 from volery.base.time import MS, S
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, AuxiliaryFunctions
 from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES
 from volery.simulation.autopilots.ardupilot.fence import FENCE_CHECKS, check_fence, respond_rover
 from volery.simulation.autopilots.ardupilot.firmware import (
@@ -64,6 +65,7 @@ from volery.simulation.autopilots.manoeuvres.rover_driving import (
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import LinkStart
 from volery.simulation.autopilots.mavlink.messages import Fields
+from volery.simulation.autopilots.onboard_mission import DO_AUX_FUNCTION
 from volery.simulation.autopilots.vehicle_state import (
     Mode,
     ParameterTable,
@@ -123,7 +125,7 @@ MODES = {
             10,
             "AUTO",
             AUTO_BITS,
-            lambda vehicle: FlyMission(vehicle, rover_leg, mission.ROVER_MISSION),
+            lambda vehicle: FlyMission(vehicle, rover_leg, ROVER_MISSION),
             STEERED,
             needs_position=True,
         ),
@@ -158,6 +160,7 @@ CHECKS = (
     Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
     *SHARED_CHECKS,
     *FENCE_CHECKS,
+    *STOP_CHECKS,
 )
 
 HEALTH = Health(0x1330DC2F, 0x1320802F, 0x1330812F, round(22.4 * S), round(42.0 * S))
@@ -186,6 +189,10 @@ def arming_problems(vehicle: Vehicle) -> list[str]:
     return failing_prearm_checks(vehicle) + mode_not_armable(vehicle)
 
 
+AUXILIARY = AuxiliaryFunctions(OPTION_MODES, arming_problems, ARMING_TEXTS)
+ROVER_MISSION = mission.rover_rules({DO_AUX_FUNCTION: AUXILIARY.act})
+
+
 def finish_setup(vehicle: Vehicle) -> None:
     """Finish the set-up: enter the mode that INITIAL_MODE names."""
     vehicle.enter_mode(MODES.get(round(vehicle.parameters["INITIAL_MODE"]), MODES[0]))
@@ -206,7 +213,7 @@ def on_step(vehicle: Vehicle) -> None:
     if not pilot_input.sticks_rest(vehicle):
         pilot_input.read_mode_switch(vehicle, "MODE_CH", "MODE")
         pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
-        pilot_input.read_options(vehicle, OPTION_MODES, arming_problems, ARMING_TEXTS)
+        AUXILIARY.read_switches(vehicle)
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_rover)
     if vehicle.armed:
@@ -261,12 +268,15 @@ _MAVLINK = ardupilot_mavlink(
     streams=streams(("RC_CHANNELS_SCALED",), ()),
     on_stream_request=on_stream_request,
     least_period=25 * MS,
-    commands=commands.rover_commands(
-        arming_problems,
-        failing_prearm_checks,
-        ARMING_TEXTS,
-        {mode.name: mode.number for mode in MODES.values()},
-    ),
+    commands={
+        **commands.rover_commands(
+            arming_problems,
+            failing_prearm_checks,
+            ARMING_TEXTS,
+            {mode.name: mode.number for mode in MODES.values()},
+        ),
+        DO_AUX_FUNCTION: AUXILIARY.on_command,
+    },
     handlers={
         "SET_ATTITUDE_TARGET": rover_attitude,
         "SET_POSITION_TARGET_GLOBAL_INT": rover_global,

@@ -189,12 +189,12 @@ class Loiter(ClimbByThrottle):
         self._velocity = (north * kept, east * kept)
 
     def _let_go(self, now: Ns, passed: float) -> None:
-        """Coast at first, then brake to a stop."""
+        """Coast against the drag at first, then brake to a stop."""
         tuning = self.vehicle.tuning
         north, east = self._velocity
         speed = hypot(north, east)
         braking = now - self._centred_at > tuning.loiter_brake_delay
-        slow = tuning.loiter_brake if braking else tuning.loiter_accel / tuning.loiter_speed * speed
+        slow = tuning.loiter_accel / tuning.loiter_speed * speed + (tuning.loiter_brake if braking else 0.0)
         left = max(0.0, speed - slow * passed)
         self._velocity = (north * left / speed, east * left / speed) if speed > 0.0 else (0.0, 0.0)
         if left == 0.0 and self._held is None:
