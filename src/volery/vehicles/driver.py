@@ -95,6 +95,7 @@ class Capability(Enum):
     MANUAL_CONTROL = "be flown by manual control"
     STABILIZE = "fly stabilized"
     ALTITUDE_HOLD = "hold its altitude"
+    CLIMB_BY_THROTTLE = "climb and sink by the throttle while it holds its altitude"
     MISSION = "fly an uploaded mission"
     TERRAIN = "keep an altitude above ground"
 

@@ -357,8 +357,9 @@ class Drone(Vehicle):
     def altitude_hold(self) -> None:
         """Enter the mode in which manual control commands attitude and climb rate; on the ground also arm.
 
-        A throttle of 0.5 keeps the altitude. It needs no position and returns when the mode is seen. Raises
-        ``Refused`` unless ``manual_control`` was called within the last second.
+        A throttle of 0.5 keeps the altitude; a Paparazzi keeps it whatever the throttle says. It needs no
+        position and returns when the mode is seen. Raises ``Refused`` unless ``manual_control`` was called
+        within the last second.
         """
         self._connect(Capability.ALTITUDE_HOLD)
         self._enter_manual_mode("altitude_hold", "hold the altitude", self._driver.altitude_hold)

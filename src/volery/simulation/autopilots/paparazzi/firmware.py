@@ -16,10 +16,10 @@ from volery.base.frames import Vector
 from volery.base.time import MS, Ns, S
 from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.simulation.autopilots.autopilot import BootEvent, BootSequence, Firmware, PeriodicWork
-from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold
 from volery.simulation.autopilots.paparazzi import parameters
 from volery.simulation.autopilots.paparazzi.endpoint import PaparazziEndpoint
 from volery.simulation.autopilots.paparazzi.flight_modes import (
+    ClimbByStick,
     Direct,
     FailsafeDescent,
     FlyHome,
@@ -173,7 +173,7 @@ MODES = {
         Mode(1, "FAILSAFE", 0, FailsafeDescent),
         Mode(2, "HOME", 0, FlyHome, needs_position=True),
         Mode(4, "ATTITUDE_DIRECT", 0, Direct, pilot=True, manual_throttle=True),
-        Mode(6, "ATTITUDE_RC_CLIMB", 0, AltitudeHold, pilot=True),
+        Mode(6, "ATTITUDE_RC_CLIMB", 0, ClimbByStick, pilot=True),
         Mode(9, "ATTITUDE_Z_HOLD", 0, HoldHeight, pilot=True),
         Mode(12, "HOVER_Z_HOLD", 0, HoldPlace, pilot=True, needs_position=True),
         Mode(13, "NAV", 0, FlyPlan, needs_position=True),

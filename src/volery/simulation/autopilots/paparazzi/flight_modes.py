@@ -190,6 +190,28 @@ class Direct(Stabilize):
         return throttle
 
 
+class ClimbByStick(AltitudeHold):
+    """ATTITUDE_RC_CLIMB: sticks command lean angles and yaw rate.
+
+    Version 6.2 updates the vertical reference in NAV only: here it keeps the vertical speed at which the mode
+    began, whatever the throttle says, unless RC_CLIMB_BY_THROTTLE is set.
+    """
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._kept = 0.0
+
+    def enter(self) -> None:
+        """Take the present vertical speed."""
+        self._kept = 0.0 if self.vehicle.landed else -self.vehicle.estimate.velocity[2]
+
+    def climb(self, throttle: float) -> float:
+        """Return the climb rate [m/s]."""
+        if self.vehicle.parameters["RC_CLIMB_BY_THROTTLE"]:
+            return super().climb(throttle)
+        return self._kept
+
+
 class HoldHeight(AltitudeHold):
     """ATTITUDE_Z_HOLD: sticks command lean angles and yaw rate; the height is held."""
 

@@ -46,6 +46,9 @@ FIGURES: Mapping[str, Figure] = {
         1.2 * FARTHEST_M, "m from HOME beyond which it becomes FAILSAFE instead"
     ),
     "FAILSAFE_DESCENT_SPEED": Figure(0.0, "m/s down in FAILSAFE: v6.2 keeps its height; 1.5 is intended"),
+    "RC_CLIMB_BY_THROTTLE": Figure(
+        0.0, "1: the throttle climbs in ATTITUDE_RC_CLIMB as intended; v6.2 does not follow it"
+    ),
     "FAILSAFE_ON_BAT_CRITICAL": Figure(0.0, "1: a critical battery is FAILSAFE, and keeps motors off"),
     "CRITIC_BAT_LEVEL": Figure(0.0, "V that are critical; 3.1 V a cell of its battery"),
     "GEOFENCE_DATALINK_LOST_TIME": Figure(0.0, "s of silence after which NAV becomes HOME; 0: never"),

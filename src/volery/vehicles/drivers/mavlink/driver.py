@@ -55,6 +55,7 @@ DRONE_CAPABILITIES = ROVER_CAPABILITIES | {
     Capability.LAND,
     Capability.STABILIZE,
     Capability.ALTITUDE_HOLD,
+    Capability.CLIMB_BY_THROTTLE,
 }
 _CAPABILITIES = {DRONE_KIND: DRONE_CAPABILITIES, ROVER_KIND: ROVER_CAPABILITIES}
 _NONE: frozenset[Capability] = frozenset()

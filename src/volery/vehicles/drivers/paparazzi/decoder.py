@@ -89,7 +89,7 @@ ASSUMED: Mapping[str, str] = {
     "version 6.2 keeps its height",
     "GUIDED on the ground": "lifts off as soon as the motors run",
     "height above home": "is the height above the origin: block 'Geo init' sets it where the aircraft stands",
-    "ATTITUDE_RC_CLIMB": "keeps the height with the throttle in the middle, climbs and sinks by it else; "
+    "ATTITUDE_RC_CLIMB": "keeps the height at which it began; version 6.2 does not follow the throttle; "
     "ATTITUDE_Z_HOLD keeps the height at which it began whatever the throttle says",
 }
 """What the driver assumes. All but ATTITUDE_RC_CLIMB was seen of version 6.2 in its own simulator."""

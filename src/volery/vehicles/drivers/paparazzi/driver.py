@@ -53,7 +53,9 @@ CAPABILITIES = frozenset(
         Capability.ALTITUDE_HOLD,
     }
 )
-"""No speed: GUIDED flies at the aircraft's own. No missions: a flight plan is built into the aircraft."""
+"""No speed: GUIDED flies at the aircraft's own. No missions: a flight plan is built into the aircraft. No
+climb by throttle: version 6.2 does not follow it in ATTITUDE_RC_CLIMB.
+"""
 _NONE: frozenset[Capability] = frozenset()
 
 

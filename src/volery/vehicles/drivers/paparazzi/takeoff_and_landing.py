@@ -16,12 +16,13 @@ from volery.base.time import MS, Ns, S, to_seconds
 from volery.vehicles.driver import ManualControl, Repeat, Step
 from volery.vehicles.drivers.paparazzi.backend import COME_DOWN, VELOCITY_Z, Setpoint
 from volery.vehicles.drivers.paparazzi.decoder import (
+    ATTITUDE_MODE,
     FAILSAFE,
     GUIDED,
-    HEIGHT_MODE,
     HOME,
     KILL,
     LAND_BLOCK,
+    MAX_PPRZ,
     NAV,
     START_BLOCK,
     TAKEOFF_BLOCK,
@@ -52,7 +53,6 @@ OVERSHOT_M, CREEPING_M_S = 1.0, 0.1
 SUNK_M = 0.5
 NOT_SINKING_FOR: Ns = 10 * S
 """Time in which FAILSAFE must lower the height by ``SUNK_M``; it should descend at 1.5 m/s."""
-SINKING_THROTTLE = 0.25
 RESCUE = "land() again once it has a fix, or fly it by hand"
 WATCH_PERIOD: Ns = 250 * MS
 STANDING_M_S = 0.1
@@ -238,11 +238,11 @@ class TakeoffAndLanding:
         return (check, stop, release, *map(_unless_disarmed, landing))
 
     def _land_without_fix(self, within: Ns) -> Sequence[Step]:
-        """Return steps that land in FAILSAFE or, where that keeps the height, by sticks over the datalink.
+        """Return steps that land in FAILSAFE or, where that keeps the height, by thrust over the datalink.
 
         Once there is a fix again, the plan lands it.
         """
-        steps = self._steps
+        steps, descent = self._steps, _DescentByThrust(self._steps)
         by_hand = steps.setpoints.held is not None and steps.decoder.transmitter
 
         def fail_safely() -> None:
@@ -251,7 +251,7 @@ class TakeoffAndLanding:
 
         def take_sticks() -> None:
             steps.decoder.note_commanded(self._telemetry.mode)
-            steps.setpoints.hold(ManualControl())
+            descent.begin()
 
         def until_fixed(step: Step) -> Step:
             """Skip or end the step once it is down, or has a fix."""
@@ -274,10 +274,9 @@ class TakeoffAndLanding:
         take = until_fixed(steps.wait_for_sticks())
         take = replace(take, send=take_sticks, advice=refused)
         sink = replace(
-            until_fixed(disarmed_step("land", HEIGHT_MODE, within, (FAILSAFE, KILL))),
-            send=lambda: steps.setpoints.hold(ManualControl(throttle=SINKING_THROTTLE)),
-            keep=self._stop_when_down(),
-            fails=self._sinking(HEIGHT_MODE),
+            until_fixed(disarmed_step("land", ATTITUDE_MODE, within, (FAILSAFE, KILL))),
+            keep=Repeat(WATCH_PERIOD, descent.control),
+            fails=self._sinking(ATTITUDE_MODE),
         )
         let_go = replace(
             until_fixed(steps.wait_for_sticks()),
@@ -287,7 +286,8 @@ class TakeoffAndLanding:
         )
         # with sticks neither a setting nor their switch ends FAILSAFE: by way of GUIDED, once they count
         leave = () if by_hand else (take, let_go, until_fixed(steps.change_mode(GUIDED)), take)
-        by_sticks = (*leave, until_fixed(steps.change_mode(HEIGHT_MODE)), sink)
+        level_out = immediate_step("hold the thrust", descent.begin)
+        by_sticks = (*leave, level_out, until_fixed(steps.change_mode(ATTITUDE_MODE)), sink)
         by_plan = (replace(step, skippable=True) for step in self.land_by_plan(within))
         before = () if by_hand else level
         return (steps.check_settings(), *before, *by_sticks, *by_plan, steps.release())
@@ -398,6 +398,45 @@ class _TouchDown:
         carried = decoder.thrust <= CARRIED * self._sinking_thrust
         if carried and now - self._standing_since >= STANDING_FOR:
             self._steps.backend.set_motors(False)
+
+
+class _DescentByThrust:
+    """Lowers an aircraft in ATTITUDE_DIRECT: a PI controller from the vertical speed to the thrust.
+
+    It needs no position. The gains give a bandwidth of 1 rad/s (an excess of thrust of 1 % accelerates by
+    0.1 m/s^2), slow enough for telemetry of four samples a second.
+    """
+
+    GAIN, INTEGRAL_GAIN = 0.1, 0.03
+    """Thrust per error of speed [1/(m/s)] and per its integral [1/m], as shares of the weight."""
+    LEAST, MOST = 0.6, 1.2
+    """Limits of the thrust as shares of the weight."""
+    USUAL = 0.5
+    """Thrust that carries an aircraft which has reported none."""
+
+    def __init__(self, steps: PaparazziSteps) -> None:
+        self._steps = steps
+        self._touch_down = _TouchDown(steps)
+        self._weight = self.USUAL
+        self._integral = 0.0
+
+    def begin(self) -> None:
+        """Hold the thrust that was reported last, which carries the aircraft."""
+        self._weight = self._steps.decoder.thrust / MAX_PPRZ or self.USUAL
+        self._command(1.0)
+
+    def control(self) -> None:
+        """Update the thrust from the last vertical speed; at the touch-down stop the motors."""
+        self._touch_down.watch()
+        up = self._steps.telemetry.velocity.up
+        error = 0.0 if isnan(up) else -SINKING_M_S - up
+        self._integral += error * to_seconds(WATCH_PERIOD)
+        share = 1.0 + self.GAIN * error + self.INTEGRAL_GAIN * self._integral
+        self._command(min(self.MOST, max(self.LEAST, share)))
+
+    def _command(self, share: float) -> None:
+        throttle = min(1.0, share * self._weight)
+        self._steps.setpoints.hold(ManualControl(throttle=throttle))
 
 
 def _is_still(seen: Telemetry) -> bool:

@@ -76,7 +76,17 @@ def test_yaw_is_a_turn_rate_clockwise(craft: Any) -> None:
     assert craft.autopilot.vehicle.estimate.rates[2] == pytest.approx(radians(45.0), abs=0.08)
 
 
-def test_climb_sticks_take_off_climb_and_hold(craft: Any) -> None:
+@pytest.mark.parametrize("throttle", [0, 64, 127])
+def test_in_rc_climb_the_throttle_has_no_effect(throttle: int, craft: Any) -> None:
+    craft.in_the_air()
+    craft.set("auto2", 6)
+    hold(craft, 4.0, mode=AUTO2, throttle=throttle)
+    assert craft.mode == "ATTITUDE_RC_CLIMB"
+    assert craft.up == pytest.approx(5.0, abs=0.5)
+
+
+def test_climb_sticks_as_intended_take_off_climb_and_hold(make: Make) -> None:
+    craft = make(parameters={"RC_CLIMB_BY_THROTTLE": 1})
     craft.set("auto2", 6)
     hold(craft, 0.3, mode=AUTO2, throttle=64)
     craft.set("kill_throttle", 0.0)
@@ -135,7 +145,7 @@ def test_nav_is_not_entered_without_satellites(craft: Any) -> None:
 
 
 def test_sticks_fly_without_satellites(make: Make) -> None:
-    craft = make(warm=False, parameters={"FAILSAFE_DESCENT_SPEED": 1.5})
+    craft = make(warm=False, parameters={"FAILSAFE_DESCENT_SPEED": 1.5, "RC_CLIMB_BY_THROTTLE": 1})
     craft.flight.block_gps()
     craft.run(15.0)
     craft.set("auto2", 6)

@@ -30,7 +30,7 @@ NAMES = {number: name for name, number in NUMBERS.items()}
 FIRST_STEADY_BLOCK, START, TAKEOFF, STANDBY, LAND_HERE, FLARE, LANDED = 2, 3, 4, 5, 13, 15, 16
 OTHER_SETTING = 1.0
 FARTHEST_M = 150.0
-HOVER_THRUST = 6040.0
+HOVER_THRUST, FULL_THRUST = 6040.0, 9600.0
 THRUST_LOST = 50.0
 """Thrust that it loses in 0.1 s on the ground while it is to sink: it sees after 12 s that it has landed."""
 
@@ -282,8 +282,11 @@ class FakePaparazzi:
                 self._sink(LANDED)
         elif craft.mode == "FAILSAFE" and craft.armed:
             self._sink(craft.block)
-        elif craft.mode == "ATTITUDE_RC_CLIMB" and craft.flying and self.climbs_by_stick:
-            rate = 4.0 * (self.throttle - 0.5) if craft.up > 0.0 or self.throttle > 0.6 else 0.0
+        elif craft.mode == "ATTITUDE_DIRECT" and craft.flying and self.climbs_by_stick:
+            craft.thrust = self.throttle * FULL_THRUST
+            push = 9.81 * (craft.thrust / HOVER_THRUST - 1.0)
+            rate = craft.velocity[2] + push / 10
+            rate = rate if craft.up > 0.0 else max(0.0, rate)
             craft.velocity = (0.0, 0.0, rate)
             craft.up = max(0.0, craft.up + rate / 10)
 

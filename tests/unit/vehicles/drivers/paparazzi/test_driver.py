@@ -614,7 +614,7 @@ def test_neither_failsafe_nor_sticks_bring_it_down(bench: Make) -> None:
         drone.land()
 
     at.autopilot.climbs_by_stick = False
-    with pytest.raises(NotArrived, match=r"in ATTITUDE_RC_CLIMB it does not sink: 10\.\d m above home"):
+    with pytest.raises(NotArrived, match=r"in ATTITUDE_DIRECT it does not sink: 10\.\d m above home"):
         at.fly(mission)
 
 
