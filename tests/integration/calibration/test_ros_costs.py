@@ -28,9 +28,21 @@ from volery.run.assembly.model_checks import vocabulary
 pytestmark = pytest.mark.integration
 
 VOLERY = str(Path(sys.executable).with_name("volery"))
-PACE = Pace(block_ms=100.0, period_ms=10.0, sleeps_ms=(5.0, 20.0), counts=(1, 2))
+PACE = Pace(block_ms=100.0, periods_ms=(10.0, 40.0), sleeps_ms=(5.0, 20.0), counts=(1, 2))
 MACHINE = Machine("here", "this machine", 2, 2000.0)
-SAID = {"publish_often", "publish_next_often", "sleep", "wait", "receive", "connect", "accept", "init", "node_handle"}
+SAID = {
+    "publish",
+    "publish_next",
+    "publish_often",
+    "publish_next_often",
+    "sleep",
+    "wait",
+    "receive",
+    "connect",
+    "accept",
+    "init",
+    "node_handle",
+}
 SAID |= {"advertise", "subscribe", "service_client", "advertise_service", "call_service", "serve"}
 
 NODE = """

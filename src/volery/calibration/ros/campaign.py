@@ -22,10 +22,6 @@ from volery.calibration.ros.call_costs import CallCost, CostLine, Round, Sample,
 from volery.calibration.ros.probe_environment import Pace, ProbeSetup
 from volery.cost import CallFigures, Line, RosLaw, line_through, read_catalogue
 
-PERIODS_MS = (20.0, 50.0)
-"""Periods of measured cycles, ms, in turn by round: caches are colder after a longer sleep. A law has the
-publications of both."""
-
 LEAST_ROUNDS = 3
 """Least number of rounds that shows their spread."""
 
@@ -58,8 +54,8 @@ class Plan:
         sleeps = list(self.pace.sleeps_ms)
         random.shuffle(chosen)
         random.shuffle(sleeps)
-        period = PERIODS_MS[number % len(PERIODS_MS)]
-        return replace(self.pace, period_ms=period, counts=tuple(chosen), sleeps_ms=tuple(sleeps))
+        periods = self.pace.periods_ms[:: -1 if number % 2 else 1]
+        return replace(self.pace, periods_ms=periods, counts=tuple(chosen), sleeps_ms=tuple(sleeps))
 
 
 @dataclass(frozen=True)

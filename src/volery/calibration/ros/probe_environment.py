@@ -32,17 +32,17 @@ _DOMAIN = "77"
 
 @dataclass(frozen=True)
 class Pace:
-    """Durations of a probe, ms, and the sleeps and numbers of subscribers in the order of measurement."""
+    """Durations of a probe, ms; periods, sleeps and numbers of subscribers in the order of measurement."""
 
     block_ms: float = 600.0
-    period_ms: float = 50.0
+    periods_ms: tuple[float, ...] = (20.0, 50.0)
     sleeps_ms: tuple[float, ...] = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
     counts: tuple[int, ...] = (1, 2, 4, 8)
 
     def arguments(self) -> list[str]:
         """Return the arguments of a probe."""
-        listed = [",".join(f"{one:g}" for one in several) for several in (self.sleeps_ms, self.counts)]
-        return [f"{self.block_ms:g}", f"{self.period_ms:g}", *listed]
+        several = (self.periods_ms, self.sleeps_ms, self.counts)
+        return [f"{self.block_ms:g}", *(",".join(f"{one:g}" for one in these) for these in several)]
 
 
 @dataclass(frozen=True)

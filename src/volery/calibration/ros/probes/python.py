@@ -250,9 +250,9 @@ def _together(calls: list[Callable[[], Any]]) -> Callable[[], Any]:
 class Probe:
     """One pass through everything that is measured."""
 
-    def __init__(self, client: Client, block_s: float, period_s: float) -> None:
+    def __init__(self, client: Client, block_s: float, periods_s: list[float]) -> None:
         self._client = client
-        self._block_s, self._period_s = block_s, period_s
+        self._block_s, self._periods_s = block_s, periods_s
         self._kept: list[object] = []
 
     def _block(self, what: str, x: float, period_s: float, call: Callable[[], Any]) -> None:
@@ -315,8 +315,9 @@ class Probe:
                 lambda count=count, made=made: made[0].peers() >= count,  # type: ignore[misc]
                 count,
             )
-            self._block("idle", 0, self._period_s, nothing)
-            self._block("publish", count, self._period_s, made[0].publish)
+            for period_s in self._periods_s:
+                self._block("idle", 0, period_s, nothing)
+                self._block("publish", count, period_s, made[0].publish)
             made[0].close()
             time.sleep(SETTLE_S)
 
@@ -332,10 +333,11 @@ class Probe:
             _until(_connected(first, others, count))
             time.sleep(SETTLE_S)
             both = [first.publish, *(other.publish for other in others)]
-            self._block("publish_alone", 0, self._period_s, first.publish)
-            self._block("publish_both", count, self._period_s, _together(both))
+            for period_s in self._periods_s:
+                self._block("publish_alone", 0, period_s, first.publish)
+                self._block("publish_both", count, period_s, _together(both))
             if spin is not None and count == counts[0]:
-                self._block("spin_once", 0, self._period_s, _together([*both, spin]))
+                self._block("spin_once", 0, self._periods_s[0], _together([*both, spin]))
             for other in others:
                 other.close()
             time.sleep(SETTLE_S)
@@ -345,8 +347,8 @@ class Probe:
         """Measure cycles that call a service and idle cycles."""
         call = self._client.caller()
         call()
-        self._block("idle_before_call", 0, self._period_s, nothing)
-        self._block("call_service", 0, self._period_s, call)
+        self._block("idle_before_call", 0, self._periods_s[0], nothing)
+        self._block("call_service", 0, self._periods_s[0], call)
 
     def serving(self) -> None:
         """Measure waiting with requests; waiting without is measured before each reception."""
@@ -382,9 +384,9 @@ def _numbers(text: str) -> list[float]:
     return [float(one) for one in text.split(",")]
 
 
-def main(library: str, block_ms: str, period_ms: str, sleeps: str, counts: str) -> None:
+def main(library: str, block_ms: str, periods: str, sleeps: str, counts: str) -> None:
     """Make all measurements in the order of ``roscpp.cpp``."""
-    probe = Probe(CLIENTS[library](), float(block_ms) / 1000.0, float(period_ms) / 1000.0)
+    probe = Probe(CLIENTS[library](), float(block_ms) / 1000.0, [ms / 1000.0 for ms in _numbers(periods)])
     probe.joining()
     probe.registrations()
     probe.sleeping(_numbers(sleeps))

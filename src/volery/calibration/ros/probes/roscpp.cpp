@@ -1,7 +1,7 @@
 // Probe of roscpp: CPU time of calls into the client library. Prints one JSON object a line:
 //   {"what": .., "x": .., "cycles": .., "waited_ns": .., "process_ns": .., "caller_ns": ..}
 // process_ns: CPU time of the whole process; caller_ns: of the calling thread; waited_ns: time on the wall.
-// Usage: roscpp BLOCK_MS PERIOD_MS SLEEP_MS,SLEEP_MS,.. SUBSCRIBERS,SUBSCRIBERS,..
+// Usage: roscpp BLOCK_MS PERIOD_MS,PERIOD_MS,.. SLEEP_MS,SLEEP_MS,.. SUBSCRIBERS,SUBSCRIBERS,..
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -122,22 +122,25 @@ void registrations(ros::NodeHandle& node) {
   measured.report("spin_once_first", 0, 1);
 }
 
-void publishing(ros::NodeHandle& node, double period_ms, double block_ms, const std::vector<double>& counts) {
+void publishing(ros::NodeHandle& node, const std::vector<double>& periods_ms, double block_ms,
+                const std::vector<double>& counts) {
   Message message;
   message.data.resize(4);
   for (double count : counts) {
     ros::Publisher publisher;
     once("accept", [&] { publisher = node.advertise<Message>("calibration/to_" + std::to_string(int(count)), 10); },
          [&] { return publisher.getNumSubscribers() >= count; }, count);
-    block("idle", 0, period_ms, block_ms, [] {});
-    block("publish", count, period_ms, block_ms, [&] { publisher.publish(message); });
+    for (double period_ms : periods_ms) {
+      block("idle", 0, period_ms, block_ms, [] {});
+      block("publish", count, period_ms, block_ms, [&] { publisher.publish(message); });
+    }
     publisher.shutdown();
     pause(kSettleMs);
   }
 }
 
 // Measures cycles that publish once, on several topics, and then spin: later calls find warm threads.
-void spinning(ros::NodeHandle& node, double period_ms, double block_ms) {
+void spinning(ros::NodeHandle& node, const std::vector<double>& periods_ms, double block_ms) {
   Message message;
   message.data.resize(4);
   ros::Publisher first = node.advertise<Message>("calibration/to_1", 10);
@@ -156,10 +159,12 @@ void spinning(ros::NodeHandle& node, double period_ms, double block_ms) {
       first.publish(message);
       for (ros::Publisher& other : others) other.publish(message);
     };
-    block("publish_alone", 0, period_ms, block_ms, [&] { first.publish(message); });
-    block("publish_both", count, period_ms, block_ms, both);
+    for (double period_ms : periods_ms) {
+      block("publish_alone", 0, period_ms, block_ms, [&] { first.publish(message); });
+      block("publish_both", count, period_ms, block_ms, both);
+    }
     if (count == kFew) {
-      block("spin_once", 0, period_ms, block_ms, [&] {
+      block("spin_once", 0, periods_ms[0], block_ms, [&] {
         both();
         ros::spinOnce();
       });
@@ -223,7 +228,8 @@ void serving(ros::NodeHandle& node, double block_ms) {
 
 int main(int argc, char** argv) {
   if (argc < 5) return 2;
-  const double block_ms = std::atof(argv[1]), period_ms = std::atof(argv[2]);
+  const double block_ms = std::atof(argv[1]);
+  const std::vector<double> periods_ms = numbers(argv[2]);
   once("nothing", [] {});
   once("init", [&] { ros::init(argc, argv, "calibration_probe"); });
   std::unique_ptr<ros::NodeHandle> node;
@@ -234,9 +240,9 @@ int main(int argc, char** argv) {
   once("settle", [] { pause(5 * kSettleMs); });
   registrations(*node);
   for (double ms : numbers(argv[3])) block("sleep", ms * 1000.0, ms, block_ms, [] {});
-  publishing(*node, period_ms, block_ms, numbers(argv[4]));
-  spinning(*node, period_ms, block_ms);
-  calling(*node, period_ms, block_ms);
+  publishing(*node, periods_ms, block_ms, numbers(argv[4]));
+  spinning(*node, periods_ms, block_ms);
+  calling(*node, periods_ms[0], block_ms);
   receiving(*node, block_ms);
   receiving(*node, block_ms);
   serving(*node, block_ms);
