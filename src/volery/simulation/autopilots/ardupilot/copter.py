@@ -58,7 +58,7 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import (
     ReturnAlongTrack,
     Stabilize,
 )
-from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, copter_leg
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, MissionRules
 from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return
 from volery.simulation.autopilots.manoeuvres.zigzag import ZigZag
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
@@ -109,7 +109,7 @@ MODES = {
             3,
             "AUTO",
             AUTO_BITS,
-            lambda vehicle: FlyMission(vehicle, copter_leg, COPTER_MISSION, mission.leaves_ground),
+            lambda vehicle: FlyMission(vehicle, mission.leg_of_copter, COPTER_MISSION, mission.leaves_ground),
             LEVEL_AND_HEIGHT,
             needs_position=True,
             armable=False,
@@ -193,7 +193,7 @@ def _throttle_is_high(vehicle: Vehicle) -> bool:
 
 
 AUXILIARY = AuxiliaryFunctions(OPTION_MODES, arming_problems, ARMING_TEXTS)
-COPTER_MISSION = mission.copter_rules({DO_AUX_FUNCTION: AUXILIARY.act})
+COPTER_MISSION: MissionRules = mission.copter_rules({DO_AUX_FUNCTION: AUXILIARY.act})
 
 
 def finish_setup(vehicle: Vehicle) -> None:

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from math import isinf, isnan
 
+from volery.base.time import to_seconds
 from volery.simulation.autopilots.ardupilot.commands import HIGHEST, change_speed, turn_to
 from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, INFO, NOTICE, change_mode, disarm
 from volery.simulation.autopilots.ardupilot.payload import GRIPPER, SET_RELAY, SET_SERVO, act_on_payload
 from volery.simulation.autopilots.manoeuvres.manual_flight import HoldPlace
-from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import MissionRules
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Leg, MissionRules, copter_leg
 from volery.simulation.autopilots.manoeuvres.rover_driving import Stand
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint
-from volery.simulation.autopilots.mavlink.messages import finite
+from volery.simulation.autopilots.mavlink.messages import EPOCH_US, finite
 from volery.simulation.autopilots.onboard_mission import (
     CHANGE_SPEED,
     CONDITION_DELAY,
@@ -190,6 +191,33 @@ def act(vehicle: Vehicle, item: MissionItem) -> None:
         act_on_payload(vehicle, item)
 
 
+DAY_S = 86_400
+UNSTATED = -1.0
+"""Hour, minute or second of NAV_DELAY that is not stated."""
+
+
+def leg_of_copter(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
+    """Return the leg of an item. A delay without a duration lasts until a time of day."""
+    if item.command == DELAY:
+        if item.param1 <= 0.0:
+            item = item._replace(param1=_seconds_until(vehicle, item))
+        vehicle.send_text(INFO, f"Delaying {int(item.param1)} sec")
+    return copter_leg(vehicle, item, goes_on)
+
+
+def _seconds_until(vehicle: Vehicle, item: MissionItem) -> float:
+    """Return the time [s] until hour, minute and second of UTC, the first of them that is not -1 onwards.
+
+    The time of day comes next: on the next day, in the next hour or in the next minute, if it has passed.
+    """
+    now = (EPOCH_US / 1e6 + to_seconds(vehicle.kernel.now())) % DAY_S
+    for place, period in ((item.param2, DAY_S), (item.param3, 3600), (item.param4, 60)):
+        if place != UNSTATED:
+            of_day = 3600.0 * item.param2 + 60.0 * item.param3 + item.param4
+            return (of_day - now) % period
+    return 0.0
+
+
 def leaves_ground(vehicle: Vehicle) -> bool:
     """Return whether AUTO takes off without MISSION_START: raised throttle or bit 1 of AUTO_OPTIONS."""
     raised = vehicle.tuning.sticks.read(vehicle.rc).throttle > 0.0
@@ -214,12 +242,16 @@ DONE_MODES = {2: 1, 3: 0}
 """MIS_DONE_BEHAVE to the number of the mode that is entered: ACRO, MANUAL."""
 
 
+def _leave(vehicle: Vehicle, mode: int) -> None:
+    change_mode(vehicle, mode)
+
+
 def rover_ended(vehicle: Vehicle) -> Manoeuvre | None:
     """Report the end, and stop, loiter or change the mode as MIS_DONE_BEHAVE demands."""
     vehicle.send_text(NOTICE, "Mission Complete")
     after = round(vehicle.parameters["MIS_DONE_BEHAVE"])
     if after in DONE_MODES:
-        vehicle.kernel.call_at(vehicle.kernel.now(), lambda: change_mode(vehicle, DONE_MODES[after]))
+        vehicle.kernel.call_at(vehicle.kernel.now(), lambda: _leave(vehicle, DONE_MODES[after]))
     return HoldPlace(vehicle) if after == DONE_LOITER else Stand(vehicle)
 
 

@@ -54,7 +54,7 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import (
     Simple,
     Steering,
 )
-from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, MissionRules
 from volery.simulation.autopilots.manoeuvres.rover_driving import (
     GuidedRover,
     Manual,
@@ -190,7 +190,7 @@ def arming_problems(vehicle: Vehicle) -> list[str]:
 
 
 AUXILIARY = AuxiliaryFunctions(OPTION_MODES, arming_problems, ARMING_TEXTS)
-ROVER_MISSION = mission.rover_rules({DO_AUX_FUNCTION: AUXILIARY.act})
+ROVER_MISSION: MissionRules = mission.rover_rules({DO_AUX_FUNCTION: AUXILIARY.act})
 
 
 def finish_setup(vehicle: Vehicle) -> None:

@@ -16,6 +16,7 @@ from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Circl
 from volery.simulation.autopilots.manoeuvres.rover_driving import STANDING, DriveTo
 from volery.simulation.autopilots.manoeuvres.to_point import CLOSE, Land, ToPoint, root_speed, stopping_point
 from volery.simulation.autopilots.manual_control import StickPositions
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import IDLE, Manoeuvre, Vehicle
 
 GRAVITY = 9.80665
@@ -141,6 +142,10 @@ class AltitudeHold(ClimbByThrottle):
         )
 
 
+LOITER_BRAKE_JERK = 5.0
+"""LOIT_BRK_JERK of ArduCopter [m/s^3]."""
+
+
 class Loiter(ClimbByThrottle):
     """Sticks command accelerations over the ground.
 
@@ -151,14 +156,18 @@ class Loiter(ClimbByThrottle):
         super().__init__(vehicle)
         self._velocity: tuple[float, float] = (0.0, 0.0)
         self._last: Ns = 0
-        self._centred_at: Ns = 0
+        self._centred_at: Ns = NEVER
+        self._braking = 0.0
+        """Deceleration of the brake now [m/s^2]."""
         self._held: Vector | None = None
 
     def enter(self) -> None:
         """Begin with the present velocity."""
         north, east, _ = self.vehicle.estimate.velocity
         self._velocity = (north, east)
-        self._last = self._centred_at = self.vehicle.kernel.now()
+        self._last = self.vehicle.kernel.now()
+        self._centred_at = NEVER  # the delay before braking counts from a stick that was let go in the mode
+        self._braking = 0.0
         self._held = None
 
     def step(self) -> None:
@@ -168,11 +177,16 @@ class Loiter(ClimbByThrottle):
         passed, self._last = to_seconds(now - self._last), now
         if pilot.roll or pilot.pitch:
             self._centred_at = now
+            self._braking = 0.0
             self._held = None
             self._push(pilot, passed)
         else:
             self._let_go(now, passed)
         self._drive(pilot, climb)
+
+    def _drag(self) -> float:
+        """Return deceleration over speed [1/s]: it balances the largest tilt at the largest speed."""
+        return GRAVITY * tan(self.vehicle.tuning.loiter_tilt) / self.vehicle.tuning.loiter_speed
 
     def _push(self, pilot: StickPositions, passed: float) -> None:
         """Accelerate as the commanded tilt would, less a drag that balances it at the largest speed."""
@@ -181,7 +195,7 @@ class Loiter(ClimbByThrottle):
         right = GRAVITY * tan(pilot.roll * tuning.loiter_tilt)
         heading = self.vehicle.estimate.attitude[2]
         c, s = cos(heading), sin(heading)
-        drag = tuning.loiter_accel / tuning.loiter_speed
+        drag = self._drag()
         kept = 1.0 / (1.0 + drag * passed)  # the drag at the end of the step: it cannot overshoot
         north, east = self._velocity
         north += (forward * c - right * s) * passed
@@ -193,8 +207,9 @@ class Loiter(ClimbByThrottle):
         tuning = self.vehicle.tuning
         north, east = self._velocity
         speed = hypot(north, east)
-        braking = now - self._centred_at > tuning.loiter_brake_delay
-        slow = tuning.loiter_accel / tuning.loiter_speed * speed + (tuning.loiter_brake if braking else 0.0)
+        if now - self._centred_at > tuning.loiter_brake_delay:
+            self._braking = min(tuning.loiter_brake, self._braking + LOITER_BRAKE_JERK * passed)
+        slow = self._drag() * speed + self._braking
         left = max(0.0, speed - slow * passed)
         self._velocity = (north * left / speed, east * left / speed) if speed > 0.0 else (0.0, 0.0)
         if left == 0.0 and self._held is None:
