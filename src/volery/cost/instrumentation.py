@@ -47,16 +47,10 @@ LIBRARY_CALL = "__volery_call__"
 LIBRARY_OPERATOR = "__volery_operator_"
 LIBRARY_STORE = "__volery_store__"
 _READ_TWICE = (
-    ast.Name,
-    ast.Attribute,
-    ast.Subscript,
-    ast.Slice,
-    ast.Tuple,
-    ast.Constant,
-    ast.UnaryOp,
-    ast.BinOp,
-)
-_READ_TWICE += (ast.expr_context, ast.operator, ast.unaryop)
+    ast.Name, ast.Attribute, ast.Subscript, ast.Slice, ast.Tuple, ast.Constant, ast.UnaryOp, ast.BinOp,
+    ast.expr_context, ast.operator, ast.unaryop,
+)  # fmt: skip
+"""Parts of a target that a second reading does not change."""
 SLICE = "__volery_slice__"
 """Names (or their beginnings) in the namespace of instrumented code: the cell that statements add to, the
 counters inside expressions by weight, the functions that count the items of an argument, and those that
