@@ -36,6 +36,8 @@ class Parameter(NamedTuple):
     name: str
     type: int
     value: float
+    listed_by: str = ""
+    """The parameter that must not be 0 for this one to be listed; empty: it is always listed."""
 
 
 def quantised(kind: int, value: float) -> float:
@@ -47,17 +49,20 @@ def quantised(kind: int, value: float) -> float:
 
 
 def load(package: str, resource: str) -> tuple[Parameter, ...]:
-    """Read a packaged list: ``name type value`` per line, ``#`` starts a comment."""
+    """Read a packaged list: ``name type value [listed_by]`` per line, ``#`` starts a comment."""
     found = []
     for line in files(package).joinpath(resource).read_text(encoding="ascii").splitlines():
         if line and not line.startswith("#"):
-            name, kind, value = line.split()
-            found.append(Parameter(name, int(kind), quantised(int(kind), float(value))))
+            name, kind, value, *listed_by = line.split()
+            found.append(Parameter(name, int(kind), quantised(int(kind), float(value)), *listed_by))
     return tuple(found)
 
 
 class Parameters:
     """Parameters of one vehicle in the order of their indices.
+
+    Those of a subsystem that is switched off are read and set by name, but have no index: length, iteration
+    and indices count the listed ones only.
 
     Args:
         defaults: All parameters with their default values.
@@ -71,6 +76,10 @@ class Parameters:
         self._order = tuple(defaults)
         self._index = {parameter.name: index for index, parameter in enumerate(self._order)}
         self._values = {parameter.name: parameter.value for parameter in self._order}
+        self._gates = {parameter.listed_by for parameter in self._order}
+        self._listed: tuple[str, ...] = ()
+        self._places: dict[str, int] = {}
+        self._list()
         self.changes = 0
         """Number of values that were set so far."""
         for name, value in (overrides or {}).items():
@@ -79,31 +88,39 @@ class Parameters:
             if self.set(name, value) is None:
                 raise UsageError(f"parameter {name} cannot be {value}: it takes finite numbers")
 
+    def _list(self) -> None:
+        """List the parameters whose subsystems are switched on."""
+        self._listed = tuple(
+            one.name for one in self._order if not one.listed_by or self._values[one.listed_by]
+        )
+        self._places = {name: index for index, name in enumerate(self._listed)}
+
     def __len__(self) -> int:
-        return len(self._order)
+        return len(self._listed)
 
     def __contains__(self, name: str) -> bool:
         return name in self._index
 
     def __iter__(self) -> Iterator[Parameter]:
-        return (self.at(index) for index in range(len(self._order)))
+        return (self.at(index) for index in range(len(self._listed)))
 
     def __getitem__(self, name: str) -> float:
         return self._values[name]
 
     def at(self, index: int) -> Parameter:
         """Return the parameter with that index."""
-        name, kind, _ = self._order[index]
-        return Parameter(name, kind, self._values[name])
+        return self._now(self._listed[index])
 
     def index(self, name: str) -> int:
-        """Return the index of a parameter that exists."""
-        return self._index[name]
+        """Return the index of a parameter that is listed."""
+        return self._places[name]
 
     def find(self, name: str) -> Parameter | None:
-        """Return the parameter of that name, or ``None``."""
-        index = self._index.get(name)
-        return None if index is None else self.at(index)
+        """Return the parameter of that name, listed or not, or ``None``."""
+        return self._now(name) if name in self._index else None
+
+    def _now(self, name: str) -> Parameter:
+        return self._order[self._index[name]]._replace(value=self._values[name])
 
     def set(self, name: str, value: float) -> Parameter | None:
         """Set a parameter and return it, rounded to its type.
@@ -116,7 +133,9 @@ class Parameters:
             return None
         self._values[name] = quantised(self._order[index].type, value)
         self.changes += 1
-        return self.at(index)
+        if name in self._gates:
+            self._list()
+        return self._now(name)
 
 
 @dataclass(frozen=True)

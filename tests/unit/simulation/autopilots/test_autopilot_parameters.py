@@ -86,3 +86,34 @@ def test_an_override_replaces_the_default() -> None:
 def test_a_wrong_override_is_explained(overrides: dict[str, float], words: str) -> None:
     with pytest.raises(UsageError, match=words):
         Parameters(LISTED, overrides)
+
+
+SUBSYSTEM = (
+    Parameter("GRIP_ENABLE", INT8, 0.0),
+    Parameter("GRIP_GRAB", INT16, 1900.0, "GRIP_ENABLE"),
+    Parameter("LAST", INT8, 3.0),
+)
+
+
+def test_parameters_of_a_subsystem_that_is_off_are_found_by_name_only() -> None:
+    store = Parameters(SUBSYSTEM)
+    assert ([one.name for one in store], len(store)) == (["GRIP_ENABLE", "LAST"], 2)
+    assert store.index("LAST") == 1
+    assert "GRIP_GRAB" in store
+    found = store.set("GRIP_GRAB", 1800.0)
+    assert found is not None
+    assert found.value == 1800.0
+    assert store.find("GRIP_GRAB") == found
+    assert len(store) == 2
+
+
+def test_switching_a_subsystem_on_lists_its_parameters_at_once_and_off_hides_them() -> None:
+    store = Parameters(SUBSYSTEM)
+    store.set("GRIP_ENABLE", 1.0)
+    assert ([one.name for one in store], store.index("LAST")) == (["GRIP_ENABLE", "GRIP_GRAB", "LAST"], 2)
+    store.set("GRIP_ENABLE", 0.0)
+    assert ([one.name for one in store], store.at(1).name) == (["GRIP_ENABLE", "LAST"], "LAST")
+
+
+def test_an_override_lists_a_subsystem_from_the_start() -> None:
+    assert len(Parameters(SUBSYSTEM, {"GRIP_ENABLE": 1.0})) == 3

@@ -151,7 +151,7 @@ class ParameterService:
         return self._fields(found, self._vehicle.parameters.index(name) if keeps else UNSOLICITED)
 
     def _fields(self, parameter: Parameter, index: int) -> dict[str, Any]:
-        name, kind, value = parameter
+        name, kind, value, _ = parameter
         return {
             "param_id": name,
             "param_value": to_bytewise(kind, value) if self._policy.bytewise else value,
@@ -163,7 +163,7 @@ class ParameterService:
     def _checksum(self) -> Parameter:
         """Return a checksum over names and values as a parameter."""
         total = 0
-        for name, kind, value in self._vehicle.parameters:
+        for name, kind, value, _ in self._vehicle.parameters:
             total = crc32(name.encode() + _REAL.pack(to_bytewise(kind, value)), total)
         return Parameter(self._policy.checksum, UINT32, float(total))
 
@@ -213,22 +213,13 @@ class ParameterService:
 
 # --- missions ---
 
-MISSION_ACCEPTED, MISSION_ERROR, MISSION_UNSUPPORTED, NO_SPACE, INVALID_SEQUENCE, CANCELLED = (
-    0,
-    1,
-    3,
-    4,
-    13,
-    15,
-)
+MISSION_ACCEPTED, MISSION_ERROR, MISSION_UNSUPPORTED, NO_SPACE, INVALID_SEQUENCE = 0, 1, 3, 4, 13
 """MAV_MISSION_RESULT."""
 
 MISSION, FENCE, RALLY = 0, 1, 2
 """MAV_MISSION_TYPE."""
 
 MAX_ITEMS = 724
-REQUEST_PERIOD: Ns = 1 * S
-UPLOAD_TIMEOUT: Ns = 8 * S
 REQUEST_INT = "MISSION_REQUEST_INT"
 GUIDED_ITEM = 2
 """``current`` of an item outside of a mission: a destination for now."""
@@ -309,15 +300,17 @@ class MissionService:
         upload = self._upload
         if upload is None:
             return
-        if self._kernel.now() - upload.latest >= UPLOAD_TIMEOUT:
-            self._vehicle.send_text(4, "Mission upload timeout")
-            self._acknowledge(upload.peer, CANCELLED, upload.kind)
+        policy = self._firmware.missions.upload
+        if self._kernel.now() - upload.latest >= policy.gives_up_after:
+            result = policy.gives_up(self._vehicle)
+            if result is not None:
+                self._acknowledge(upload.peer, result, upload.kind)
             self._upload = None
             return
         index = upload.first + len(upload.items)
-        request = REQUEST_INT if upload.by_integers else self._firmware.missions.upload.request(index)
+        request = REQUEST_INT if upload.by_integers else policy.request(index)
         upload.peer.answer(request, seq=index, mission_type=upload.kind)
-        upload.reminder = self._kernel.call_at(self._kernel.now() + REQUEST_PERIOD, self._request_item)
+        upload.reminder = self._kernel.call_at(self._kernel.now() + policy.request_period, self._request_item)
 
     def _drop_upload(self) -> None:
         if self._upload is not None and self._upload.reminder is not None:

@@ -66,7 +66,7 @@ def _ftp_error(asked: list[int]) -> int | None:
 def packed_parameters(parameters: Parameters) -> bytes:
     """Return ``param.pck`` as AP_Filesystem_Param writes it: names are stated from where they differ."""
     rows, before = [], ""
-    for name, kind, value in parameters:
+    for name, kind, value, _ in parameters:
         number, form = _PACKED_TYPES.get(kind, _PACKED_REAL)
         differs = (at for at, (one, other) in enumerate(zip(before, name, strict=False)) if one != other)
         shared = min(next(differs, min(len(before), len(name))), 15, len(name) - 1)
