@@ -13,6 +13,7 @@ import pytest
 
 import volery.simulation.autopilots
 from volery.simulation.autopilots.autopilot_parameters import REAL32
+from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.px4 import FIRMWARE, event_interface
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
@@ -523,3 +524,28 @@ def test_where_it_was_sent_it_shows_within_a_second(facts: dict[str, Any], bench
     assert rig.mode(4, 3) == ACCEPTED
     rig.run(2.0)
     assert rig.latest["POSITION_TARGET_GLOBAL_INT"]["lat_int"] == pytest.approx(north, abs=1)
+
+
+def test_an_upload_that_stops_is_requested_again_and_given_up(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    rig.received.clear()
+    rig.send("MISSION_COUNT", target_system=1, target_component=1, count=3)
+    rig.run(4.5)
+    assert len(rig.of("MISSION_REQUEST")) == pytest.approx(18, abs=2)
+    assert "Operation timeout\t" not in rig.texts()
+    rig.run(1.0)
+    assert rig.texts()[-1] == "Operation timeout\t"
+    assert event_interface.MISSION_TIMEOUT.id in rig.events()
+    assert not rig.of("MISSION_ACK")
+
+
+def test_a_mission_that_is_started_names_what_has_armed(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    latitude, longitude, _ = rig.vehicle.estimate.geodetic
+    item = MissionItem(22, 3, x=round(latitude * 1e7), y=round(longitude * 1e7), z=10.0)
+    rig.vehicle.mission.replace([item])
+    rig.command(300)
+    rig.run(0.5)
+    assert "Armed by mission start\t" in rig.texts()

@@ -63,6 +63,15 @@ class ParameterPolicy(NamedTuple):
     """Name of a checksum over all parameters that is sent first; empty: none."""
 
 
+CANCELLED = 15
+"""MAV_MISSION_RESULT."""
+
+
+def _cancel(vehicle: Vehicle) -> int:
+    vehicle.send_text(4, "Mission upload timeout")
+    return CANCELLED
+
+
 class MissionUploadPolicy(NamedTuple):
     """How a mission is uploaded."""
 
@@ -74,6 +83,12 @@ class MissionUploadPolicy(NamedTuple):
     """Whether MISSION_REQUEST_INT is used once the peer has acknowledged a request as unsupported."""
     keeps_old: bool = False
     """Whether the mission on board stays until the new one is complete."""
+    request_period: Ns = 1 * S
+    """Period at which an item that does not arrive is requested again."""
+    gives_up_after: Ns = 8 * S
+    """Time without an item after which the upload ends."""
+    gives_up: Callable[[Vehicle], int | None] = _cancel
+    """Reports that; returns the MAV_MISSION_RESULT that is acknowledged, or ``None``."""
 
 
 Builder = Callable[[Vehicle], dict[str, Any] | None]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any
 from zlib import crc32
 
-from volery.base.time import MS, US, Ns, S
+from volery.base.time import MS, US, Ns
 from volery.kernel.api import Handle
 from volery.links.mavlink_messages import from_bytewise, message_type_of, to_bytewise
 from volery.simulation.autopilots.autopilot_parameters import Parameter

@@ -81,7 +81,7 @@ def on_arm(vehicle: Vehicle, command: Command) -> int:
     """Handle COMPONENT_ARM_DISARM."""
     force = to_integer(command.param2) == FORCE
     if command.param1 == 1.0:
-        return commander_of(vehicle).arm(force)
+        return commander_of(vehicle).arm(force=force)
     if command.param1 == 0.0:
         return commander_of(vehicle).disarm(force)
     return UNSUPPORTED
@@ -207,7 +207,7 @@ def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
         return DENIED
     if commander.request_mode(modes.MISSION) != ACCEPTED:
         return DENIED
-    return ACCEPTED if commander.arm(force=False) == ACCEPTED else DENIED
+    return ACCEPTED if commander.arm(force=False, for_mission=True) == ACCEPTED else DENIED
 
 
 def on_terminate(vehicle: Vehicle, command: Command) -> int:

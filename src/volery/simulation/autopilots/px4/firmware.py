@@ -225,7 +225,13 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
         ),
         missions=MissionPolicy(
             upload=MissionUploadPolicy(
-                mission.request_message, received="", falls_back_to_int=True, keeps_old=True
+                mission.request_message,
+                received="",
+                falls_back_to_int=True,
+                keeps_old=True,
+                request_period=250 * MS,
+                gives_up_after=5 * S,
+                gives_up=mission.give_up,
             ),
             stored_item=mission.stored_item,
             stored_point=failsafes.stored_fence_point,

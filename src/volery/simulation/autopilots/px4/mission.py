@@ -33,7 +33,7 @@ from volery.simulation.autopilots.onboard_mission import (
 from volery.simulation.autopilots.px4 import event_interface, modes
 from volery.simulation.autopilots.px4.commands import on_return
 from volery.simulation.autopilots.px4.flight_modes import Descent, Hold, TakeOff
-from volery.simulation.autopilots.px4.modes import INFO, commander_of
+from volery.simulation.autopilots.px4.modes import CRITICAL, INFO, commander_of
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 UNSUPPORTED_FRAME, UNSUPPORTED = 2, 3
@@ -65,6 +65,12 @@ def stored_item(item: MissionItem) -> MissionItem | int:
     if item.command not in FLOWN | KEPT:
         return UNSUPPORTED
     return item if item.frame in FRAMES else UNSUPPORTED_FRAME
+
+
+def give_up(vehicle: Vehicle) -> None:
+    """Report that an upload has stopped; nothing is acknowledged."""
+    vehicle.send_text(CRITICAL, "Operation timeout\t")
+    commander_of(vehicle).log.send(event_interface.MISSION_TIMEOUT)
 
 
 def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:

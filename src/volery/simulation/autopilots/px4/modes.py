@@ -350,10 +350,14 @@ class Commander:
 
     # -- arming
 
-    def arm(self, force: bool) -> int:
+    def arm(self, *, force: bool, for_mission: bool = False) -> int:
         """Arm by command, and return a MAV_RESULT.
 
         Reasons of a refusal appear in events, except for the throttle.
+
+        Args:
+            force: Skip the checks.
+            for_mission: The command is MISSION_START.
         """
         vehicle = self.vehicle
         if vehicle.armed:
@@ -374,8 +378,9 @@ class Commander:
         self.lifted_at = NEVER
         self.ground = vehicle.estimate.position[2]
         vehicle.arm()
-        vehicle.send_text(INFO, "Armed by external command\t")
-        self.log.send(event_interface.ARMED, event_interface.BY_COMMAND)
+        vehicle.send_text(INFO, f"Armed by {'mission start' if for_mission else 'external command'}\t")
+        reason = event_interface.BY_MISSION if for_mission else event_interface.BY_COMMAND
+        self.log.send(event_interface.ARMED, reason)
         self.report_minimum_height()
         return ACCEPTED
 
