@@ -146,12 +146,16 @@ def copter_global(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> Non
     _obey(vehicle, _of_global(vehicle, fields))
 
 
+def _states_attitude(fields: dict[str, Any]) -> bool:
+    """Return whether SET_ATTITUDE_TARGET states a throttle, and all its values are numbers."""
+    values = (*fields["q"], fields["body_yaw_rate"], fields["thrust"])
+    return not fields["type_mask"] & THROTTLE_IGNORED and all_within(values)
+
+
 def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_ATTITUDE_TARGET: attitude, yaw rate, and thrust as a climb rate."""
     guided, mask = vehicle.manoeuvre, fields["type_mask"]
-    if not isinstance(guided, Guided) or mask & THROTTLE_IGNORED:
-        return
-    if not all_within((*fields["q"], fields["body_yaw_rate"], fields["thrust"])):
+    if not isinstance(guided, Guided) or not _states_attitude(fields):
         return
     w, x, y, z = fields["q"]
     size = hypot(w, x, y, z)
@@ -163,9 +167,7 @@ def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> N
 def rover_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_ATTITUDE_TARGET of a rover: a share of its speed, with a heading or a turn rate."""
     guided, mask = vehicle.manoeuvre, fields["type_mask"]
-    if not isinstance(guided, GuidedRover) or mask & THROTTLE_IGNORED:
-        return
-    if not all_within((*fields["q"], fields["body_yaw_rate"], fields["thrust"])):
+    if not isinstance(guided, GuidedRover) or not _states_attitude(fields):
         return
     speed = min(1.0, max(-1.0, fields["thrust"])) * vehicle.tuning.speed
     if mask & YAW_RATE_IGNORED:

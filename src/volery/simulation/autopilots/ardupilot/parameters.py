@@ -59,6 +59,7 @@ _SHARED = {
     "FS_GCS_TIMEOUT": "silence after which the ground station is lost",
     "FS_THR_ENABLE": "action when the throttle channel falls below FS_THR_VALUE",
     "FS_THR_VALUE": "pulse width below which the transmitter is lost",
+    "GPS_TYPE": "0: no receiver",
     "GRIP_ENABLE": "any value but 0: there is a gripper",
     "INITIAL_MODE": "mode after boot",
     "RALLY_INCL_HOME": "any value but 0: home counts as a rally point of the return",

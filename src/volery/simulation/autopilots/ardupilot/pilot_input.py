@@ -108,11 +108,12 @@ def on_step(vehicle: Vehicle) -> None:
 
 
 def simulate_faults(vehicle: Vehicle) -> None:
-    """Inject the faults and the wind that SIM_ parameters name, once after each change."""
+    """Inject the faults and the wind that SIM_ parameters name, once after each change; GPS_TYPE 0, too."""
     parameters = vehicle.parameters
     motor_and_share = parameters["SIM_ENGINE_FAIL"], parameters["SIM_ENGINE_MUL"]
     wind = parameters["SIM_WIND_SPD"], parameters["SIM_WIND_DIR"]
-    wanted = (parameters["SIM_GPS_DISABLE"], *motor_and_share, *wind)
+    no_receiver = parameters["SIM_GPS_DISABLE"] != 0.0 or parameters["GPS_TYPE"] == 0.0
+    wanted = (float(no_receiver), *motor_and_share, *wind)
     before = vehicle.failsafes.simulated
     if wanted == before:
         return

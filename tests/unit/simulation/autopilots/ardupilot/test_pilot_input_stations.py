@@ -55,3 +55,16 @@ def test_after_a_boot_the_mode_switch_counts_once_there_is_a_transmitter(
     rig.vehicle.set_parameter("SIM_RC_FAIL", 0.0)
     rig.run(1.0)
     assert rig.vehicle.mode.number == mode
+
+
+def test_without_a_receiver_a_copter_lands_by_its_failsafe(station: Any) -> None:
+    rig = station()
+    rig.run(1.0)
+    rig.command(176, 1, 4)
+    assert rig.command(400, 1) == 0
+    assert rig.command(22, 0, 0, 0, 0, 0, 0, 10.0) == 0
+    rig.run_until(lambda: rig.height > 9.5)
+    rig.vehicle.set_parameter("GPS_TYPE", 0.0)
+    rig.run_until(lambda: rig.vehicle.mode.name == "LAND", within=30.0)
+    rig.vehicle.set_parameter("GPS_TYPE", 1.0)
+    rig.run_until(lambda: rig.vehicle.has_position, within=30.0)
