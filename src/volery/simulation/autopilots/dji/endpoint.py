@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from math import cos, radians
+from math import cos, degrees, isfinite, radians
 from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
@@ -29,6 +29,7 @@ from volery.ros.messages.dji_constants import (
     OLD_NAMES,
     SETPOINT,
     SETPOINT_TOPICS,
+    GimbalMode,
 )
 from volery.simulation.autopilots.dji.flight_controller import FlightController, controller_of
 from volery.simulation.autopilots.dji.sdk_services import Answer, Services
@@ -116,6 +117,12 @@ def _velocity(controller: FlightController, stamp: Ns) -> Any:
     return kind(_header(stamp, "ground_ENU"), _vector(velocity))
 
 
+def _gimbal_angle(controller: FlightController, stamp: Ns) -> Any:
+    """Return roll, pitch and yaw of the gimbal in degrees, as the flight controller sends them."""
+    kind = message_class("geometry_msgs/msg/Vector3Stamped")
+    return kind(_header(stamp, "ground_ENU"), _vector(controller.gimbal.angles()))
+
+
 def _byte(value: int) -> Any:
     return message_class("std_msgs/msg/UInt8")(value)
 
@@ -199,6 +206,7 @@ TOPICS: tuple[Topic, ...] = (
     Topic("local_position", "geometry_msgs/msg/PointStamped", NORMAL, _local_position),
     Topic("height_above_takeoff", "std_msgs/msg/Float32", NORMAL, _height),
     Topic("velocity", "geometry_msgs/msg/Vector3Stamped", NORMAL, _velocity),
+    Topic("gimbal_angle", "geometry_msgs/msg/Vector3Stamped", NORMAL, _gimbal_angle),
     Topic("rc", "sensor_msgs/msg/Joy", NORMAL, _rc),
     Topic("rc_connection_status", "std_msgs/msg/UInt8", NORMAL, _rc_connection),
     Topic("battery_state", "sensor_msgs/msg/BatteryState", SLOW, _battery),
@@ -345,11 +353,23 @@ class DjiEndpoint:
         for name, flag in SETPOINT_TOPICS.items():
             node.subscribe(f"{package}/{name}", JOY, partial(self._setpoint, flag), group=group)
         node.subscribe(f"{package}/{SETPOINT}generic", JOY, self._generic, group=group)
+        node.subscribe(f"{package}/gimbal_angle_cmd", f"{package}/msg/Gimbal", self._gimbal, group=group)
 
     def _setpoint(self, flag: int, message: Any) -> None:
         with self._kernel.guard:
             if self.is_active:
                 self.controller.handle_setpoint(tuple(float(axis) for axis in message.axes[:4]), flag)
+
+    def _gimbal(self, message: Any) -> None:
+        """Handle ``gimbal_angle_cmd``: radians, and a bit of ``mode`` for each axis that keeps its angle."""
+        mode = message.mode
+        kept = (GimbalMode.KEEPS_ROLL, GimbalMode.KEEPS_PITCH, GimbalMode.KEEPS_YAW)
+        angles = (message.roll, message.pitch, message.yaw)
+        wanted = [None if mode & keeps else degrees(angle) for keeps, angle in zip(kept, angles, strict=True)]
+        with self._kernel.guard:
+            if self.is_active and all(isfinite(angle) for angle in angles):
+                relative = not mode & GimbalMode.ABSOLUTE
+                self.controller.gimbal.point(*wanted, message.ts, relative=relative)
 
     def _generic(self, message: Any) -> None:
         if len(message.axes) >= 5 and 0.0 <= message.axes[4] < 256.0:

@@ -26,6 +26,7 @@ from volery.ros.messages.dji_constants import (
     MissionAck,
     TaskAck,
 )
+from volery.simulation.autopilots.dji.gimbal import Gimbal
 from volery.simulation.autopilots.dji.parameters import aircraft_type
 from volery.simulation.autopilots.dji.sdk_commands import (
     GO_HOME_AT_END,
@@ -109,6 +110,7 @@ class FlightController:
         """Origin of the local position [deg, m AMSL], or None."""
         self.task: Any = None
         """Waypoint mission as uploaded, or None."""
+        self.gimbal = Gimbal(self.vehicle.kernel)
         self.anomalies = 0
         self.landing_confirmed = False
         self._switch = self._switch_position()

@@ -8,7 +8,7 @@ and answers a take-off or a landing when it is finished.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import pi, radians
+from math import isfinite, pi, radians
 from typing import Any, NamedTuple
 
 from volery.base.frames import heading_to_yaw
@@ -24,6 +24,7 @@ from volery.ros.messages.dji_constants import (
     NEW_NAMES,
     NO_CODE,
     OLD_NAMES,
+    TAKE_PICTURE,
     AuthorityAck,
     DisplayMode,
     Flag,
@@ -40,6 +41,13 @@ GO_HOME, TAKE_OFF, LAND = 1, 4, 6
 
 _AUTHORITY = f"{OLD_NAMES}/srv/SDKControlAuthority"
 _TASK = f"{OLD_NAMES}/srv/DroneTaskControl"
+STOP_FILM = 2
+"""The last action of a camera."""
+MAIN_GIMBAL = 0
+GIMBAL_PERIOD: Ns = 2 * S
+"""Time after which the node of 4.1 answers a command to its gimbal."""
+
+_GIMBAL_TASK = f"{NEW_NAMES}/srv/GimbalAction"
 _FLIGHT_TASK = f"{NEW_NAMES}/srv/FlightTaskControl"
 
 Condition = Callable[[], bool]
@@ -135,12 +143,18 @@ class Services:
             ),
             Served(f"{OLD_NAMES}/sdk_control_authority", _AUTHORITY, self._authority),
             Served(f"{OLD_NAMES}/drone_task_control", _TASK, self._task),
+            *_accepting(f"{OLD_NAMES}/", OLD_NAMES, ("camera_action", "CameraAction", self._camera_action)),
             Served(f"{OLD_NAMES}/query_drone_version", f"{OLD_NAMES}/srv/QueryDroneVersion", self._version),
         )
 
     def _version(self, _request: Any) -> Reply:
         hardware, version = HARDWARE[self._controller.aircraft]
         return Reply(message_class(f"{OLD_NAMES}/srv/QueryDroneVersion_Response")(version, hardware))
+
+    def _camera_action(self, request: Any) -> int:
+        """Handle camera_action: pictures are counted; films start and stop without an effect."""
+        self._controller.gimbal.pictures += request.camera_action == TAKE_PICTURE
+        return TaskAck.OK if request.camera_action <= STOP_FILM else NO_CODE
 
     def _authority(self, request: Any) -> Reply:
         wanted = bool(request.control_enable)
@@ -170,6 +184,7 @@ class Services:
         controller.activate_at_power_on()
         return (
             Served("flight_task_control", _FLIGHT_TASK, self._flight_task),
+            Served("gimbal_task_control", _GIMBAL_TASK, self._gimbal_task),
             _failing(NEW_NAMES, "obtain_release_control_authority", "ObtainControlAuthority", self._obtain),
             _failing(NEW_NAMES, "kill_switch", "KillSwitch", self._kill),
             *_accepting(
@@ -181,6 +196,11 @@ class Services:
                     "set_joystick_mode",
                     "SetJoystickMode",
                     lambda one: _plain(self._joystick_mode(one)),
+                ),
+                (
+                    "camera_start_shoot_single_photo",
+                    "CameraStartShootSinglePhoto",
+                    lambda one: _plain(self._picture(one)),
                 ),
                 ("joystick_action", "JoystickAction", lambda one: _plain(self._joystick_action(one))),
                 (
@@ -228,6 +248,23 @@ class Services:
         mode = doing.get(request.task)
         finished = None if mode is None else lambda: vehicle.mode.number != mode or not vehicle.armed
         return Reply(_response(_FLIGHT_TASK, True, TaskAck.OK), finished)
+
+    def _gimbal_task(self, request: Any) -> Reply:
+        """Turn the main gimbal; the node answers two seconds later."""
+        angles = (request.roll, request.pitch, request.yaw)
+        done = request.payload_index == MAIN_GIMBAL and all(isfinite(angle) for angle in angles)
+        if done:
+            wanted = (0.0, 0.0, 0.0) if request.is_reset else angles
+            relative = request.rotationMode == 1 and not request.is_reset
+            self._controller.gimbal.point(*wanted, request.time, relative=relative)
+        kernel = self._controller.vehicle.kernel
+        until = kernel.now() + GIMBAL_PERIOD
+        return Reply(_response(_GIMBAL_TASK, done, NO_CODE), lambda: kernel.now() >= until)
+
+    def _picture(self, request: Any) -> bool:
+        done = bool(request.payload_index == MAIN_GIMBAL)
+        self._controller.gimbal.pictures += done
+        return done
 
     def _joystick_mode(self, request: Any) -> bool:
         self._joystick = (

@@ -114,7 +114,8 @@ class DjiBackend:
         self._context: ExecutionContext = replace(node.context, deadline=None, on_release=None, meter=None)
         self._scope = kernel.root.child(f"{name} (DJI)")
         self._spinner = node.group()
-        inbox = node.group(self._take)
+        self._inbox = inbox = node.group(self._take)
+        self._gimbal_followed = False
         for topic, (kind, handler) in self.decoder.topics(interface.package).items():
             qos = AS_OFFERED if topic == POSITION else STATE
             node.subscribe(f"{interface.namespace}/{topic}", kind, handler, qos, inbox)
@@ -293,6 +294,14 @@ class DjiBackend:
         self.stream.stop()
         self.decoder.commanded = mode.name
         self.request(Ack.TASK, self.interface.task(task))
+
+    def follow_gimbal(self) -> None:
+        """Subscribe to the angles of the gimbal, at its first use: few aircraft carry one."""
+        if not self._gimbal_followed:
+            self._gimbal_followed = True
+            topic = f"{self.interface.namespace}/gimbal_angle"
+            kind = "geometry_msgs/msg/Vector3Stamped"
+            self._node.subscribe(topic, kind, self.decoder.take_gimbal, STATE, self._inbox)
 
     # -- the end
 

@@ -127,6 +127,7 @@ class DjiDecoder:
         self._taken_at: Ns = 0
         self._motors = False  # of an M100, whose status does not report them
         self._anomalies = 0
+        self.gimbal_pitch = nan  # degrees, up positive; once it was subscribed to
 
     def topics(self, package: str) -> Mapping[str, tuple[str, Handler]]:
         """Return type and handler of each topic."""
@@ -149,6 +150,10 @@ class DjiDecoder:
         return self.located_at >= 0 and self._kernel.now() - self.located_at <= STALE
 
     # -- topics
+
+    def take_gimbal(self, message: Any) -> None:
+        """Decode ``gimbal_angle``: roll, pitch and yaw in degrees."""
+        self.gimbal_pitch = message.vector.y
 
     def _flight_status(self, message: Any) -> None:
         self.node_seen = True

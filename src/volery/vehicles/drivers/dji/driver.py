@@ -21,6 +21,7 @@ from volery.vehicles.drivers.dji.backend import QUIET, DjiBackend
 from volery.vehicles.drivers.dji.decoder import MOST_VOLTS, SETTLED, STALE, TAKEN_OVER_FOR
 from volery.vehicles.drivers.dji.missions import MissionRunner, above_home, check_amsl
 from volery.vehicles.drivers.dji.sequences import LANDING_MODES, SDK, STARTS, WAITS, DjiSteps, DjiTasks
+from volery.vehicles.drivers.dji.services import DjiServices
 from volery.vehicles.drivers.dji.setpoints import (
     BRAKES_M_S2,
     DOWN_M_S,
@@ -55,7 +56,6 @@ _NONE: frozenset[Capability] = frozenset()
 class Dji:
     """Driver of a DJI aircraft. See ``vehicles.driver.Driver`` for the operations."""
 
-    services = None
     landing_modes = LANDING_MODES
     cycle: Action | None = None
 
@@ -65,6 +65,7 @@ class Dji:
         self._kernel = kernel
         self._backend = backend
         self._stream = backend.stream
+        self.services = DjiServices(kernel, backend)
         self._steps = steps = DjiSteps(name, backend)
         self.problem, self.close, self.stop = backend.problem, backend.close, backend.stream.stop
         tasks = DjiTasks(steps)

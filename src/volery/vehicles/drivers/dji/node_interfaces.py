@@ -9,7 +9,8 @@ differ.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import degrees
+from functools import cached_property
+from math import degrees, radians
 from typing import Any, NamedTuple, Protocol
 
 from volery.base.frames import yaw_to_heading
@@ -21,7 +22,9 @@ from volery.ros.messages.dji_constants import (
     OLD_NAMES,
     SETPOINT,
     SETPOINT_TOPICS,
+    TAKE_PICTURE,
     Flag,
+    GimbalMode,
 )
 
 GO_HOME, TAKE_OFF, LAND = 1, 4, 6
@@ -32,6 +35,9 @@ START_MISSION = 0
 
 SETPOINT_WITHIN = 200_000_000
 """Time-out of a set-point sent by a service, ns."""
+
+GIMBAL_TURNS_S = 1
+"""Time in which a gimbal turns to an angle, s."""
 
 JOY = "sensor_msgs/msg/Joy"
 
@@ -81,6 +87,12 @@ class NodeInterface(Protocol):
 
     def mission_action(self, action: int) -> ServiceRequest:
         """Start or stop the mission."""
+
+    def gimbal(self, pitch: float, yaw: float) -> ServiceRequest | None:
+        """Point the gimbal, degrees; ``None`` means that it was commanded on a topic."""
+
+    def picture(self) -> ServiceRequest:
+        """Take a picture."""
 
     def setpoint(self, flag: int, numbers: Sequence[float]) -> None:
         """Send four numbers in the conventions of ROS. May block while they are sent."""
@@ -164,6 +176,25 @@ class DjiSdkInterface(_CommonInterface):
         """Return a request to ``set_local_pos_ref``."""
         return self._make_request(self._reference)
 
+    @cached_property
+    def _gimbal(self) -> Publisher:
+        return self._node.advertise(f"{self.namespace}/gimbal_angle_cmd", f"{self.package}/msg/Gimbal")
+
+    @cached_property
+    def _camera(self) -> Client:
+        return self._client(f"{self.namespace}/camera_action", "CameraAction")
+
+    def gimbal(self, pitch: float, yaw: float) -> None:
+        """Publish on ``gimbal_angle_cmd``; the roll stays as it is."""
+        command: Any = message_class(self._gimbal.type)()
+        command.mode = GimbalMode.ABSOLUTE | GimbalMode.KEEPS_ROLL
+        command.ts, command.pitch, command.yaw = GIMBAL_TURNS_S, radians(pitch), radians(yaw)
+        self._gimbal.publish(command)
+
+    def picture(self) -> ServiceRequest:
+        """Return a request to ``camera_action``."""
+        return self._make_request(self._camera, camera_action=TAKE_PICTURE)
+
     def setpoint(self, flag: int, numbers: Sequence[float]) -> None:
         """Publish on the topic of the flag, or on the generic one."""
         publisher = self._publishers.get(flag)
@@ -182,7 +213,7 @@ class OsdkRosInterface(_CommonInterface):
 
     def __init__(self, node: Node, namespace: str) -> None:
         super().__init__(node, namespace)
-        beside = namespace.rpartition("/")[0] + "/"
+        beside = self._beside = namespace.rpartition("/")[0] + "/"
         self._task = self._client(f"{beside}flight_task_control", "FlightTaskControl")
         self._authority = self._client(f"{beside}obtain_release_control_authority", "ObtainControlAuthority")
         self._kill = self._client(f"{beside}kill_switch", "KillSwitch")
@@ -220,6 +251,23 @@ class OsdkRosInterface(_CommonInterface):
     def reference(self) -> ServiceRequest:
         """Return a request to ``set_local_pos_reference``."""
         return self._make_request(self._reference)
+
+    @cached_property
+    def _gimbal(self) -> Client:
+        return self._client(f"{self._beside}gimbal_task_control", "GimbalAction")
+
+    @cached_property
+    def _camera(self) -> Client:
+        name = f"{self._beside}camera_start_shoot_single_photo"
+        return self._client(name, "CameraStartShootSinglePhoto")
+
+    def gimbal(self, pitch: float, yaw: float) -> ServiceRequest:
+        """Return a request to ``gimbal_task_control`` for the main gimbal."""
+        return self._make_request(self._gimbal, pitch=pitch, yaw=yaw, time=float(GIMBAL_TURNS_S))
+
+    def picture(self) -> ServiceRequest:
+        """Return a request to ``camera_start_shoot_single_photo`` of the main camera."""
+        return self._make_request(self._camera)
 
     def setpoint(self, flag: int, numbers: Sequence[float]) -> None:
         """Call ``joystick_action``, after ``set_joystick_mode`` if the flag has changed.
