@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,7 +16,9 @@ from volery.model.text import (
     Node,
     Problems,
     Quoted,
+    is_inside,
     no_such,
+    outside,
     parse,
     parse_value,
     stated_texts,
@@ -251,3 +254,34 @@ def test_an_unknown_name_lists_the_known_ones() -> None:
     assert caught.value.what == no_such("drne", "vehicle", ["drone", "rover"])
     assert "'drne' (did you mean 'drone'?); there is drone or rover" in caught.value.what
     assert written(("a", 1, "b")) == "a.1.b"
+
+
+def test_files_outside_of_the_models_folders_are_refused(tmp_path: Path) -> None:
+    inside, elsewhere = tmp_path / "model", tmp_path / "other"
+    for folder in (inside, elsewhere):
+        folder.mkdir()
+    (elsewhere / "secret.py").write_text("")
+    (inside / "link.py").symlink_to(elsewhere / "secret.py")
+    assert is_inside(inside / "own.py", [inside])
+    assert not is_inside(inside / "link.py", [inside])
+    assert is_inside(inside / "link.py", [inside, elsewhere])
+    assert not is_inside(inside / ".." / "other" / "secret.py", [inside])
+    assert outside("link.py").startswith(
+        "'link.py' is outside the folder of the model; list its folder under"
+    )
+
+
+def test_problems_of_no_line_come_first_and_those_of_one_line_in_the_order_found() -> None:
+    found = problems_at({("b",): 1, ("a",): 1})
+    for name in ("b", "a"):
+        found.add((name,), f"{name} is wrong")
+    found.add(("c",), "no place")
+    with pytest.raises(CollectedModelError) as caught:
+        found.raise_if_any()
+    assert [error.what for error in caught.value.errors] == ["no place", "b is wrong", "a is wrong"]
+
+
+def test_a_fault_behind_the_last_line_has_its_number() -> None:
+    error = refusal("a: [1,\n2,")
+    assert error.where == Location("m.yaml", 2)
+    assert refusal("a: [1,\n2,\n").where == Location("m.yaml", 3)

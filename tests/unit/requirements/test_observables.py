@@ -265,3 +265,18 @@ def test_the_quantity_of_an_unknown_subject_says_what_it_is() -> None:
     make_observer(f"somebody.{of_a_vehicle}")
     with pytest.raises(UsageError, match="a component has no quantity 'nonsense'"):
         make_observer("somebody.nonsense")
+
+
+def test_without_an_activation_or_a_period_there_are_no_violations_to_count():
+    assert isnan(observed("loop.period_violations", []))
+    late = [Activation(start * MS, start * MS, "server", NONE) for start in (0, 500)]
+    assert isnan(observed("server.period_violations", late))
+    assert observed("loop.period_violations", activations((0, 1))) == 0.0
+    assert observed("loop.period_violations", activations((0, 1), (500, 501))) == 1.0
+
+
+def test_missed_deadlines_are_none_only_where_there_are_deadlines():
+    assert isnan(observed("loop.deadline_misses", activations((0, 9))))
+    for count in (1, 2, 3):
+        met = activations(*((100 * i, 100 * i + 5) for i in range(count)), deadline=5)
+        assert observed("loop.deadline_misses", met) == 0.0

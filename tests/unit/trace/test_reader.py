@@ -342,3 +342,17 @@ def test_rosbags_reads_the_file_as_a_recording(tmp_path: Path) -> None:
     with AnyReader([path]) as reader:
         found = [reader.deserialize(raw, connection.msgtype) for connection, _, raw in reader.messages()]
     assert len(found) == len(events)
+
+
+def test_a_trace_is_complete_only_with_its_end_and_its_last_bytes(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    events = write_sample(path)
+    whole = path.read_bytes()
+    for cut in (1, 4, 8):
+        path.write_bytes(whole[:-cut])
+        trace = read(path)
+        assert len(trace.events) == len(events)
+        assert not trace.complete
+        assert trace.lost.startswith("the writer never finished")
+    path.write_bytes(whole[: len(whole) // 2] + whole[-8:])
+    assert not read(path).complete
