@@ -71,7 +71,18 @@ def lasting_reasons(telemetry: Telemetry, since: Ns) -> Sequence[str]:
     """
     said = [text.text for text in telemetry.texts if text.at >= since and text.text.startswith("PreArm: ")]
     repeated = dict.fromkeys(text for text in said if said.count(text) > 1)
-    return [text for text in repeated if _stays(text.lower())]
+    return [text + _remedy(text.lower()) for text in repeated if _stays(text.lower())]
+
+
+_REMEDIES = {
+    "mode requires mission": "choose another mode at the transmitter's mode switch, or upload a mission",
+    "mode not armable": "choose another mode at the transmitter's mode switch",
+}
+"""What mends an arming check whose own text does not say it."""
+
+
+def _remedy(text: str) -> str:
+    return next((f" ({remedy})" for check, remedy in _REMEDIES.items() if check in text), "")
 
 
 def _stays(text: str) -> bool:

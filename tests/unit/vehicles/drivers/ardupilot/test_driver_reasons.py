@@ -39,6 +39,15 @@ def test_a_take_off_ends_at_once_if_waiting_does_not_mend_it(bench: Make, text: 
     assert at.kernel.now() < 15 * S
 
 
+def test_the_reason_of_a_mode_names_the_transmitters_switch(bench: Make) -> None:
+    at = bench()
+    fails(at, "PreArm: Mode requires mission")
+    with pytest.raises(
+        Refused, match=r"Mode requires mission .choose another mode at the transmitter's mode switch"
+    ):
+        at.fly(lambda drone: drone.wait_ready())
+
+
 @pytest.mark.parametrize("text", ["PreArm: Need Position Estimate", "PreArm: Gyros inconsistent"])
 def test_a_take_off_waits_for_what_passes(bench: Make, text: str) -> None:
     at = bench()
