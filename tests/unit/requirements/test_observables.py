@@ -273,6 +273,9 @@ def test_without_an_activation_or_a_period_there_are_no_violations_to_count():
     assert isnan(observed("server.period_violations", late))
     assert observed("loop.period_violations", activations((0, 1))) == 0.0
     assert observed("loop.period_violations", activations((0, 1), (500, 501))) == 1.0
+    punctual = activations(*((100 * i, 100 * i + 1) for i in range(5)))
+    assert observed("loop.period_violations", punctual) == 0.0
+    assert observed("loop.period_violations", [*punctual[:2], punctual[0], *punctual[2:]]) == 0.0
 
 
 def test_missed_deadlines_are_none_only_where_there_are_deadlines():

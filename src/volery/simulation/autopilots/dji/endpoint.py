@@ -369,7 +369,7 @@ class DjiEndpoint:
         with self._kernel.guard:
             if self.is_active and all(isfinite(angle) for angle in angles):
                 relative = not mode & GimbalMode.ABSOLUTE
-                self.controller.gimbal.point(*wanted, message.ts, relative=relative)
+                self.controller.gimbal.point(wanted, message.ts, relative=relative)
 
     def _generic(self, message: Any) -> None:
         if len(message.axes) >= 5 and 0.0 <= message.axes[4] < 256.0:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from volery.base.frames import Vector
 from volery.base.time import Ns, from_seconds
 from volery.kernel.api import Kernel
@@ -31,23 +33,18 @@ class Gimbal:
         (r0, p0, y0), (r1, p1, y1) = self._from, self._to
         return r0 + share * (r1 - r0), p0 + share * (p1 - p0), y0 + share * (y1 - y0)
 
-    def point(
-        self, roll: float | None, pitch: float | None, yaw: float | None, seconds: float, *, relative: bool
-    ) -> None:
-        """Turn to angles within a time; ``None`` leaves an axis where it is.
+    def point(self, wanted: Sequence[float | None], seconds: float, *, relative: bool) -> None:
+        """Turn to angles within a time.
 
         Args:
-            roll: Roll.
-            pitch: Pitch, limited to that of the gimbal.
-            yaw: Yaw.
+            wanted: Roll, pitch and yaw; ``None`` leaves an axis where it is. The pitch is limited.
             seconds: Time to get there.
             relative: Whether the angles count from where the gimbal is.
         """
         here = self.angles()
         low, high = GIMBAL_PITCHES
-        wanted = [
-            now if angle is None else now * relative + angle
-            for now, angle in zip(here, (roll, pitch, yaw), strict=True)
-        ]
-        self._from, self._to = here, (wanted[0], min(high, max(low, wanted[1])), wanted[2])
+        roll, pitch, yaw = (
+            now if angle is None else now * relative + angle for now, angle in zip(here, wanted, strict=True)
+        )
+        self._from, self._to = here, (roll, min(high, max(low, pitch)), yaw)
         self._began, self._lasts = self._kernel.now(), max(0, from_seconds(seconds))

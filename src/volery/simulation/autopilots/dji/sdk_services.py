@@ -256,7 +256,7 @@ class Services:
         if done:
             wanted = (0.0, 0.0, 0.0) if request.is_reset else angles
             relative = request.rotationMode == 1 and not request.is_reset
-            self._controller.gimbal.point(*wanted, request.time, relative=relative)
+            self._controller.gimbal.point(wanted, request.time, relative=relative)
         kernel = self._controller.vehicle.kernel
         until = kernel.now() + GIMBAL_PERIOD
         return Reply(_response(_GIMBAL_TASK, done, NO_CODE), lambda: kernel.now() >= until)
