@@ -184,6 +184,8 @@ class ReportState:
     """Uptime at which operating hours were last stored [ns]."""
     contacts: int = 0
     """Number of touch-downs reported."""
+    gauge_offset_mah: float = 0.0
+    """Charge that the battery's gauge counts beyond what was drawn [mAh]."""
 
 
 @dataclass

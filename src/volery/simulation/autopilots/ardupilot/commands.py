@@ -8,6 +8,7 @@ from math import isfinite, isnan, pi, radians
 
 from volery.base.frames import wrap
 from volery.simulation.autopilots.ardupilot import payload
+from volery.simulation.autopilots.ardupilot.battery import on_battery_reset
 from volery.simulation.autopilots.ardupilot.fence import fence_admits, on_fence_enable
 from volery.simulation.autopilots.ardupilot.modes import (
     CRITICAL,
@@ -34,7 +35,7 @@ from volery.simulation.autopilots.mavlink.messages import (
     Handler,
     all_within,
 )
-from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE, MissionItem
+from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE, JUMP_TAG, MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 LOITER_UNLIMITED, RETURN, LAND, TAKEOFF = 17, 20, 21, 22
@@ -43,6 +44,7 @@ FLIGHT_TERMINATION, REPOSITION, PAUSE_CONTINUE, SET_YAW_SPEED, SET_MISSION_CURRE
 REPEAT_RELAY, REPEAT_SERVO, FENCE_ENABLE, RUN_PREARM_CHECKS = 182, 184, 207, 401
 ROI_LOCATION, ROI_NONE, ROI, MOTOR_TEST = 195, 197, 201, 209
 START_MAG_CAL, ACCEPT_MAG_CAL, CANCEL_MAG_CAL = 42424, 42425, 42426
+BATTERY_RESET, VTOL_LAND, JUMP_TO_TAG = 42651, 85, 601
 CALIBRATION, STORAGE, REBOOT, MISSION_START, ARM_DISARM, GET_HOME = 241, 245, 246, 300, 400, 410
 
 HIGHEST = 83_000.0
@@ -279,6 +281,20 @@ def on_set_current(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED if vehicle.choose_item(round(command.param1)) else DENIED
 
 
+LARGEST_TAG = 65_535
+
+
+def on_jump_to_tag(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_JUMP_TAG: make the first mission item JUMP_TAG with that number the current one."""
+    if not 0.0 <= command.param1 <= LARGEST_TAG:
+        return DENIED
+    tag = int(command.param1)
+    items = enumerate(vehicle.mission.items)
+    places = (place for place, item in items if item.command == JUMP_TAG and int(item.param1) == tag)
+    place = next(places, None)
+    return ACCEPTED if place is not None and vehicle.choose_item(place) else FAILED
+
+
 def on_calibration(vehicle: Vehicle, _command: Command) -> int:
     """Handle PREFLIGHT_CALIBRATION, PREFLIGHT_STORAGE and those of the compass: no effect while disarmed."""
     return FAILED if vehicle.armed else ACCEPTED
@@ -379,6 +395,8 @@ def shared_commands(
         ACCEPT_MAG_CAL: on_calibration,
         CANCEL_MAG_CAL: on_calibration,
         FENCE_ENABLE: on_fence_enable,
+        BATTERY_RESET: on_battery_reset,
+        JUMP_TO_TAG: on_jump_to_tag,
     }
 
 
@@ -390,6 +408,7 @@ def copter_commands(
         **shared_commands(problems, prearm, words, modes["GUIDED"]),
         TAKEOFF: on_takeoff,
         LAND: to_mode(modes["LAND"]),
+        VTOL_LAND: to_mode(modes["LAND"]),
         RETURN: to_mode(modes["RTL"]),
         LOITER_UNLIMITED: to_mode(modes["LOITER"]),
         CONDITION_YAW: on_condition_yaw,

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from functools import partial
 
 from volery.base.time import S, from_seconds
+from volery.simulation.autopilots.ardupilot.battery import left_mah, used_mah
 from volery.simulation.autopilots.ardupilot.modes import (
     COPTER_DISARMED,
     CRITICAL,
@@ -43,11 +44,10 @@ def _battery_below(vehicle: Vehicle, volts: str, charge: str) -> bool:
     parameters, estimate = vehicle.parameters, vehicle.estimate
     if vehicle.uptime() < 3 * S:
         return False
-    left = parameters["BATT_CAPACITY"] - estimate.battery_used_mah
     sagged = parameters[volts] > 0.0 and estimate.battery_volts < parameters[volts]
     if not sagged:
         vehicle.failsafes.true_since.pop(volts, None)
-        return parameters[charge] > 0.0 and left < parameters[charge]
+        return parameters[charge] > 0.0 and left_mah(vehicle) < parameters[charge]
     since = vehicle.failsafes.true_since.setdefault(volts, vehicle.kernel.now())
     return vehicle.kernel.now() - since >= from_seconds(parameters["BATT_LOW_TIMER"])
 
@@ -76,9 +76,8 @@ def estimator_lost(vehicle: Vehicle) -> bool:
 
 def _report_battery(vehicle: Vehicle, level: str) -> int:
     """Report a low or critical battery, and return the action of BATT_FS_LOW_ACT or BATT_FS_CRT_ACT."""
-    estimate = vehicle.estimate
-    used = estimate.battery_used_mah
-    vehicle.send_text(WARNING, f"Battery 1 is {level} {estimate.battery_volts:.2f}V used {used:.0f} mAh")
+    volts, used = vehicle.estimate.battery_volts, used_mah(vehicle)
+    vehicle.send_text(WARNING, f"Battery 1 is {level} {volts:.2f}V used {used:.0f} mAh")
     return round(vehicle.parameters["BATT_FS_LOW_ACT" if level == "low" else "BATT_FS_CRT_ACT"])
 
 

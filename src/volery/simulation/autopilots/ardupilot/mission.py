@@ -28,6 +28,7 @@ from volery.simulation.autopilots.onboard_mission import (
     GLOBAL_TERRAIN,
     GLOBAL_TERRAIN_INT,
     JUMP,
+    JUMP_TAG,
     LAND,
     LOITER_TIME,
     LOITER_TO_ALTITUDE,
@@ -71,9 +72,9 @@ NAMES = {
 }
 """Names of the items in the firmware's status texts."""
 
-KEPT_ONLY = frozenset({92, 94, 189, 195, 197, 201, 203, 205, 206, 182, 184, 207, 208, 212, 222})
+KEPT_ONLY = frozenset({92, 94, 189, 195, 197, 201, 203, 205, 206, 182, 184, 207, 208, 212, 222, JUMP_TAG})
 """Items that are stored and read back without effect: cameras, repeated servos and relays, fences, regions of
-interest, payload places and limits of GUIDED.
+interest, payload places, limits of GUIDED, and tags that only DO_JUMP_TAG looks for.
 """
 
 PLACED = frozenset(

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from volery.base.time import Ns, S
+from volery.simulation.autopilots.ardupilot.battery import left_mah
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED
 from volery.simulation.autopilots.onboard_mission import DELAY, TAKEOFF
@@ -66,8 +67,7 @@ def no_mission(vehicle: Vehicle) -> bool:
 def low_battery(vehicle: Vehicle) -> bool:
     """Return whether the battery is below BATT_ARM_VOLT or BATT_ARM_MAH."""
     volts, charge = vehicle.parameters["BATT_ARM_VOLT"], vehicle.parameters["BATT_ARM_MAH"]
-    left = vehicle.parameters["BATT_CAPACITY"] - vehicle.estimate.battery_used_mah
-    return 0.0 < vehicle.estimate.battery_volts < volts or left < charge
+    return 0.0 < vehicle.estimate.battery_volts < volts or left_mah(vehicle) < charge
 
 
 SHARED_CHECKS = (

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
 from volery.base.time import US, S
+from volery.simulation.autopilots.ardupilot.battery import used_mah
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.mavlink.messages import (
@@ -400,7 +401,7 @@ def _battery(vehicle: Vehicle) -> tuple[int, int, int]:
         return 0, -1, -1
     estimate = vehicle.estimate
     capacity = vehicle.parameters["BATT_CAPACITY"]
-    left = 1.0 - estimate.battery_used_mah / capacity if capacity > 0.0 else 0.0
+    left = 1.0 - used_mah(vehicle) / capacity if capacity > 0.0 else 0.0
     return (
         to_uint16(estimate.battery_volts * 1000.0),
         to_int16(estimate.battery_amps * 100.0),
@@ -417,7 +418,7 @@ def battery_status(vehicle: Vehicle) -> Fields:
         "temperature": 32_767,
         "voltages": (volts or NOT_THERE, *([NOT_THERE] * 9)),
         "current_battery": max(0, amps),
-        "current_consumed": int(estimate.battery_used_mah),
+        "current_consumed": int(used_mah(vehicle)),
         "energy_consumed": int(estimate.battery_energy_j / 100.0),
         "battery_remaining": left,
         "charge_state": 1,
