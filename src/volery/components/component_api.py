@@ -51,7 +51,11 @@ def now() -> float:
 
 
 def sleep(seconds: float) -> None:
-    """Block for ``seconds`` seconds of the run. This ends an activation."""
+    """Block for a time of the run. This ends an activation.
+
+    Args:
+        seconds: Duration, s.
+    """
     waiting.sleep(caller("volery.sleep()")[0], from_seconds(seconds))
 
 
@@ -93,6 +97,12 @@ def note(kind: str, subject: str, state: str, detail: str = "") -> None:
     """Record that something which the application follows has entered a state.
 
     For example ``note("parcel", "p-1", "ordered")``.
+
+    Args:
+        kind: Kind of thing.
+        subject: Its name.
+        state: State that it has entered.
+        detail: Text for the reader of the report.
     """
     kernel, task = caller("volery.note()")
     with kernel:
@@ -100,7 +110,15 @@ def note(kind: str, subject: str, state: str, detail: str = "") -> None:
 
 
 def log(text: str, severity: str = "info") -> None:
-    """Record a line of text; ``severity`` is error, warning, info or debug."""
+    """Record a line of text.
+
+    Args:
+        text: The line.
+        severity: ``error``, ``warning``, ``info`` or ``debug``.
+
+    Raises:
+        UsageError: There is no such severity.
+    """
     if severity not in SEVERITIES:
         raise UsageError(f"volery.log(severity={severity!r}): choose {', '.join(SEVERITIES)}")
     kernel, task = caller("volery.log()")

@@ -127,11 +127,19 @@ class Run:
         return self.completed and self.record.outcome.requirements_met is not False and not self.problems
 
     def arrays(self, vehicle: str) -> dict[str, NDArray[Any]]:
-        """Return the recorded states of a vehicle as numpy arrays by name; see ``vehicle_arrays``."""
+        """Return the recorded states of a vehicle as numpy arrays by name; see ``vehicle_arrays``.
+
+        Args:
+            vehicle: Name of the vehicle in the model.
+        """
         return vehicle_arrays(self.folder, vehicle)
 
     def to_pandas(self, vehicle: str) -> Any:
-        """Return the recorded states of a vehicle as a ``pandas.DataFrame`` with the index ``time_s``."""
+        """Return the recorded states of a vehicle as a ``pandas.DataFrame`` with the index ``time_s``.
+
+        Args:
+            vehicle: Name of the vehicle in the model.
+        """
         return to_frame(self.arrays(vehicle), INDEX)
 
 

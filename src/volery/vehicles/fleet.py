@@ -68,11 +68,19 @@ class Fleet(Mapping[str, Vehicle]):
         return _GroupOperation(self._kernel, asked, self._vehicles, function).run()
 
     def wait_ready(self, within: float = READY_WITHIN_S) -> None:
-        """Wait until each vehicle could arm and go to a position, at most *within* seconds."""
+        """Wait until each vehicle could arm and go to a position.
+
+        Args:
+            within: time-out, s.
+        """
         self.each(lambda vehicle: vehicle.wait_ready(within), "be ready")
 
     def takeoff(self, height: float) -> None:
-        """Take off with all drones, to *height* metres above the home of each; rovers stay."""
+        """Take off with all drones; rovers stay.
+
+        Args:
+            height: height above the home of each, m.
+        """
         asked = f"take off to {height:g} m"
         self.each(lambda one: one.takeoff(height) if isinstance(one, Drone) else None, asked)
 

@@ -486,7 +486,15 @@ class Vehicle(ServicedVehicle):
         self._operate("resume", "take the vehicle back", self._driver.hold, policy=TO_SAFETY)
 
     def upload_mission(self, mission: Sequence[MissionItem]) -> None:
-        """Replace the mission on board. Each leg is checked against limits and fence as a straight path."""
+        """Replace the mission on board. Each leg is checked against limits and fence as a straight path.
+
+        Args:
+            mission: its items, in the order in which they are flown.
+
+        Raises:
+            UsageError: it is empty.
+            OutOfBounds: a leg leaves limits or fence.
+        """
         self._connect(Capability.MISSION)
         items = list(mission)
         if not items:
