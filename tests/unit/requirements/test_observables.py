@@ -283,3 +283,9 @@ def test_missed_deadlines_are_none_only_where_there_are_deadlines():
     for count in (1, 2, 3):
         met = activations(*((100 * i, 100 * i + 5) for i in range(count)), deadline=5)
         assert observed("loop.deadline_misses", met) == 0.0
+
+
+def test_time_starts_at_exactly_nothing():
+    assert observed("loop.cpu_time", []) == 0.0
+    assert observed("onboard.utilisation", []) == 0.0
+    assert observed("loop.activations", []) == 0.0

@@ -356,3 +356,12 @@ def test_a_trace_is_complete_only_with_its_end_and_its_last_bytes(tmp_path: Path
         assert trace.lost.startswith("the writer never finished")
     path.write_bytes(whole[: len(whole) // 2] + whole[-8:])
     assert not read(path).complete
+
+
+def test_the_file_is_closed_at_the_end(tmp_path: Path) -> None:
+    path = tmp_path / "trace.mcap"
+    write_sample(path, seconds=1.0)
+    with Reading(path) as reading:
+        list(reading.events())
+        assert not reading._file.closed
+    assert reading._file.closed

@@ -38,8 +38,8 @@ class SimulatedFleet:
     """Simulated vehicles in one world, by name, in the order of the model.
 
     System ids count from 1, except for the vehicles in *systems*. The links of the vehicles in
-    *through_bytes* can be given faults: see ``faulty_links``. With *logging* the autopilots keep logs of their
-    flights.
+    *through_bytes* can be given faults: see ``faulty_links``. With *logging* the autopilots keep
+    logs of their flights.
     """
 
     def __init__(
