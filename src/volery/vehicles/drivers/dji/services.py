@@ -89,7 +89,10 @@ class DjiServices:
     # -- what the node does not offer
 
     def _unsupported(self, what: str) -> CapabilityError:
-        return CapabilityError(f"{self._name}: {what}: the SDK node of a DJI offers gimbal and camera only")
+        return CapabilityError(
+            f"{self._name}: {what}: the SDK node of a DJI offers gimbal and camera only; "
+            "an ArduPilot or PX4 offers it, over MAVLink or MAVROS"
+        )
 
     def parameter_name(self, name: str) -> str:
         """Raise ``CapabilityError``."""
