@@ -128,6 +128,10 @@ class OutputState:
     """Pulse widths [us] by channel, from 1."""
     relays: set[int] = field(default_factory=set)
     """Relays that are on, from 0."""
+    repeated: tuple[str, int] | None = None
+    """Kind and number of the output that changes by itself."""
+    repetitions: int = 0
+    """Number of the last order to change an output repeatedly."""
 
 
 @dataclass

@@ -383,7 +383,7 @@ def shared_commands(
         REBOOT: on_reboot,
         RUN_PREARM_CHECKS: partial(on_prearm_checks, problems=prearm),
         payload.SET_SERVO: payload.on_set_servo,
-        REPEAT_SERVO: payload.on_set_servo,
+        REPEAT_SERVO: payload.on_repeat_servo,
         payload.SET_RELAY: payload.on_set_relay,
         REPEAT_RELAY: payload.on_repeat_relay,
         ROI: on_region,

@@ -6,7 +6,9 @@ an output: its state shows in telemetry and in SIM_PIN_MASK.
 
 from __future__ import annotations
 
-from volery.base.time import S
+from collections.abc import Callable
+
+from volery.base.time import MS, S, from_seconds
 from volery.simulation.autopilots.ardupilot.modes import INFO
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, boot_ms
 from volery.simulation.autopilots.onboard_mission import MissionItem
@@ -21,20 +23,33 @@ RELAY_FUNCTION = 1
 
 LONGEST_PULSE = 65_535
 
+CHANGES_EVERY = 20 * MS
+"""Shortest time between two changes of a repetition."""
+LONGEST_PERIOD, MOST_PERIODS = 86_400.0, 16_383.0
+"""Period [s] and number of periods to which a repetition is limited."""
+
 LET_GO, GRAB = 0, 1
 """Values of param2 of DO_GRIPPER."""
 GRIPS_WITHIN = 2 * S
 """Time of a servo gripper from the command to the report of its end."""
 
 
-def set_servo(vehicle: Vehicle, channel: int, pulse: int) -> bool:
-    """Give a channel that drives nothing else a pulse width [us], and return whether there is one."""
+def _is_free(vehicle: Vehicle, channel: int, pulse: int) -> bool:
+    """Return whether there is such a pulse width [us], and a channel that drives nothing else."""
     function = f"SERVO{channel}_FUNCTION"
     if function not in vehicle.parameters or not 0 <= pulse <= LONGEST_PULSE:
         return False
     if vehicle.parameters[function]:
         vehicle.send_text(INFO, f"ServoRelayEvent: Channel {channel} is already in use")
         return False
+    return True
+
+
+def set_servo(vehicle: Vehicle, channel: int, pulse: int) -> bool:
+    """Give a channel that drives nothing else a pulse width [us], and return whether there is one."""
+    if not _is_free(vehicle, channel, pulse):
+        return False
+    _stop_repeating(vehicle, ("servo", channel))
     vehicle.outputs.servos[channel] = pulse
     return True
 
@@ -55,15 +70,19 @@ def set_relay(vehicle: Vehicle, number: int, state: int) -> bool:
     """
     if not has_relay(vehicle, number):
         return False
+    _stop_repeating(vehicle, ("relay", number))
+    _write_relay(vehicle, number, bool(state) if state in (0, 1) else number not in vehicle.outputs.relays)
+    return True
+
+
+def _write_relay(vehicle: Vehicle, number: int, on: bool) -> None:
     relays = vehicle.outputs.relays
-    on = bool(state) if state in (0, 1) else number not in relays
     (relays.add if on else relays.discard)(number)
     pin = f"RELAY{number + 1}_PIN"
     if pin in vehicle.parameters and vehicle.parameters[pin] >= 0.0:
         bit = 1 << round(vehicle.parameters[pin])
         mask = round(vehicle.parameters["SIM_PIN_MASK"])
         vehicle.parameters.set("SIM_PIN_MASK", float(mask | bit if on else mask & ~bit))
-    return True
 
 
 def relay_status(vehicle: Vehicle) -> Fields:
@@ -86,7 +105,7 @@ def move_gripper(vehicle: Vehicle, action: int) -> bool:
 
 
 def on_set_servo(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_SET_SERVO and DO_REPEAT_SERVO."""
+    """Handle DO_SET_SERVO."""
     return ACCEPTED if set_servo(vehicle, round(command.param1), round(command.param2)) else FAILED
 
 
@@ -95,12 +114,71 @@ def on_set_relay(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED if set_relay(vehicle, round(command.param1), round(command.param2)) else FAILED
 
 
+def _repeat(
+    vehicle: Vehicle, output: tuple[str, int], times: float, period: float, change: Callable[[int], None]
+) -> None:
+    """Change an output twice in each period, at once for the first time; it replaces an earlier repetition.
+
+    Args:
+        vehicle: The vehicle.
+        output: Kind and number of the output.
+        times: Number of periods; without end if negative.
+        period: Duration of a period [s].
+        change: Called with the number of changes left, which is even for the first half of a period.
+    """
+    outputs, every = (
+        vehicle.outputs,
+        max(CHANGES_EVERY, from_seconds(min(max(0.0, period), LONGEST_PERIOD)) // 2),
+    )
+    outputs.repeated = output
+    outputs.repetitions += 1
+    this = outputs.repetitions
+
+    def go_on(left: int) -> None:
+        if (
+            not left
+            or vehicle.outputs is not outputs
+            or (outputs.repetitions, outputs.repeated) != (this, output)
+        ):
+            return
+        change(left)
+        vehicle.kernel.call_at(vehicle.kernel.now() + every, lambda: go_on(left - 1))
+
+    go_on(2 * round(min(max(times, -1.0), MOST_PERIODS)))
+
+
+def _stop_repeating(vehicle: Vehicle, output: tuple[str, int]) -> None:
+    if vehicle.outputs.repeated == output:
+        vehicle.outputs.repeated = None
+
+
 def on_repeat_relay(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_REPEAT_RELAY: an even number of changes leaves the relay as it was."""
-    number, times = round(command.param1), round(command.param2)
+    """Handle DO_REPEAT_RELAY: param2 on and off cycles of param3 seconds each."""
+    number = round(command.param1)
     if not has_relay(vehicle, number):
         return FAILED
-    return ACCEPTED if times % 2 == 0 or set_relay(vehicle, number, state=2) else FAILED
+    _repeat(
+        vehicle,
+        ("relay", number),
+        command.param2,
+        command.param3,
+        lambda _left: _write_relay(vehicle, number, number not in vehicle.outputs.relays),
+    )
+    return ACCEPTED
+
+
+def on_repeat_servo(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_REPEAT_SERVO: param3 cycles of param4 seconds between pulse width param2 and the trim."""
+    channel, pulse = round(command.param1), round(command.param2)
+    if not _is_free(vehicle, channel, pulse):
+        return FAILED
+    trim = round(vehicle.parameters[f"SERVO{channel}_TRIM"])
+
+    def change(left: int) -> None:
+        vehicle.outputs.servos[channel] = trim if left % 2 else pulse
+
+    _repeat(vehicle, ("servo", channel), command.param3, command.param4, change)
+    return ACCEPTED
 
 
 def on_gripper(vehicle: Vehicle, command: Command) -> int:

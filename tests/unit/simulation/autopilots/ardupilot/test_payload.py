@@ -66,3 +66,45 @@ def test_a_switch_moves_the_gripper(station: Any) -> None:
         rig.vehicle.rc.transmitter[8] = pulse
         rig.run(0.5)
         assert (said in rig.texts()[count:]) == (said is not None)
+
+
+REPEAT_RELAY, SET_SERVO, REPEAT_SERVO = 182, 183, 184
+
+
+def over_time(rig: Any, of: Any) -> list[Any]:
+    """Return the values of *of* at the middle of four halves of a period of 1 s."""
+    values = []
+    rig.run(0.25)
+    for _ in range(4):
+        values.append(of())
+        rig.run(0.5)
+    return values
+
+
+def test_a_repeated_relay_goes_on_and_off_and_ends_as_it_was(station: Any) -> None:
+    rig = station("rover", parameters={"RELAY1_FUNCTION": 1})
+    assert rig.command(REPEAT_RELAY, 0, 1, 1.0) == ACCEPTED
+    assert over_time(rig, lambda: 0 in rig.vehicle.outputs.relays) == [True, False, False, False]
+    assert rig.command(REPEAT_RELAY, 0, -1, 1.0) == ACCEPTED  # without end
+    rig.run(20.0)
+    assert over_time(rig, lambda: 0 in rig.vehicle.outputs.relays) in ([True, False] * 2, [False, True] * 2)
+    assert rig.command(RELAY, 0, 1) == ACCEPTED  # ends the repetition
+    assert over_time(rig, lambda: 0 in rig.vehicle.outputs.relays) == [True] * 4
+    assert rig.command(REPEAT_RELAY, 3, 1, 1.0) == FAILED
+
+
+def test_a_repeated_servo_goes_to_its_pulse_and_back_to_the_trim(station: Any) -> None:
+    rig = station("rover", parameters={"SERVO11_TRIM": 1400})
+    assert rig.command(REPEAT_SERVO, 11, 1700, 2, 1.0) == ACCEPTED
+    assert over_time(rig, lambda: rig.vehicle.outputs.servos[11]) == [1700, 1400, 1700, 1400]
+    assert rig.command(REPEAT_SERVO, 11, 1700, 5, 1.0) == ACCEPTED
+    assert rig.command(SET_SERVO, 11, 1200) == ACCEPTED  # ends the repetition
+    assert over_time(rig, lambda: rig.vehicle.outputs.servos[11]) == [1200] * 4
+
+
+def test_a_reboot_ends_a_repetition(station: Any) -> None:
+    rig = station("rover", parameters={"RELAY1_FUNCTION": 1})
+    assert rig.command(REPEAT_RELAY, 0, -1, 1.0) == ACCEPTED
+    assert rig.command(246, 1) == ACCEPTED
+    rig.run(0.1)
+    assert over_time(rig, lambda: 0 in rig.vehicle.outputs.relays) == [False] * 4
