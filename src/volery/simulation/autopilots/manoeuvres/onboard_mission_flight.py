@@ -202,7 +202,8 @@ class FlyMission(Manoeuvre):
                 return
             index = self._act(index, item)
         plan.complete = True
-        plan.current = 0
+        if not self._rules.restarts:
+            plan.current = 0
         self.target, self.landing, self.taking_off = None, False, False
         after = self._rules.ended(vehicle)
         if after is not None:
