@@ -283,7 +283,7 @@ def test_after_the_last_waypoint_it_stays(bench: Any) -> None:
     assert rig.vehicle.mission.complete
     assert rig.height == pytest.approx(5.0, abs=0.5)
     assert rig.vehicle.estimate.position[0] == pytest.approx(10.0, abs=1.5)
-    assert rig.latest["MISSION_CURRENT"]["seq"] == 2
+    assert rig.vehicle.mission.current == 2
 
 
 def test_another_item_can_be_chosen_in_flight(bench: Any) -> None:
