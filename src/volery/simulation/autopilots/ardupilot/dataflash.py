@@ -25,12 +25,12 @@ _CODES = {
     "I": "I",
     "L": "i",
     "H": "H",
+    "M": "B",
     "c": "h",
     "N": "16s",
     "Z": "64s",
     "n": "4s",
 }
-_CODES |= {"M": "B"}
 """Format letters of DataFlash to those of ``struct``."""
 
 
