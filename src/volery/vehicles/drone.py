@@ -385,6 +385,7 @@ class Drone(Vehicle):
         if telemetry.last_message_ns < 0:
             return "never sent a message"
         self._wait_for_link()
+        self._executor.wait_for_interrupted()
         if self._acts_by_itself():
             with self.kernel:
                 self._driver.stop()

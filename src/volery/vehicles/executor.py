@@ -34,6 +34,8 @@ RECENT_TEXT_S = 3.0
 CLOCKS_COMPARED_AFTER: Ns = 5 * S
 CLOCK_TOLERANCE = 0.25
 """Share by which the clocks of vehicle and program may differ before that of the vehicle counts."""
+INTERRUPTED_SHOWS_AFTER: Ns = 3 * S
+"""Time after which a command that was interrupted on its way shows: two heartbeats and a delay."""
 LINK_TIMEOUT: Ns = 5 * S
 """Time without a message after which the link counts as lost: five missed heartbeats."""
 
@@ -137,6 +139,7 @@ class StepExecutor:
         self._claim = 0  # counts aborts; steps begun under an earlier claim end
         self._successor = ""  # what aborted the steps in progress
         self._taking_back = False  # from a failsafe that a stream of this program has caused
+        self._interrupted_ns: Ns | None = None  # when Ctrl-C or SIGTERM ended a sequence
 
     def execute(
         self,
@@ -164,7 +167,11 @@ class StepExecutor:
         """
         undone = ""
         for _ in range(restarts + 1):
-            undone = self._execute_once(asked, plan(), check)
+            try:
+                undone = self._execute_once(asked, plan(), check)
+            except (KeyboardInterrupt, SystemExit):
+                self._interrupted_ns = self._kernel.now()
+                raise
             if not undone:
                 return
         times = f" before lift-off, each time it was started over ({restarts} times)" if restarts else ""
@@ -295,6 +302,14 @@ class StepExecutor:
                 return False
             cycle()
         return True
+
+    def wait_for_interrupted(self) -> None:
+        """Wait until a command that was interrupted on its way would show: it may have armed the vehicle."""
+        since, self._interrupted_ns = self._interrupted_ns, None
+        telemetry = self._driver.telemetry
+        if since is not None and not telemetry.armed:
+            within = since + INTERRUPTED_SHOWS_AFTER - self._kernel.now()
+            self.wait(lambda: telemetry.armed, max(0, within))
 
     def report_clock(self, rate: float) -> None:
         """Record once that the vehicle's clock runs *rate* times as fast, and whose seconds count where."""

@@ -116,6 +116,7 @@ class Rover(Vehicle):
         if telemetry.last_message_ns < 0:
             return "never sent a message"
         self._wait_for_link()
+        self._executor.wait_for_interrupted()
         with self.kernel:
             self._driver.stop()
         if not telemetry.armed:

@@ -25,6 +25,7 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import sleep
 from volery.trace.events import LinkState, Operation, Text
 from volery.vehicles import ChangeSpeed, Fence, Limits, ReturnHome, TakeOff, Waypoint, Zone
+from volery.vehicles.driver import Step
 
 Make = Callable[..., Any]
 LATITUDE, LONGITUDE = -35.363261, 149.16523
@@ -620,6 +621,31 @@ def test_the_end_of_a_program_lands_it(bench: Make) -> None:
 def test_the_end_of_a_program_disarms_it_on_the_ground(bench: Make) -> None:
     at = bench()
     assert at.fly(lambda drone: (drone.arm(), drone.come_to_rest())[1]) == "was disarmed on the ground"
+    assert not at.craft.armed
+
+
+@pytest.mark.parametrize("interruption", [KeyboardInterrupt, SystemExit])
+def test_one_that_armed_at_the_moment_of_an_interruption_is_disarmed(
+    bench: Make, interruption: type[BaseException]
+) -> None:
+    """The heartbeat that shows it comes after the program has begun to end."""
+    at = bench()
+
+    def mission(drone: Any) -> str:
+        drone.wait_ready()
+        send = drone._driver.arm()[0].send
+
+        def interrupted() -> None:
+            send()
+            raise interruption
+
+        drone._driver.arm = lambda: [Step(ask="arm", send=interrupted, done=lambda _: False, within=S)]
+        with pytest.raises(interruption):
+            drone.arm()
+        assert not drone._driver.telemetry.armed
+        return str(drone.come_to_rest())
+
+    assert at.fly(mission) == "was disarmed on the ground"
     assert not at.craft.armed
 
 
