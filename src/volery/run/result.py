@@ -17,7 +17,7 @@ from volery.kernel.api import Kernel
 from volery.run.event_log import LogOptions
 from volery.run.vehicle_arrays import INDEX, vehicle_arrays
 from volery.trace.events import Event, Milestone, Text
-from volery.vehicles.vehicle import ON_LINK_LOSS
+from volery.vehicles.observed_vehicle import ON_LINK_LOSS
 
 if TYPE_CHECKING:
     from volery.requirements.record import RunRecord

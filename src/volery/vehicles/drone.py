@@ -8,11 +8,12 @@ from volery.base.errors import OutOfBounds, Refused, UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S, from_seconds
+from volery.vehicles.bounded_vehicle import path_timeout, travel_timeout
 from volery.vehicles.driver import Acceleration, AttitudeTarget, Capability, ManualControl
 from volery.vehicles.executor import LANDING, NO_GOAL, RESTARTS, STREAM, TO_SAFETY, TRAVEL, TURN, Goal
 from volery.vehicles.limits import height_violation
 from volery.vehicles.telemetry import Velocity
-from volery.vehicles.vehicle import Vehicle, path_timeout, travel_timeout
+from volery.vehicles.vehicle import Vehicle
 
 VELOCITY_LASTS_S = 3.0
 SETPOINT_LASTS_S = 1.0

@@ -6,16 +6,13 @@ go on beside an operation of another task.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from volery.base.errors import CapabilityError, Refused, UsageError
-from volery.base.position import Position
 from volery.base.time import MS, Ns, S, from_seconds
-from volery.kernel.api import Handle, Kernel
+from volery.kernel.api import Handle
 from volery.kernel.waiting import sleep
-from volery.vehicles.driver import Driver
-from volery.vehicles.executor import StepExecutor
+from volery.vehicles.bounded_vehicle import BoundedVehicle
 from volery.vehicles.onboard_logs import OnboardLogs
 from volery.vehicles.onboard_plan import OnboardPlan
 from volery.vehicles.parameters import Parameters
@@ -31,21 +28,8 @@ DOWN_AFTER: Ns = 1500 * MS
 """Silence that shows the restart: heartbeats arrive each second."""
 
 
-class ServicedVehicle(ABC):
+class ServicedVehicle(BoundedVehicle):
     """State over time and services of a vehicle; see ``Vehicle``."""
-
-    name: str
-    kernel: Kernel
-    _driver: Driver
-    _executor: StepExecutor
-
-    @abstractmethod
-    def _connect(self) -> None:
-        """Wait for the first message."""
-
-    @abstractmethod
-    def _check_leg(self, asked: str, place: Position) -> None:
-        """Raise ``OutOfBounds`` if *place* is out of bounds."""
 
     def _services(self, what: str) -> Services:
         """Return the services; raise ``CapabilityError`` where there is no *what*."""

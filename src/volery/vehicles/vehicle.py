@@ -1,4 +1,4 @@
-"""What drones and rovers share: state, readiness, missions, and how every operation is carried out.
+"""What drones and rovers share: readiness, missions, and how every operation is carried out.
 
 Every call is an interaction point. An operation blocks until telemetry shows that it is done; it has a
 time-out, and an error names the vehicle, the operation, the autopilot's own text and the remedy. One
@@ -24,18 +24,15 @@ ground the vehicle is disarmed instead.
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import hypot, isfinite
+from math import isfinite
 
 from volery.base.errors import (
     CapabilityError,
     ControlLost,
-    LinkLost,
-    LinkSilent,
     LowBattery,
-    NotArrived,
     OffTrack,
     OutOfBounds,
     PositionLost,
@@ -45,24 +42,13 @@ from volery.base.errors import (
     VehicleError,
     VoleryError,
 )
-from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
-from volery.base.time import MINUTE, MS, Ns, S, from_seconds, to_seconds
+from volery.base.position import Position
+from volery.base.time import Ns, S, from_seconds, to_seconds
 from volery.kernel.api import Handle, Kernel
 from volery.kernel.task import ExecutionContext, Task
-from volery.trace.events import Operation, Text
+from volery.trace.events import Operation
 from volery.vehicles.battery_monitor import low_battery
-from volery.vehicles.driver import (
-    Capability,
-    Driver,
-    Land,
-    ManualControl,
-    MissionItem,
-    ReturnHome,
-    Step,
-    TakeOff,
-    Waypoint,
-    item_problem,
-)
+from volery.vehicles.driver import Capability, Driver, ManualControl, MissionItem, Step
 from volery.vehicles.escalation import Escalation, Reaction, escalate
 from volery.vehicles.executor import (
     FLY_MISSION,
@@ -79,53 +65,19 @@ from volery.vehicles.executor import (
     Check,
     Goal,
     OperationPolicy,
-    StepExecutor,
     distance_to,
 )
 from volery.vehicles.flight_monitor import FlightMonitor
-from volery.vehicles.limits import (
-    Bounds,
-    Fence,
-    Limits,
-    Path,
-    is_number,
-    states_amsl,
-)
+from volery.vehicles.limits import Fence, Limits
+from volery.vehicles.observed_vehicle import LINK_RETURN_S
 from volery.vehicles.serviced_vehicle import ServicedVehicle
-from volery.vehicles.telemetry import (
-    REFRESHED_AFTER,
-    Attitude,
-    Battery,
-    StatusText,
-    Telemetry,
-    Velocity,
-    describe_state,
-)
 
-FIRST_MESSAGE_WITHIN_S = 10.0
 READY_WITHIN_S = 120.0
 MISSION_WITHIN_S = 3600.0
 BATTERY_MEASURED_WITHIN_S = 10.0
-LINK_RETURN_S = 30.0
-"""How long the end of a program waits for a lost link."""
-
-SAID_AFTER: Ns = 5 * S
-SAID_AGAIN_AFTER: Ns = 15 * S
-"""Times after which a wait for a position is reported."""
-
-ASK_PERIOD: Ns = 500 * MS
-ASK_FOR: Ns = MINUTE
-"""An autopilot that has not sent its parameters after this time will not send them."""
-ON_LINK_LOSS = "if this program stops sending"
-"""Beginning of the recorded line that states the vehicle's reaction to a lost link."""
 
 MANUAL_CONTROL_FRESH: Ns = S
 """Manual flight does not begin with an older sample of manual control."""
-
-SLOWEST_TRAVEL = 2.5
-"""Speed over ground, m/s, that a time-out assumes where no speed is stated."""
-SLOWEST_CLIMB = 0.5
-MARGIN_S = 30.0
 
 _MONITORED = (OutOfBounds, OffTrack, LowBattery, PositionLost, ThrustSaturated)
 """Errors of monitors to which the vehicle reacts."""
@@ -134,25 +86,7 @@ Truth = Callable[[], Position]
 """The true position (AMSL) of a simulated vehicle: for recorded errors, never for the operations."""
 
 
-def travel_timeout(distance: float, climb: float, speed: float | None = None) -> Ns:
-    """Return the time-out of a movement: half the speed, a climb rate of 0.5 m/s, and a margin.
-
-    Args:
-        distance: horizontal distance, m.
-        climb: difference of height, m.
-        speed: speed over ground, m/s; ``None`` means the autopilot's own.
-    """
-    across = distance / (speed / 2.0 if speed is not None else SLOWEST_TRAVEL)
-    return from_seconds(MARGIN_S + across + abs(climb) / SLOWEST_CLIMB)
-
-
-def path_timeout(path: Path, speed: float | None) -> Ns:
-    """Return the time-out of a movement along a straight path at *speed* m/s."""
-    start, end = path
-    return travel_timeout(hypot(end[0] - start[0], end[1] - start[1]), end[2] - start[2], speed)
-
-
-class Vehicle(ServicedVehicle):
+class Vehicle(ServicedVehicle, ABC):
     """A vehicle behind a driver. Use ``Drone`` or ``Rover``.
 
     Limits and fence are checked before anything is sent and at each position report while the vehicle
@@ -170,8 +104,6 @@ class Vehicle(ServicedVehicle):
         link_timeout: time without a message after which the link counts as lost, ns.
     """
 
-    kind = ""
-
     def __init__(
         self,
         kernel: Kernel,
@@ -183,255 +115,16 @@ class Vehicle(ServicedVehicle):
         truth: Truth | None = None,
         link_timeout: Ns = LINK_TIMEOUT,
     ) -> None:
-        self.name = name
-        self.kernel = kernel
-        self.limits = limits or Limits()
-        self.fence = fence
-        self._driver = driver
-        driver.telemetry.detects_silence = driver.cycle is None
-        self._executor = StepExecutor(kernel, driver, link_timeout)
+        super().__init__(kernel, name, driver, link_timeout, limits or Limits(), fence)
         self.escalation = Escalation()
         self._flight_monitor = FlightMonitor(kernel, driver.telemetry)
         self._truth = truth
-        self._supported: frozenset[Capability] = frozenset()  # as known once the vehicle was connected
-        self._bounds: Bounds | None = None
         self._in_progress: tuple[Task | None, str] | None = None
         self._monitor: Handle | None = None  # monitors what goes on after a call has returned
         self._straying: VehicleError | None = None  # the same, while the vehicle is being held for it
         self._bounds_error: VehicleError | None = None  # found by the monitor; raised by the next call
-        self._link_loss_query: Handle | None = None
         self._manual_control_at: Ns | None = None
         self._mission: Sequence[MissionItem] = ()  # on board, if this program has uploaded it
-
-    # -- state, as last reported by the autopilot
-
-    @property
-    def position(self) -> Position:
-        """Position (AMSL) estimated by the autopilot. Raises ``VehicleError`` before the first estimate."""
-        return self._known("its position", self._poll().position)
-
-    @property
-    def home(self) -> Position:
-        """Home position (AMSL), where it would return to. ArduPilot sets it anew each time it arms."""
-        return self._known("its home", self._poll().home)
-
-    @property
-    def altitude(self) -> AboveHome:
-        """Altitude above home. Raises ``VehicleError`` before the first estimate."""
-        telemetry = self._poll()
-        self._known("its altitude", telemetry.position)
-        return AboveHome(telemetry.above_home)
-
-    @property
-    def velocity(self) -> Velocity:
-        """Velocity over ground: north, east, up in m/s; NaN before the first estimate."""
-        return self._poll().velocity
-
-    @property
-    def attitude(self) -> Attitude:
-        """Roll, pitch and heading in degrees; NaN for values that the autopilot does not send.
-
-        Over MAVROS the first call subscribes to ``imu/data`` and waits for it.
-        """
-        self._poll()
-        self._driver.request_attitude()
-        return self._poll().attitude
-
-    @property
-    def battery(self) -> Battery:
-        """Remaining share 0..1, volts, amperes; NaN for values that are not measured."""
-        return self._poll().battery
-
-    @property
-    def mode(self) -> str:
-        """Flight mode by the autopilot's own name."""
-        return self._poll().mode
-
-    @property
-    def status(self) -> str:
-        """System status in MAVLink's terms: standby, active, critical ..."""
-        return self._poll().status
-
-    @property
-    def armed(self) -> bool:
-        """Whether the motors may turn."""
-        return self._poll().armed
-
-    @property
-    def ready(self) -> bool:
-        """Whether the vehicle could arm now and go to a position."""
-        return self._poll().ready
-
-    @property
-    def stale(self) -> bool:
-        """Whether the state below may be old: position, mode and all else are those before a silence.
-
-        It is True from 2 s after the last message until 2 s after messages have returned, because a link that
-        stalls delivers late what it has held back.
-        """
-        return self._poll().stale
-
-    @property
-    def texts(self) -> list[StatusText]:
-        """Last status texts of the autopilot, oldest first."""
-        return list(self._poll().texts)
-
-    @property
-    def telemetry(self) -> Telemetry:
-        """All telemetry, for code that passes it on."""
-        return self._poll()
-
-    @property
-    def capabilities(self) -> frozenset[Capability]:
-        """Operations that the vehicle supports; empty before the first message."""
-        with self.kernel:
-            return self._driver.capabilities
-
-    @property
-    def on_link_loss(self) -> str:
-        """Reaction to a lost link in one line, from the parameters; empty until these are known."""
-        self._poll()
-        with self.kernel:
-            return self._driver.on_link_loss()
-
-    def _poll(self) -> Telemetry:
-        """Process received messages and return the telemetry."""
-        if self._driver.cycle is not None:
-            self._driver.poll()
-        with self.kernel:
-            return self._driver.telemetry
-
-    def _known(self, what: str, value: Position | None) -> Position:
-        if value is None:
-            raise self._unknown(what)
-        return value
-
-    def _unknown(self, what: str) -> VehicleError:
-        return VehicleError(self.name, what, "the autopilot does not know it yet; wait_ready() first")
-
-    # -- link
-
-    def wait_connected(self, within: float = FIRST_MESSAGE_WITHIN_S) -> None:
-        """Wait for the first message of the autopilot.
-
-        Args:
-            within: longest time to wait, s.
-
-        Raises:
-            LinkSilent: nothing was received.
-            LinkGarbled: something else was received; the error says what.
-            CapabilityError: the vehicle is of another kind, or its firmware is not supported.
-        """
-        telemetry = self._driver.telemetry
-
-        def connected() -> bool:
-            return telemetry.last_message_ns >= 0 and self._driver.problem() is None
-
-        with self.kernel.joined():
-            is_connected = self._executor.wait(connected, from_seconds(within))
-        if not is_connected:
-            with self.kernel:
-                problem = self._driver.problem()
-            if problem is not None:
-                raise type(problem)(f"{self.name}: {problem}")
-            raise LinkSilent(f"{self.name}: no message was received within {within:g} s")
-        if not telemetry.kind:
-            telemetry.kind = self.kind  # MAVROS does not report the kind of vehicle
-            self._poll()  # the kind changes how messages are decoded
-        if telemetry.kind != self.kind:
-            raise CapabilityError(f"{self.name} is a {telemetry.kind}, not a {self.kind}")
-        self._record_link_loss_reaction()
-
-    def wait_located(self, within: float, tell: Callable[[str], object] | None = None) -> None:
-        """Wait until the autopilot reports position and home.
-
-        Args:
-            within: longest time to wait, s; 0 does not wait.
-            tell: receives what is missing, every few seconds.
-
-        Raises:
-            NotArrived: they are not known in time; the error names what is missing and what its GPS reports.
-        """
-        if within == 0.0 or not self._missing_place():
-            return
-        began = self.kernel.now()
-        until, say_after = began + from_seconds(within), SAID_AFTER
-        with self.kernel.joined():
-            while self._missing_place():
-                now = self.kernel.now()
-                if now >= until:
-                    what = f"{self._missing_place()} within {within:g} s; a wait of 0 s does not need it"
-                    raise NotArrived(self.name, "connect", what)
-                self._executor.wait(lambda: not self._missing_place(), min(until - now, say_after))
-                missing, say_after = self._missing_place(), SAID_AGAIN_AFTER
-                if missing and tell is not None:
-                    tell(f"{self.name}: {missing} after {to_seconds(self.kernel.now() - began):.0f} s")
-
-    def _missing_place(self) -> str:
-        """Return what of position and home the autopilot does not report, in words; empty for nothing."""
-        seen = self._poll()
-        missing = [
-            name for name, known in (("position", seen.position), ("home", seen.home)) if known is None
-        ]
-        if not missing:
-            return ""
-        gps = f"its GPS reports {seen.fix or 'nothing'}, {seen.satellites} satellites"
-        return f"it has not reported its {' and its '.join(missing)} ({gps})"
-
-    def _record_link_loss_reaction(self) -> None:
-        """Record the reaction to a lost link as soon as it is known, without blocking."""
-        if self._link_loss_query is not None:
-            return
-        until = self.kernel.now() + ASK_FOR
-
-        def ask() -> None:
-            line = self._driver.on_link_loss()
-            if line:
-                self.kernel.record(Text(self.kernel.now(), self.name, 6, f"{ON_LINK_LOSS}: {line}"))
-            if line or self.kernel.now() >= until:
-                query.cancel()
-
-        with self.kernel.guard:
-            self._link_loss_query = query = self.kernel.every(ASK_PERIOD, ask)
-
-    def _connect(self, capability: Capability | None = None) -> None:
-        """Process received messages; wait for the first one if there was none.
-
-        Args:
-            capability: what the vehicle must be able to do; ``CapabilityError`` if it cannot.
-        """
-        telemetry = self._poll()
-        if telemetry.last_message_ns < 0 or telemetry.kind != self.kind:
-            self.wait_connected()
-        if capability is None:
-            return
-        problem = self._driver.problem()
-        if isinstance(problem, CapabilityError):
-            raise CapabilityError(f"{self.name}: {problem}")
-        if capability not in self._supported:
-            capabilities = self._driver.capabilities
-            if capability not in capabilities:
-                can = ", ".join(sorted(each.value for each in capabilities))
-                raise CapabilityError(f"{self.name} cannot {capability.value}; it can {can}")
-            self._supported |= capabilities
-
-    def _wait_for_link(self) -> None:
-        """If the link is or was lost, give it time to return and telemetry time to become fresh."""
-        telemetry = self._driver.telemetry
-        if not telemetry.stale and not self._executor.link_lost():
-            return
-        if not self._executor.wait(
-            lambda: not (telemetry.stale or self._executor.link_lost()), from_seconds(LINK_RETURN_S)
-        ):
-            raise LinkLost(
-                f"{self.name}: the link did not return; it is unknown whether it has come to rest; last: "
-                f"{describe_state(telemetry)}{', FLYING' if telemetry.flying else ''}, {self._reaction()}"
-            )
-        if not telemetry.detects_silence:
-            self._executor.wait(lambda: False, REFRESHED_AFTER)
-
-    def _reaction(self) -> str:
-        return self._driver.on_link_loss() or "its reaction to a lost link is not known"
 
     # -- operations common to all vehicles
 
@@ -535,152 +228,6 @@ class Vehicle(ServicedVehicle):
                     handle.cancel()
             self._driver.close()
 
-    # -- checks before an operation
-
-    def _home_bounds(self) -> Bounds | None:
-        """Return the bounds about the present home; ``None`` without a home.
-
-        Raises:
-            UsageError: the fence excludes home.
-        """
-        home = self._driver.telemetry.home
-        if home is None:
-            return None
-        bounds = self._bounds
-        if (
-            bounds is None
-            or bounds.limits is not self.limits
-            or bounds.fence is not self.fence
-            or bounds.home != home
-        ):
-            bounds = self._bounds = Bounds(home, self.limits, self.fence)
-        seen = self._driver.telemetry
-        if not seen.amsl_known and self.fence is not None and states_amsl(self.fence):
-            raise UsageError(f"{self.name}: the fence states altitudes AMSL: {seen.amsl_remedy}")
-        if bounds.home_violation:
-            raise UsageError(f"{self.name}: the fence excludes home: {bounds.home_violation}")
-        return bounds
-
-    def _usable_bounds(self) -> Bounds | None:
-        """Return the bounds about the present home; ``None`` without a home, or if they exclude it."""
-        try:
-            return self._home_bounds()
-        except UsageError:
-            return None
-
-    def _check_path(self, asked: str, start: Position | None, goal: Position) -> Path:
-        """Return the straight path; raise ``OutOfBounds`` if it violates limits or fence. *start* is AMSL."""
-        if start is None:
-            raise self._unknown("its position")
-        bounds = self._home_bounds()
-        if bounds is None:
-            raise self._unknown("its home")
-        path = bounds.path(start, goal)
-        violation = bounds.path_violation(path, goal)
-        if violation:
-            raise OutOfBounds(self.name, asked, violation)
-        return path
-
-    def _timeout_to(self, goal: Position, speed: float | None = None) -> Ns:
-        """Return the time-out of a movement from the present position to *goal*."""
-        here, bounds = self._driver.telemetry.position, self._home_bounds()
-        if here is None or bounds is None:
-            return from_seconds(MARGIN_S)
-        return path_timeout(bounds.path(here, goal), speed)
-
-    def _landing_timeout(self, climb: float) -> Ns:
-        """Return the time-out of a landing at 0.5 m/s, as of ArduPilot; an unknown height is the highest."""
-        height = self._driver.telemetry.above_home
-        height = max(height, 0.0) if isfinite(height) else self.limits.highest
-        return travel_timeout(0.0, 2.0 * (height + climb))
-
-    def _check_leg(self, asked: str, place: Position) -> None:
-        self._check_path(asked, self._amsl(place), place)
-
-    def _check_altitude(self, goal: Position) -> None:
-        if isinstance(goal.altitude, Ellipsoidal):
-            raise CapabilityError(
-                f"{self.name}: {goal.altitude} cannot be flown to: autopilots count from the geoid; "
-                f"subtract its height there and say AMSL"
-            )
-        if isinstance(goal.altitude, AboveGround):
-            self._connect(Capability.TERRAIN)
-        seen = self._driver.telemetry
-        if isinstance(goal.altitude, AMSL) and not seen.amsl_known:
-            raise Refused(self.name, f"go to {goal}", seen.amsl_remedy)
-
-    def _check_numbers(self, call: str, *numbers: object, example: str) -> None:
-        """Raise ``UsageError`` unless all are finite numbers: programs and consoles have no type checker.
-
-        Args:
-            call: the call as it was written.
-            numbers: the arguments that are numbers.
-            example: a valid call.
-        """
-        for number in numbers:
-            if not is_number(number):
-                raise UsageError(
-                    f"{self.name}: {call}: {number!r} is not a finite number; write it as in {example}"
-                )
-
-    def _check_speed(self, asked: str, speed: float) -> None:
-        self._connect(Capability.SPEED)
-        self._check_numbers(f"{asked}: speed={speed!r}", speed, example="speed=5.0, in m/s")
-        if speed <= 0:
-            raise UsageError(f"{self.name}: {asked}: a speed of {speed:g} m/s; give one above 0")
-
-    def _check_mission(self, items: Sequence[MissionItem]) -> None:
-        start = self._known("its position", self._driver.telemetry.position)
-        for number, item in enumerate(items, 1):
-            asked = f"mission item {number} ({type(item).__name__})"
-            problem = item_problem(item)
-            if problem:
-                raise UsageError(f"{self.name}: {asked}: {problem}")
-            if isinstance(item, TakeOff):
-                start = Position(start.latitude, start.longitude, AboveHome(item.height))
-                self._check_path(asked, self._amsl(start), start)
-            elif isinstance(item, Waypoint | Land) and item.position is not None:
-                self._check_altitude(item.position)
-                self._check_path(asked, self._amsl(start), item.position)
-                start = item.position
-            elif isinstance(item, ReturnHome):
-                home = self._known("its home", self._driver.telemetry.home)
-                goal = Position(home.latitude, home.longitude, self._amsl(start).altitude)
-                self._check_path(asked, self._amsl(start), goal)
-                start = home
-
-    def _is_out_of_bounds(self) -> bool:
-        """Return whether the vehicle is out of bounds now, so that any way back is allowed."""
-        here, bounds = self._driver.telemetry.position, self._home_bounds()
-        return here is not None and bounds is not None and bool(bounds.violations(here))
-
-    def _check_reserve(self, asked: str) -> None:
-        """Raise ``LowBattery`` if the battery is below its reserve."""
-        telemetry = self._driver.telemetry
-        if self.limits.battery_reserve and not self._executor.wait(
-            lambda: isfinite(telemetry.battery.remaining), from_seconds(BATTERY_MEASURED_WITHIN_S)
-        ):
-            raise CapabilityError(
-                f"{self.name}: {asked}: its autopilot does not report how full the battery is, so a reserve "
-                f"of {self.limits.reserve:.0%} cannot be kept; set its monitor up, or state no reserve"
-            )
-        battery = self._flight_monitor.battery
-        battery.note(self.kernel.now())
-        shortage = battery.shortage(self.limits)
-        if shortage:
-            raise low_battery(self.name, asked, shortage)
-
-    def _amsl(self, position: Position) -> Position:
-        """Return the same place with an AMSL altitude; above ground is taken as above home."""
-        if isinstance(position.altitude, AMSL):
-            return position
-        home = self._known("its home", self._driver.telemetry.home)
-        metres = position.altitude.metres + home.altitude.metres
-        return Position(position.latitude, position.longitude, AMSL(metres))
-
-    def _goal(self, position: Position) -> Goal:
-        return Goal(position.latitude, position.longitude, self._amsl(position).altitude.metres)
-
     # -- carrying out an operation
 
     def _operate(
@@ -744,6 +291,22 @@ class Vehicle(ServicedVehicle):
                     self._record(start, operation, asked, (outcome, said), goal())
                 if self._monitor is None and not policy.unmonitored and self._straying is None:
                     self._monitor_in_place(asked)
+
+    def _check_reserve(self, asked: str) -> None:
+        """Raise ``LowBattery`` if the battery is below its reserve."""
+        telemetry = self._driver.telemetry
+        if self.limits.battery_reserve and not self._executor.wait(
+            lambda: isfinite(telemetry.battery.remaining), from_seconds(BATTERY_MEASURED_WITHIN_S)
+        ):
+            raise CapabilityError(
+                f"{self.name}: {asked}: its autopilot does not report how full the battery is, so a reserve "
+                f"of {self.limits.reserve:.0%} cannot be kept; set its monitor up, or state no reserve"
+            )
+        battery = self._flight_monitor.battery
+        battery.note(self.kernel.now())
+        shortage = battery.shortage(self.limits)
+        if shortage:
+            raise low_battery(self.name, asked, shortage)
 
     def _abort_other(
         self, holder: Task | None, running: str, task: Task | None, operation: str, policy: OperationPolicy
