@@ -77,6 +77,7 @@ def measure(
         running(surroundings, PEERS / "source.py", rate, *ports.values()),
     ):
         processes = dict(zip(WAYS, (ours, blocking, asking), strict=True))
+        assert listener.stdout is not None
         assert listener.stdout.readline() == "ready\n"
         before = {way: processor_seconds(process) for way, process in processes.items()}
         began = time.monotonic()

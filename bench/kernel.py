@@ -11,10 +11,11 @@ import argparse
 import gc
 import os
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from heapq import heappop, heapreplace
 from statistics import median
 from time import perf_counter
+from typing import Any
 
 import simpy
 
@@ -55,7 +56,7 @@ def simpy_sleepers(processes: int, events: int) -> float:
     environment = simpy.Environment()
     each = events // processes
 
-    def body(period: int) -> object:
+    def body(period: int) -> Generator[simpy.Event, Any, None]:
         for _ in range(each):
             yield environment.timeout(period)
 
@@ -89,7 +90,7 @@ def simpy_computing(processes: int, events: int) -> float:
     core = simpy.PriorityResource(environment)
     each = events // processes // 2
 
-    def body(number: int) -> object:
+    def body(number: int) -> Generator[simpy.Event, Any, None]:
         for _ in range(each):
             with core.request(-number) as request:
                 yield request
@@ -124,7 +125,7 @@ def simpy_handover(events: int) -> float:
     environment = simpy.Environment()
     there, back = simpy.Store(environment), simpy.Store(environment)
 
-    def body(first: simpy.Store, second: simpy.Store) -> object:
+    def body(first: simpy.Store, second: simpy.Store) -> Generator[simpy.Event, Any, None]:
         for _ in range(events // 2):
             yield first.put(1)
             yield second.get()

@@ -16,6 +16,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 from time import process_time
+from typing import Any
+from unittest.mock import patch
 
 import volery
 from volery.links import in_process_link
@@ -56,19 +58,16 @@ def flight(drones: int) -> tuple[float, float, float]:
         for k in range(drones)
     ]
 
-    def counted(
-        self: in_process_link.InProcessLink, frame: object, send: object = in_process_link.InProcessLink.send
-    ) -> None:
-        stretch.frames += 1
-        send(self, frame)
+    original = in_process_link.InProcessLink.send
 
-    in_process_link.InProcessLink.send, original = counted, in_process_link.InProcessLink.send
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            run = volery.fly(stretch.fly, urls, volery.Options(seed=1, out=Path(folder)))
-            size = (Path(folder) / "trace.mcap").stat().st_size / 1e6
-    finally:
-        in_process_link.InProcessLink.send = original
+    def counted(self: in_process_link.InProcessLink, frame: Any) -> None:
+        stretch.frames += 1
+        original(self, frame)
+
+    counting = patch.object(in_process_link.InProcessLink, "send", counted)
+    with counting, tempfile.TemporaryDirectory() as folder:
+        run = volery.fly(stretch.fly, urls, volery.Options(seed=1, out=Path(folder)))
+        size = (Path(folder) / "trace.mcap").stat().st_size / 1e6
     assert run.completed, run.record.outcome.reason
     computing = max(stretch.computing) - min(stretch.computing)
     return stretch.factor(), stretch.frames / computing, size / run.record.sim_s * 3600

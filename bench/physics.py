@@ -174,7 +174,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         plain = PlainC(folder)
         for _ in range(ROUNDS):
-            for name, rate in (
+            for name, reached in (
                 ("RotorPy, one body, RK45, one step a call", rotorpy_steps(300)),
                 ("one body, RK4, 50 steps a call", our_steps(1, 100, 50)),
                 ("one body, RK4, one step a call", our_steps(1, 10, 1)),
@@ -186,7 +186,7 @@ def main() -> None:
                 ("100 vehicles, 50 steps a call", flight_steps(100, 2, 50)),
                 ("100 vehicles, 5 steps a call", flight_steps(100, 1, 5)),
             ):
-                rates.setdefault(name, []).append(rate)
+                rates.setdefault(name, []).append(reached)
     rate = {name: median(values) for name, values in rates.items()}
     theirs = rate["RotorPy, one body, RK45, one step a call"]
     print(f"{'':44}{'body-steps/s':>14}{'x RotorPy':>12}{'x plain C':>12}")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import argparse
 import gc
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -27,7 +27,7 @@ from volery.trace.reader import Reading
 from volery.trace.timeline import TimelineWriter
 
 
-def library(path: Path, events: list[Event]) -> Callable[[], None]:
+def library(path: Path, events: Sequence[Event]) -> Callable[[], None]:
     """The same messages through the library, encoded beforehand."""
     codecs = {kind: Codec(kind) for kind in OWN_EVENTS}
     encoded = [codecs[type(event)].encode(event) for event in events]
@@ -45,7 +45,7 @@ def library(path: Path, events: list[Event]) -> Callable[[], None]:
     return write
 
 
-def mcap_writer(path: Path, events: list[Event]) -> Callable[[], None]:
+def mcap_writer(path: Path, events: Sequence[Event]) -> Callable[[], None]:
     def write() -> None:
         writer = McapWriter(path, sample_setup())
         for event in events:
@@ -55,7 +55,7 @@ def mcap_writer(path: Path, events: list[Event]) -> Callable[[], None]:
     return write
 
 
-def timeline(path: Path, events: list[Event]) -> Callable[[], None]:
+def timeline(path: Path, events: Sequence[Event]) -> Callable[[], None]:
     def write() -> None:
         writer = TimelineWriter(path)
         for event in events:
@@ -65,7 +65,7 @@ def timeline(path: Path, events: list[Event]) -> Callable[[], None]:
     return write
 
 
-def fold(make: Callable[[], Callable[[Event], None]], events: list[Event]) -> Callable[[], None]:
+def fold(make: Callable[[], Callable[[Event], None]], events: Sequence[Event]) -> Callable[[], None]:
     def run() -> None:
         tap = make()
         for event in events:

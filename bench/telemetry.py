@@ -71,8 +71,15 @@ def telemetry(seconds: int, rate: int) -> Chunks:
     assert open_driver is not None
     driver = open_driver(kernel, link, "craft", {"attitude": str(rate)} if rate else {})
     kernel.run(5 * S)
-    for number in MORE.values() if rate else ():
-        driver._carrier._command("MAV_CMD_SET_MESSAGE_INTERVAL", number, 1e6 / rate)
+    services = driver.services
+    assert services is not None
+
+    def request() -> None:
+        for number in MORE.values():
+            services.command("stream more", "MAV_CMD_SET_MESSAGE_INTERVAL", number, 1e6 / rate)
+
+    if rate:
+        kernel.spawn(request, "ground station", ExecutionContext("ground station"))
     kernel.run(7 * S)
     chunks.clear()
     kernel.run((7 + seconds) * S)

@@ -22,7 +22,7 @@ os.environ["NUMBA_CPU_FEATURES"] = ""
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "src"))
 import llvmlite.binding as llvm
-from numba import carray, cfunc, types
+from numba import carray, cfunc, types  # type: ignore[attr-defined]  # numba does not declare carray
 
 from volery.base.numeric_code import NumericCode, parsed
 from volery.cost.native.core_model import execute_blocks
@@ -72,7 +72,7 @@ def compiled(entry: NumericCode) -> tuple[bytes, str]:
     )
     scope: dict[str, Any] = {"carray": carray, "entry": entry.by_numba(cache=False)}
     exec(f"def call({', '.join(parameters)}):\n    return entry({', '.join(values)})\n", scope)
-    made = cfunc(types.int64(*kinds))(scope["call"])
+    made: Any = cfunc(types.int64(*kinds))(scope["call"])
     name = f"{entry.name}_on"
     text = str(made._library._final_module).replace(made._wrapper_name, name)
     return _optimised(llvm.parse_assembly(text), name), source

@@ -154,7 +154,7 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
 
 def _filled(name: str) -> Message:
     """Return a message with one element in each of its lists."""
-    message = new(name)
+    message: Message = new(name)
     for label, kind in idl_fields(name).items():
         if kind.startswith("sequence<") and "/" in kind:
             setattr(message, label, [new(kind[9:-1])])

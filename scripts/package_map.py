@@ -27,10 +27,10 @@ def layers() -> list[list[str]]:
     return [[name.strip() for name in names.split("|")] for names in ordered]
 
 
-def dependencies() -> nx.DiGraph:
+def dependencies() -> nx.DiGraph[str]:
     """Return which package imports which, without the imports that follow from others."""
     graph = grimp.build_graph("volery", cache_dir=None)
-    packages: nx.DiGraph = nx.DiGraph()
+    packages: nx.DiGraph[str] = nx.DiGraph()
     for module in graph.modules:
         for other in graph.find_modules_directly_imported_by(module):
             one, two = (each.split(".")[1] if "." in each else "" for each in (module, other))

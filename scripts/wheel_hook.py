@@ -23,7 +23,7 @@ def _wanted() -> bool:
     return os.environ.get("VOLERY_COMPILE", "") not in ("", "0")
 
 
-class MachineCodeHook(BuildHookInterface):  # type: ignore[type-arg]
+class MachineCodeHook(BuildHookInterface[Any]):
     """Adds the machine code and the architecture to a wheel."""
 
     _modules: tempfile.TemporaryDirectory[str] | None = None

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from logging import getLogger
-from typing import TypeVar
+from typing import Any, TypeVar, overload
 
 from volery.base.errors import UsageError, VoleryError
 from volery.kernel.wall import WallKernel
@@ -21,16 +21,39 @@ LOCATED_WITHIN_S = 90.0
 """Longest wait for a position: a receiver that has just been switched on takes about a minute."""
 
 
-@contextmanager
+@overload
 def connect(
     url: str,
-    kind: type[V] = Drone,  # type: ignore[assignment]  # type variables have no defaults before Python 3.13
     *,
     seed: int = 1,
     limits: Limits | None = None,
     fence: Fence | None = None,
     within: float = LOCATED_WITHIN_S,
-) -> Iterator[V]:
+) -> AbstractContextManager[Drone]: ...
+
+
+@overload
+def connect(
+    url: str,
+    kind: type[V],
+    *,
+    seed: int = 1,
+    limits: Limits | None = None,
+    fence: Fence | None = None,
+    within: float = LOCATED_WITHIN_S,
+) -> AbstractContextManager[V]: ...
+
+
+@contextmanager
+def connect(
+    url: str,
+    kind: type[Vehicle] = Drone,
+    *,
+    seed: int = 1,
+    limits: Limits | None = None,
+    fence: Fence | None = None,
+    within: float = LOCATED_WITHIN_S,
+) -> Iterator[Any]:
     """Connect to the vehicle at *url* and yield it as soon as it knows where it is.
 
     While a real one does not, the logger ``volery`` says every few seconds what is missing.
@@ -65,7 +88,7 @@ def connect(
 
 
 @contextmanager
-def attach(url: str, kind: type[V] = Drone, *, seed: int = 1) -> Iterator[V]:  # type: ignore[assignment]  # as above
+def attach(url: str, kind: type[Vehicle] = Drone, *, seed: int = 1) -> Iterator[Vehicle]:
     """Connect to the vehicle at *url* without commanding it: an armed vehicle flies on at the end.
 
     For tools that read or set parameters, plans and logs. It does not wait for a position.
