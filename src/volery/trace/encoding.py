@@ -12,9 +12,9 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from operator import itemgetter
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
-from volery.trace.events import Event, Published
+from volery.trace.events import Event, Published, VehicleState
 
 PACKAGE = "volery_msgs"
 LITTLE_ENDIAN_CDR = 0x0100  # the bytes 00 01 00 00, read as a little-endian uint32
@@ -22,6 +22,8 @@ LITTLE_ENDIAN_CDR = 0x0100  # the bytes 00 01 00 00, read as a little-endian uin
 _ROS_TYPE = {"Ns": "int64", "float": "float64", "int": "int32", "bool": "bool"}
 _STRUCT_CODE = {"Ns": "q", "float": "d", "int": "i", "bool": "?"}
 _WIDTH = {"Ns": 8, "float": 8, "int": 4, "bool": 1}
+_TIMES = (("received", "sent"), ("end", "start"), ("finished", "released"), ("at", "at"))
+"""The fields for the log time and the publish time of an event."""
 _REMEMBERED = 4096  # combinations of strings per type of event; with more, they hardly repeat
 
 OWN_EVENTS: tuple[type[Any], ...] = tuple(kind for kind in get_args(Event) if kind is not Published)
@@ -33,9 +35,45 @@ _make: Callable[[type[Any], tuple[Any, ...]], Any] = (
 )  # as the constructor of a named tuple, but faster
 
 
+class Layout(NamedTuple):
+    """Where a message has the fields of an event; fields are given by their indexes.
+
+    Log time is the field ``log``, or ``publish`` where ``log`` is negative. The fields ``subject`` decide the
+    channel. ``data`` is the field with the message's bytes; where it is -1, they are made: the ``numbers`` by
+    ``codes``, the ``struct`` codes q, d, i and ?, padded to 4 bytes, then the strings ``words``.
+    """
+
+    log: int
+    publish: int
+    subject: tuple[int, ...]
+    codes: str = ""
+    numbers: tuple[int, ...] = ()
+    words: tuple[int, ...] = ()
+    data: int = -1
+
+
+PUBLISHED = Layout(
+    log=Published._fields.index("at"),
+    publish=Published._fields.index("at"),
+    subject=tuple(Published._fields.index(name) for name in ("topic", "type", "publisher")),
+    data=Published._fields.index("data"),
+)
+"""The layout of ``Published`` events."""
+
+
 def type_name(kind: type[Any]) -> str:
     """Return the message type of an event: ``volery_msgs/msg/Slice``."""
     return f"{PACKAGE}/msg/{kind.__name__}"
+
+
+def fields(indexes: tuple[int, ...]) -> Callable[[Any], tuple[Any, ...]]:
+    """Return the function that gets these fields of an event as a tuple."""
+    if len(indexes) > 1:
+        return itemgetter(*indexes)
+    if not indexes:
+        return lambda event: ()
+    index = indexes[0]
+    return lambda event: (event[index],)
 
 
 def _annotation(kind: type[Any], name: str) -> str:
@@ -44,20 +82,18 @@ def _annotation(kind: type[Any], name: str) -> str:
     return str(getattr(written, "__forward_arg__", written))
 
 
-def _getter(indexes: tuple[int, ...]) -> Callable[[Any], tuple[Any, ...]]:
-    """Return an ``itemgetter`` that returns a tuple for a single index, too."""
-    if len(indexes) == 1:
-        index = indexes[0]
-        return lambda event: (event[index],)
-    return itemgetter(*indexes)
+def _times(kind: type[Any]) -> tuple[int, int]:
+    """Return the indexes of the fields for the log time and the publish time."""
+    for log, publish in _TIMES:
+        if log in kind._fields:
+            return kind._fields.index(log), kind._fields.index(publish)
+    raise TypeError(f"{kind.__name__} has no field for its time")
 
 
 class Codec:
-    """Encoder and decoder of events of one kind.
+    """Encoder and decoder of events of one kind, with their ``layout`` and message ``definition``.
 
-    ``codes`` are the ``struct`` codes of the encapsulation header and the numbers, ``fixed`` their size in
-    bytes; the strings follow as ``tail``, of which ``tails`` is the cache. ``numbers`` and ``words`` get the
-    numbers and the strings of an event.
+    ``encode`` returns the CDR bytes of an event.
     """
 
     def __init__(self, kind: type[Any]) -> None:
@@ -70,33 +106,23 @@ class Codec:
             raise TypeError(
                 f"{kind.__name__} has a field that is neither a number nor a string: {annotations}"
             )
-        width = sum(_WIDTH[annotations[index]] for index in numbers)
+        log, publish = _times(kind)
         self.kind = kind
-        self.codes = "I" + "".join(_STRUCT_CODE[annotations[index]] for index in numbers) + "x" * (-width % 4)
-        self.fixed = struct.calcsize(f"<{self.codes}")
-        self.numbers = _getter(tuple(numbers))
-        self.words = _getter(tuple(words))
+        self.layout = Layout(
+            log,
+            publish,
+            subject=(kind._fields.index("vehicle"),) if kind is VehicleState else (),
+            codes="".join(_STRUCT_CODE[annotations[index]] for index in numbers),
+            numbers=tuple(numbers),
+            words=tuple(words),
+        )
         self.definition = "".join(
             f"{_ROS_TYPE.get(annotations[index], 'string')} {kind._fields[index]}\n" for index in order
         )
-        self._unpack = struct.Struct(f"<{self.codes}").unpack_from
-        self._in_order = _getter(tuple(order.index(index) for index in range(len(order))))
-        self.tails: dict[tuple[str, ...], bytes] = {}
+        self.encode: Callable[[Any], bytes] = encoder(self.layout)
+        self._head = struct.Struct(_head(self.layout))
+        self._in_order = fields(tuple(order.index(index) for index in range(len(order))))
         self._strings: dict[bytes, tuple[str, ...]] = {}
-
-    def tail(self, words: tuple[str, ...]) -> bytes:
-        """Return the CDR bytes of the strings *words*."""
-        known = self.tails.get(words)
-        if known is None:
-            if len(self.tails) >= _REMEMBERED:
-                self.tails.clear()
-            known = self.tails[words] = _encode_words(words)
-        return known
-
-    def encode(self, event: Any) -> bytes:
-        """Return the CDR bytes of *event*."""
-        head = struct.pack(f"<{self.codes}", LITTLE_ENDIAN_CDR, *self.numbers(event))
-        return head + self.tail(self.words(event))
 
     def decode(self, data: bytes) -> Any:
         """Return the event in *data*.
@@ -104,16 +130,39 @@ class Codec:
         Raises:
             ValueError, struct.error: there is none.
         """
-        header, *numbers = self._unpack(data)
+        header, *numbers = self._head.unpack_from(data)
         if header != LITTLE_ENDIAN_CDR:
             raise ValueError(f"not little-endian CDR: {data[:4].hex()}")
-        tail = data[self.fixed :]
+        tail = data[self._head.size :]
         strings = self._strings.get(tail)
         if strings is None:
             if len(self._strings) >= _REMEMBERED:
                 self._strings.clear()
             strings = self._strings[tail] = _decode_words(tail)
         return _make(self.kind, self._in_order((*numbers, *strings)))
+
+
+def encoder(layout: Layout) -> Callable[[Any], bytes]:
+    """Return the function that returns the CDR bytes of an event, by a layout without ``data``."""
+    pack = struct.Struct(_head(layout)).pack
+    numbers, words = fields(layout.numbers), fields(layout.words)
+    tails: dict[tuple[str, ...], bytes] = {}
+
+    def encode(event: Any) -> bytes:
+        strings = words(event)
+        tail = tails.get(strings)
+        if tail is None:
+            if len(tails) >= _REMEMBERED:
+                tails.clear()
+            tail = tails[strings] = _encode_words(strings)
+        return pack(LITTLE_ENDIAN_CDR, *numbers(event)) + tail
+
+    return encode
+
+
+def _head(layout: Layout) -> str:
+    """Return the format of the encapsulation header and the numbers, padded to 4 bytes."""
+    return f"<I{layout.codes}{-struct.calcsize(f'<{layout.codes}') % 4}x"
 
 
 def _encode_words(words: tuple[str, ...]) -> bytes:

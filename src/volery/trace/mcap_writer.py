@@ -4,7 +4,7 @@ The same run gives the same bytes: no wall time, no version. Chunks end with eac
 written at once, so a killed process loses at most the last simulated second. They are compressed by zstd at a
 fixed level; zstd's bytes depend on its own version alone, and the events in them on nothing.
 Records other than messages are built by the ``mcap`` library; messages, of which there are millions, by
-precompiled encoders.
+``Chunk``.
 
 Format: https://mcap.dev/spec.
 """
@@ -13,10 +13,8 @@ from __future__ import annotations
 
 import struct
 import zlib
-from array import array
-from collections import defaultdict
 from collections.abc import Callable, Iterable
-from operator import attrgetter, itemgetter
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,8 +26,9 @@ from zstandard import ZstdCompressor
 from volery.base.files import Output
 from volery.base.time import Ns, S
 from volery.trace.attachments import SETUP_ATTACHMENT, RunSetup, to_json
-from volery.trace.encoding import LITTLE_ENDIAN_CDR, OWN_EVENTS, Codec, type_name
-from volery.trace.events import NONE, Event, Message, Published, Record, VehicleState
+from volery.trace.chunk import Chunk
+from volery.trace.encoding import OWN_EVENTS, PUBLISHED, Codec, type_name
+from volery.trace.events import Event, Published, Record, VehicleState
 
 MAGIC = b"\x89MCAP0\r\n"
 TRACE_SCHEMA = "volery-trace/1"
@@ -38,15 +37,10 @@ TRACE_FILE = "trace.mcap"
 
 OUTCOME = "outcome"
 """The metadata that states how the run ended: ``status`` and ``reason``."""
-MESSAGE_FRAME = "BQHIQQ"
-"""The header of a message record: opcode, length, channel, sequence, log time, publish time."""
-MESSAGE_OVERHEAD = struct.calcsize(f"<{MESSAGE_FRAME}") - 9
-"""Bytes that a message record's length counts beside its data: the header without opcode and length."""
 COMPRESSION = "zstd"
 """The compression of chunks, in the words of the format."""
 _LEVEL = 3  # an eighth of the size; level 9 would save another quarter for six times the time
 _ROS2_PROFILE = "ros2"
-_MESSAGE = int(Opcode.MESSAGE)
 
 Definitions = Callable[[str], str]
 """Returns the complete ``ros2msg`` text of a type such as ``std_msgs/msg/String``, dependencies included."""
@@ -62,17 +56,6 @@ class Attachment(NamedTuple):
 
 def _no_definition(_: str) -> str:
     return ""
-
-
-def _times(kind: type[Any]) -> Callable[[Any], tuple[Ns, Ns]]:
-    """Return the function that gives an event's end and begin: MCAP's log time and publish time."""
-    if kind is Message:
-        return lambda event: (event.sent if event.received == NONE else event.received, event.sent)
-    fields = kind._fields
-    for log, publish in (("end", "start"), ("finished", "released"), ("at", "at")):
-        if log in fields:
-            return itemgetter(fields.index(log), fields.index(publish))
-    raise TypeError(f"{kind.__name__} has no field for its time")
 
 
 def _record(thing: records.McapRecord) -> bytes:
@@ -106,13 +89,15 @@ class McapWriter:
         self._definitions = definitions
         self._summary = _Summary()
         self._compressor = ZstdCompressor(level=_LEVEL)
-        self._body = bytearray()
-        self._indexes = _empty_indexes()
-        self._chunk_ends: Ns = S
+        self._chunk = Chunk(self._end_second)
+        self._chunk.end = S
         self._schemas: dict[str, int] = {}
-        self._published: dict[tuple[str, str, str], int] = {}
-        self._writers: dict[type[Any], Callable[[Any], None]] = {kind: self._own(kind) for kind in OWN_EVENTS}
-        self._writers[Published] = self._write_published
+        self._writers: dict[type[Any], Record] = {
+            Published: self._chunk.writer(PUBLISHED, self._published_channel)
+        }
+        for kind in OWN_EVENTS:
+            codec = Codec(kind)
+            self._writers[kind] = self._chunk.writer(codec.layout, partial(self._own_channel, codec))
         self._output.write(MAGIC + _record(records.Header(profile=_ROS2_PROFILE, library="volery")))
         self.metadata("volery", {"schema": TRACE_SCHEMA, "seed": str(setup.seed)})
         self.attach(Attachment(SETUP_ATTACHMENT, "application/json", to_json(setup)))
@@ -155,34 +140,28 @@ class McapWriter:
 
     def flush(self) -> None:
         """End the chunk and write it: it survives the end of this process."""
-        if not self._indexes:
+        filled = self._chunk.take()
+        if filled is None:
             return
-        body = bytes(self._body)
-        indexes = self._indexes
-        self._body = bytearray()
-        self._indexes = _empty_indexes()
-        first = min(min(index[::2]) for index in indexes.values())
-        last = max(max(index[::2]) for index in indexes.values())
+        body, indexes, offsets, counts, first, last = filled
         packed = self._compressor.compress(body)
         chunk = _record(records.Chunk(COMPRESSION, packed, last, first, zlib.crc32(body), len(body)))
-        listed = b""
-        offsets = {}
-        for channel, index in indexes.items():
-            offsets[channel] = self._output.size + len(chunk) + len(listed)
-            listed += _index_record(channel, index)
+        start = self._output.size
         entry = records.ChunkIndex(
             chunk_length=len(chunk),
-            chunk_start_offset=self._output.size,
+            chunk_start_offset=start,
             compression=COMPRESSION,
             compressed_size=len(packed),
             message_end_time=last,
-            message_index_length=len(listed),
-            message_index_offsets=offsets,
+            message_index_length=len(indexes),
+            message_index_offsets={
+                channel: start + len(chunk) + offset for channel, offset in offsets.items()
+            },
             message_start_time=first,
             uncompressed_size=len(body),
         )
-        if self._output.write(chunk + listed):
-            self._summary.chunk(entry, {channel: len(index) // 2 for channel, index in indexes.items()})
+        if self._output.write(chunk + indexes):
+            self._summary.chunk(entry, counts)
 
     def close(self) -> None:
         """Write what is left, the summary and the index. A second call does nothing."""
@@ -199,75 +178,29 @@ class McapWriter:
             known = self._schemas[name] = len(self._schemas) + 1
             record = _record(records.Schema(id=known, data=text.encode(), encoding="ros2msg", name=name))
             self._summary.schemas.append(record)
-            self._body += record
+            self._chunk.add(record)
         return known
 
     def _channel(self, topic: str, schema: int, metadata: dict[str, str]) -> int:
         channel = len(self._summary.channels) + 1
         record = _record(records.Channel(channel, topic, "cdr", metadata, schema))
         self._summary.channels.append(record)
-        self._body += record
+        self._chunk.add(record)
         return channel
 
-    def _own(self, kind: type[Any]) -> Callable[[Any], None]:
-        """Return the function that writes events of one kind: the hot path."""
-        codec = Codec(kind)
-        pack = struct.Struct(f"<{MESSAGE_FRAME}{codec.codes}").pack
-        overhead = MESSAGE_OVERHEAD + codec.fixed
-        times, numbers, words = _times(kind), codec.numbers, codec.words
-        tails, new_tail = codec.tails, codec.tail
-        channels: dict[str, int] = {}
-        subject_of = attrgetter("vehicle") if kind is VehicleState else None
+    def _own_channel(self, codec: Codec, vehicle: str = "") -> int:
+        """Return the channel of events of one kind; states of vehicles have one for each vehicle."""
+        name = f"{vehicle}/state" if codec.kind is VehicleState else codec.kind.__name__.lower()
+        schema = self._schema(type_name(codec.kind), codec.definition)
+        return self._channel(f"/volery/{name}", schema, {})
 
-        def write(event: Any) -> None:
-            log, publish = times(event)
-            if publish >= self._chunk_ends:
-                self._end_second(publish)
-            subject = subject_of(event) if subject_of else ""
-            channel = channels.get(subject)
-            if channel is None:
-                topic = f"/volery/{subject}/state" if subject_of else f"/volery/{kind.__name__.lower()}"
-                schema = self._schema(type_name(kind), codec.definition)
-                channel = channels[subject] = self._channel(topic, schema, {})
-            strings = words(event)
-            tail = tails.get(strings) or new_tail(strings)
-            body = self._body
-            mark = self._indexes[channel].append
-            mark(log)
-            mark(len(body))
-            length = overhead + len(tail)
-            body += pack(_MESSAGE, length, channel, 0, log, publish, LITTLE_ENDIAN_CDR, *numbers(event))
-            body += tail
-
-        return write
-
-    def _write_published(self, event: Published) -> None:
-        if event.at >= self._chunk_ends:
-            self._end_second(event.at)
-        key = (event.topic, event.type, event.publisher)
-        channel = self._published.get(key)
-        if channel is None:
-            schema = self._schema(event.type, self._definitions(event.type))
-            channel = self._channel(event.topic, schema, {"publisher": event.publisher})
-            self._published[key] = channel
-        self._indexes[channel].extend((event.at, len(self._body)))
-        length = MESSAGE_OVERHEAD + len(event.data)
-        self._body += struct.pack(f"<{MESSAGE_FRAME}", _MESSAGE, length, channel, 0, event.at, event.at)
-        self._body += event.data
+    def _published_channel(self, topic: str, message_type: str, publisher: str) -> int:
+        schema = self._schema(message_type, self._definitions(message_type))
+        return self._channel(topic, schema, {"publisher": publisher})
 
     def _end_second(self, now: Ns) -> None:
         self.flush()
-        self._chunk_ends = (now // S + 1) * S
-
-
-def _empty_indexes() -> defaultdict[int, array[int]]:
-    """Return a mapping of channel to log time and offset in the chunk of each message, alternating."""
-    return defaultdict(lambda: array("Q"))
-
-
-def _index_record(channel: int, index: array[int]) -> bytes:
-    pairs = index.tobytes()
-    return struct.pack("<BQHI", Opcode.MESSAGE_INDEX, 6 + len(pairs), channel, len(pairs)) + pairs
+        self._chunk.end = (now // S + 1) * S
 
 
 class _Summary:

@@ -25,12 +25,12 @@ from volery.base.time import Ns, clock
 from volery.trace.attachments import SETUP_ATTACHMENT, RunSetup, setup_from_json
 from volery.trace.encoding import OWN_EVENTS, Codec, type_name
 from volery.trace.events import Event, Published
-from volery.trace.mcap_writer import COMPRESSION, MAGIC, MESSAGE_FRAME, TRACE_SCHEMA, Attachment
+from volery.trace.mcap_writer import COMPRESSION, MAGIC, TRACE_SCHEMA, Attachment
 
 _Decoder = Callable[[Ns, bytes], Event | None]
 _MESSAGE = int(Opcode.MESSAGE)
 _HEAD = struct.Struct("<BQ")
-_FRAME = struct.Struct(f"<{MESSAGE_FRAME[2:]}")
+_FRAME = struct.Struct("<HIQQ")
 # start, end, uncompressed size, checksum, length of the name of the compression
 _CHUNK_HEAD = struct.Struct("<QQQII")
 _CHUNK_OVERHEAD = _CHUNK_HEAD.size + 8
