@@ -1,10 +1,11 @@
-"""Compile the modules of the event path with mypyc, into a folder that is laid over the package.
+"""Compile the modules of the event path, into a folder that is laid over the package.
 
-The modules are those of ``[tool.volery-wheel] compiled`` in pyproject.toml. They stay ordinary Python: where
-the shared libraries are beside them, Python imports these instead, with the same results. ``make wheel``
-runs this; ``pip install -e .`` does not. Needs mypy, setuptools and a C compiler.
+The modules are those of ``[tool.volery-wheel]`` in pyproject.toml: ``compiled`` by mypyc, ``in-c`` from a
+twin in C beside the Python file. They stay ordinary Python: where the shared libraries are beside them,
+Python imports these instead, with the same results. ``make wheel`` runs this; ``pip install -e .`` does not.
+Needs mypy, setuptools and a C compiler.
 
-    python scripts/compile_modules.py --into FOLDER [--level 2]
+    python scripts/compile_modules.py --into FOLDER [--level 2] [--only-c]
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import tomllib
 from pathlib import Path
 
 from mypyc.build import mypycify
-from setuptools import Distribution
+from setuptools import Distribution, Extension
 
 ROOT = Path(__file__).resolve().parent.parent
 MYPY_SETTINGS = """[mypy]
@@ -27,26 +28,40 @@ follow_imports = silent
 """As for ``make check``, but whatever is not installed where the wheel is built counts as ``Any``."""
 
 
-def compiled_modules() -> list[str]:
-    """Return the paths of the modules that are compiled, relative to src/."""
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    return [f"volery/{name}" for name in settings["tool"]["volery-wheel"]["compiled"]]
+def settings() -> dict[str, list[str]]:
+    """Return the table of what is compiled: paths of modules in the package."""
+    table: dict[str, list[str]] = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["volery-wheel"]
+    return table
 
 
-def compile_into(folder: Path, level: int) -> None:
+def by_mypyc(scratch: Path, level: int) -> list[Extension]:
+    """Return the modules as mypyc translates them to C."""
+    options = scratch / "mypy.ini"
+    options.write_text(MYPY_SETTINGS)
+    modules = [f"volery/{name}" for name in settings()["compiled"]]
+    return mypycify(
+        ["--config-file", str(options), "--cache-dir", os.devnull, *modules],
+        opt_level=str(level),
+        group_name="volery",
+        target_dir=str(scratch),
+    )
+
+
+def in_c(level: int) -> list[Extension]:
+    """Return the modules that have a twin in C."""
+    names = [f"volery/{name.removesuffix('.py')}" for name in settings()["in-c"]]
+    return [
+        Extension(name.replace("/", "."), [f"{name}.c"], extra_compile_args=[f"-O{level}"]) for name in names
+    ]
+
+
+def compile_into(folder: Path, level: int, *, only_c: bool) -> None:
     """Build the shared libraries in *folder*, as they lie beside the package's modules."""
     folder = folder.resolve()
     with tempfile.TemporaryDirectory() as scratch:
-        settings = Path(scratch) / "mypy.ini"
-        settings.write_text(MYPY_SETTINGS)
         os.environ["CFLAGS"] = f"{os.environ.get('CFLAGS', '')} -g0"
         os.chdir(ROOT / "src")
-        modules = mypycify(
-            ["--config-file", str(settings), "--cache-dir", os.devnull, *compiled_modules()],
-            opt_level=str(level),
-            group_name="volery",
-            target_dir=scratch,
-        )
+        modules = in_c(level) + ([] if only_c else by_mypyc(Path(scratch), level))
         building = Distribution({"name": "volery", "ext_modules": modules}).get_command_obj("build_ext")
         building.build_lib, building.build_temp = str(folder), scratch
         building.ensure_finalized()
@@ -58,8 +73,11 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--into", type=Path, required=True, help="where the shared libraries go")
     options.add_argument("--level", type=int, default=2, choices=range(4), help="of the C compiler")
+    options.add_argument(
+        "--only-c", action="store_true", help="only the twins in C: a second instead of minutes"
+    )
     given = options.parse_args()
-    compile_into(given.into, given.level)
+    compile_into(given.into, given.level, only_c=given.only_c)
 
 
 if __name__ == "__main__":
