@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from volery.base.errors import LowBattery as LowBattery
     from volery.base.errors import ModelError as ModelError
     from volery.base.errors import NotArrived as NotArrived
+    from volery.base.errors import ObstacleNear as ObstacleNear
     from volery.base.errors import OffTrack as OffTrack
     from volery.base.errors import OutOfBounds as OutOfBounds
     from volery.base.errors import Overridden as Overridden

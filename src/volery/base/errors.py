@@ -132,6 +132,10 @@ class OffTrack(VehicleError):
     """The autopilot does not keep the vehicle on its commanded path, or at its commanded place."""
 
 
+class ObstacleNear(VehicleError):
+    """An obstacle is nearer than the stated clearance, or the range sensors that shall see it are silent."""
+
+
 class ThrustSaturated(VehicleError):
     """The vehicle does not climb at full thrust: it is overloaded, or a motor or the battery is weak."""
 

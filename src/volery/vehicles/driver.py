@@ -230,6 +230,9 @@ class Driver(Protocol):
     def request_attitude(self) -> None:
         """Receive roll and pitch from now on, where these are not received anyway; it may wait for them."""
 
+    def request_obstacles(self) -> None:
+        """Receive what range sensors measure from now on, where the protocol carries it."""
+
     def ready(self, within: Ns) -> Sequence[Step]:
         """Wait until the vehicle could arm and go to a position."""
 

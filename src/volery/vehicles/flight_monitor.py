@@ -1,8 +1,8 @@
 """All monitors of one vehicle as one check, which runs five times a second, also between two calls.
 
 Which of them count depends on the policy of the operation. The first error in this order ends it: control is
-lost, the battery is low, the thrust is at its limit, the vehicle is off its track, out of its bounds, or has
-lost its position.
+lost, the battery is low, the thrust is at its limit, an obstacle is near, the vehicle is off its track, out
+of its bounds, or has lost its position.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from volery.vehicles.control_monitors import ThrustMonitor, TrackMonitor, UpsetM
 from volery.vehicles.escalation import SINKING_M_S
 from volery.vehicles.executor import NO_GOAL, Check, Goal, OperationPolicy
 from volery.vehicles.limits import Bounds, BoundsMonitor, Limits, Path
+from volery.vehicles.obstacle_monitor import ObstacleMonitor
 from volery.vehicles.telemetry import Telemetry
 
 JUMPED = 4
@@ -45,6 +46,7 @@ class FlightMonitor:
         self.upset = UpsetMonitor(telemetry)
         self._thrust = ThrustMonitor(telemetry)
         self._track = TrackMonitor(telemetry)
+        self._obstacles = ObstacleMonitor(telemetry)
 
     def check_of(
         self,
@@ -88,7 +90,8 @@ class FlightMonitor:
                 self._kernel.record(Text(now, seen.name, JUMPED, said))
             thrust = self._thrust.check(operation, now) if seen.flying or policy.travels else None
             upset = self.upset.check(operation, now)
-            return upset or battery or thrust or off_track or monitor.check(operation, now)
+            obstacle = self._obstacles.check(operation, now, limits.clearance if policy.bounded else 0.0)
+            return upset or battery or thrust or obstacle or off_track or monitor.check(operation, now)
 
         return check
 

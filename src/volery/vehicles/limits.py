@@ -58,6 +58,8 @@ class Limits:
         landing_reserve: share of the battery, 0 to below 1, that shall be left at touch-down: a drone is
             landed where it is once the rest only suffices for the landing. 0 means never.
         off_track: greatest distance from the commanded path or place that a drone may be blown or drift, m.
+        clearance: least distance from what the autopilot's range sensors measure, m. 0 means that they are
+            not monitored.
     """
 
     farthest: float = 10_000.0
@@ -66,6 +68,7 @@ class Limits:
     battery_reserve: float | None = None
     landing_reserve: float = DEFAULT_LANDING_RESERVE
     off_track: float = 15.0
+    clearance: float = 0.0
 
     def __post_init__(self) -> None:
         if not (self.farthest > 0 and self.highest > self.lowest):
@@ -80,6 +83,8 @@ class Limits:
             )
         if not self.off_track > 0.0:
             raise UsageError(f"off_track={self.off_track:g}: give metres, above 0")
+        if not 0.0 <= self.clearance < inf:
+            raise UsageError(f"clearance={self.clearance:g}: give metres, or 0 for none")
 
     @property
     def reserve(self) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from math import inf, isfinite, nan
 from typing import NamedTuple
 
+from volery.base.frames import Vector
 from volery.base.position import Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
@@ -51,6 +52,14 @@ class Answer(NamedTuple):
     at: Ns
     accepted: bool
     result: str
+
+
+class Obstacle(NamedTuple):
+    """A distance that a range sensor has measured, m, and its direction: a unit vector (east, north, up)."""
+
+    metres: float
+    direction: Vector
+    at: Ns
 
 
 KEPT_TEXTS = 50
@@ -120,6 +129,8 @@ class Telemetry:
             Where an autopilot reports positions instead, ``pulse_of`` converts them. Its mode switch, as
             channel 5, is at 1500 where a program may fly, else at 1000.
         rc_ns: time of their last report; -1 before the first.
+        obstacles: what range sensors measure, by message and sector; only where a clearance is stated.
+        obstacles_ns: time of their last measurement, also of one that sees nothing; -1 before the first.
         boot_ns: last reported time of the autopilot since its boot; -1 where it sends none.
         home_ns: time since which the present home position is reported; -1 without one.
         detects_silence: whether a silence is one of the link, not of a node that does not run its loop.
@@ -172,6 +183,8 @@ class Telemetry:
         self.answers: dict[str, Answer] = {}
         self.rc: tuple[int, ...] = ()
         self.rc_ns: Ns = -1
+        self.obstacles: dict[tuple[str, int], Obstacle] = {}
+        self.obstacles_ns: Ns = -1
         self.changed = Signal(kernel, f"telemetry of {name}")
 
     def forget(self) -> None:
@@ -225,6 +238,20 @@ class Telemetry:
         lost = age if age > min(allowed, LONGEST_POSITION_AGE) else 0
         since = [one for one in (self._fix_lost_ns, self._estimate_lost_ns) if one is not None]
         return max(lost, *(now - one for one in since)) if since else lost
+
+    def note_obstacle(self, sector: tuple[str, int], direction: Vector, metres: float) -> None:
+        """Note what a range sensor measures now.
+
+        Args:
+            sector: which sensor or sector of it.
+            direction: unit vector (east, north, up).
+            metres: distance, m; infinite where nothing is seen.
+        """
+        self.obstacles_ns = self._kernel.now()
+        if isfinite(metres):
+            self.obstacles[sector] = Obstacle(metres, direction, self.obstacles_ns)
+        else:
+            self.obstacles.pop(sector, None)
 
     @property
     def estimate_valid(self) -> bool:

@@ -7,6 +7,7 @@ operation runs at a time, only while no other station has control, within the bo
 | what ends an operation | the caller gets | the vehicle |
 |---|---|---|
 | limits or fence are violated | ``OutOfBounds`` | holds where it has stopped |
+| an obstacle is nearer than the stated clearance | ``ObstacleNear`` | holds where it has stopped |
 | it is far off its commanded path or place for 3 s | ``OffTrack`` | holds where it has stopped |
 | the battery falls below the reserve | ``LowBattery`` | holds where it has stopped |
 | what is left suffices for a landing only | ``CriticalBattery`` | is landed where it is |
@@ -33,6 +34,7 @@ from volery.base.errors import (
     CapabilityError,
     ControlLost,
     LowBattery,
+    ObstacleNear,
     OffTrack,
     OutOfBounds,
     PositionLost,
@@ -75,11 +77,12 @@ from volery.vehicles.serviced_vehicle import ServicedVehicle
 READY_WITHIN_S = 120.0
 MISSION_WITHIN_S = 3600.0
 BATTERY_MEASURED_WITHIN_S = 10.0
+RANGES_WITHIN_S = 10.0
 
 MANUAL_CONTROL_FRESH: Ns = S
 """Manual flight does not begin with an older sample of manual control."""
 
-_MONITORED = (OutOfBounds, OffTrack, LowBattery, PositionLost, ThrustSaturated)
+_MONITORED = (OutOfBounds, OffTrack, ObstacleNear, LowBattery, PositionLost, ThrustSaturated)
 """Errors of monitors to which the vehicle reacts."""
 
 Truth = Callable[[], Position]
@@ -277,8 +280,7 @@ class Vehicle(ServicedVehicle, ABC):
             self._executor.check_link(asked, policy.to_safety)
             if policy.needs_control and not (policy.to_safety and self._executor.take_back()):
                 self._executor.check_ours(asked)
-            if policy.travels:
-                self._check_reserve(asked)
+            self._check_measured(asked, policy)
             self._execute(asked, plan, policy, goal, restarts)
         except BaseException as error:
             outcome, said = type(error).__name__, str(error)
@@ -321,6 +323,25 @@ class Vehicle(ServicedVehicle, ABC):
             raise UsageError(f"{self.name}: {operation}: {name} has {running} under way")
         by = f" by {task.name}" if task is not None else ""
         self._executor.abort_for(f"{operation}(){by}")
+
+    def _check_measured(self, asked: str, policy: OperationPolicy) -> None:
+        """Check what must be measured for the operation: the battery, and distances of obstacles."""
+        if policy.travels:
+            self._check_reserve(asked)
+        if policy.bounded and self.limits.clearance:
+            self._check_range_sensors(asked)
+
+    def _check_range_sensors(self, asked: str) -> None:
+        """Raise ``CapabilityError`` if no range sensor reports, so that no clearance can be kept."""
+        seen = self._driver.telemetry
+        if seen.obstacles_ns >= 0:
+            return
+        self._driver.request_obstacles()
+        if not self._executor.wait(lambda: seen.obstacles_ns >= 0, from_seconds(RANGES_WITHIN_S)):
+            raise CapabilityError(
+                f"{self.name}: {asked}: its autopilot reports no distances of obstacles, so a clearance of "
+                f"{self.limits.clearance:g} m cannot be kept; set its range sensors up, or state no clearance"
+            )
 
     def _execute(
         self,

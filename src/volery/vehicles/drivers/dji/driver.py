@@ -96,6 +96,9 @@ class Dji:
     def request_attitude(self) -> None:
         """Do nothing: the attitude arrives without a request."""
 
+    def request_obstacles(self) -> None:
+        """Do nothing: the SDK nodes publish no distances of obstacles."""
+
     def on_link_loss(self) -> str:
         """Return the assumed reaction: neither public definitions nor parameters state it."""
         return (

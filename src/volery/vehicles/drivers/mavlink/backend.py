@@ -165,6 +165,9 @@ class Backend(Protocol):
     def request_attitude(self) -> None:
         """See ``Driver``."""
 
+    def request_obstacles(self) -> None:
+        """See ``Driver``."""
+
     def request_arming_checks(self) -> None:
         """Request the texts of the arming checks that fail now."""
 

@@ -18,6 +18,7 @@ from volery.links.mavlink_messages import constant, entry_name, from_bytewise, m
 from volery.trace.events import LinkState
 from volery.vehicles.address import rate_option, records_texts, system_option
 from volery.vehicles.driver import AttitudeTarget, link_error
+from volery.vehicles.drivers.mavlink import obstacle_decoder
 from volery.vehicles.drivers.mavlink.backend import (
     FORCE,
     GROUND_SPEED,
@@ -37,6 +38,8 @@ HEARTBEAT_PERIOD: Ns = S
 SILENT_AFTER: Ns = 3 * S
 VERSION = "AUTOPILOT_VERSION"
 
+OBSTACLE_PERIOD: Ns = 200 * MS
+"""A vehicle at 5 m/s moves by a metre between two measurements."""
 STREAM_REQUEST_PERIOD: Ns = 3 * S
 MISSED = 3
 """Number of periods without a message after which the stream counts as missing."""
@@ -465,6 +468,13 @@ class MavlinkClient:
 
     def request_attitude(self) -> None:
         """Do nothing: ATTITUDE is requested from the beginning, at the rate of the address."""
+
+    def request_obstacles(self) -> None:
+        """Request the messages of range sensors."""
+        self._decoder.decode_obstacles()
+        for message in obstacle_decoder.MESSAGES:
+            self._streams.add(message, OBSTACLE_PERIOD)
+        self._streams.check(self._kernel.now())
 
     def request_target(self) -> None:
         """Request POSITION_TARGET_GLOBAL_INT, which reports the target."""

@@ -14,6 +14,7 @@ from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import StatusTextAssembler, constant, entry_name
 from volery.trace.events import Text
 from volery.vehicles.drivers.mavlink.backend import ACTIVE, ARMED, FAILSAFE, ON_GROUND, UNDEFINED
+from volery.vehicles.drivers.mavlink.obstacle_decoder import ObstacleDecoder
 from volery.vehicles.drivers.steps import DRONE_KIND, ROVER_KIND
 from volery.vehicles.telemetry import Attitude, Battery, StatusText, Telemetry, Velocity
 
@@ -102,6 +103,10 @@ class TelemetryDecoder(ABC):
         except UsageError:
             return False
         return True
+
+    def decode_obstacles(self) -> None:
+        """Decode the messages of range sensors from now on."""
+        self._handlers.update(ObstacleDecoder(self._telemetry).handlers)
 
     def add_text(self, severity: int, text: str) -> None:
         """Add a text of the autopilot."""

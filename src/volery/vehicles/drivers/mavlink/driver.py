@@ -118,6 +118,7 @@ class MavlinkDriver:
         self.problem = backend.problem
         self.services = backend.services
         self.request_attitude = backend.request_attitude
+        self.request_obstacles = backend.request_obstacles
         self._kernel = kernel
         self._backend = backend
         self._takeover = Takeover(kernel, backend.telemetry, self.obeys)

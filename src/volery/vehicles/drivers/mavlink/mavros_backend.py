@@ -269,6 +269,9 @@ class MavrosBackend:
         while isnan(self.telemetry.attitude.roll) and self._kernel.now() < until:
             self._spin()
 
+    def request_obstacles(self) -> None:
+        """Do nothing: MAVROS publishes range sensors only as its configuration names them."""
+
     def poll(self) -> None:
         """Process received messages; all of them are charged as one ``spinOnce``."""
         self._spinner.spin_once(0)

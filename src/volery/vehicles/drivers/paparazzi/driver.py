@@ -116,6 +116,9 @@ class Paparazzi:
     def request_attitude(self) -> None:
         """Do nothing: the attitude arrives without a request."""
 
+    def request_obstacles(self) -> None:
+        """Do nothing: pprzlink carries no distances of obstacles."""
+
     def ready(self, within: Ns) -> Sequence[Step]:
         """Wait for a fix, an origin, an aligned attitude, and checked settings."""
         advice = (
