@@ -1,11 +1,7 @@
 """The chunk in C and the chunk in Python have the same bytes, whatever the events."""
 
 import gc
-import subprocess
-import sys
 import weakref
-from importlib.util import module_from_spec, spec_from_file_location
-from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -17,7 +13,6 @@ from volery.trace.chunk import Chunk
 from volery.trace.encoding import OWN_EVENTS, PUBLISHED, Codec, Layout, _annotation
 from volery.trace.events import Message, Published, Slice, Text
 
-SCRIPT = Path(__file__).parents[2] / "scripts/compile_modules.py"
 LAYOUTS: dict[type[Any], Layout] = {
     **{kind: Codec(kind).layout for kind in OWN_EVENTS},
     Published: PUBLISHED,
@@ -33,16 +28,8 @@ VALUES: dict[str, st.SearchStrategy[Any]] = {
 
 
 @pytest.fixture(scope="module")
-def in_c(tmp_path_factory: pytest.TempPathFactory) -> ModuleType:
-    folder = tmp_path_factory.mktemp("compiled")
-    subprocess.run([sys.executable, SCRIPT, "--into", folder, "--only-c"], check=True, capture_output=True)
-    [library] = (folder / "volery/trace").glob("chunk.*.so")
-    spec = spec_from_file_location("volery.trace.chunk", library)
-    assert spec is not None
-    assert spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def in_c(twins_in_c: dict[str, ModuleType]) -> ModuleType:
+    return twins_in_c["chunk"]
 
 
 def event(kind: type[Any]) -> st.SearchStrategy[Any]:

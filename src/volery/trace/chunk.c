@@ -4,8 +4,8 @@
  * grows. The used length of the buffer changes when the record is whole, so an error leaves no half record.
  */
 
-#define PY_SSIZE_T_CLEAN
-#include <Python.h>
+#include "growing_bytes.h"
+#include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 #include <structmember.h>
@@ -20,25 +20,6 @@ enum {
     INDEX_HEAD = 15,   /* opcode 1, length 8, channel 2, length of the pairs 4 */
     LITTLE_ENDIAN_CDR = 0x0100
 };
-
-/* Bytes that grow at their end. */
-typedef struct {
-    char *bytes;
-    Py_ssize_t used, room;
-} Buffer;
-
-static char *reserve(Buffer *buffer, Py_ssize_t more)
-{
-    if (buffer->room - buffer->used < more) {
-        Py_ssize_t room = 2 * buffer->room + more;
-        char *bytes = PyMem_Realloc(buffer->bytes, room);
-        if (bytes == NULL)
-            return (char *)PyErr_NoMemory();
-        buffer->bytes = bytes;
-        buffer->room = room;
-    }
-    return buffer->bytes + buffer->used;
-}
 
 static char *put(char *at, uint64_t value, int width)
 {
@@ -163,18 +144,10 @@ static char *put_numbers(char *at, Writer *writer, PyObject *event)
 static int put_word(Buffer *records, Py_ssize_t *length, PyObject *word)
 {
     Py_ssize_t size;
-    PyObject *replaced = NULL;
-    const char *text = PyUnicode_AsUTF8AndSize(word, &size);
-    if (text == NULL) {
-        if (!PyErr_ExceptionMatches(PyExc_UnicodeEncodeError))
-            return -1;
-        PyErr_Clear(); /* a lone surrogate */
-        replaced = PyUnicode_AsEncodedString(word, "utf-8", "replace");
-        if (replaced == NULL)
-            return -1;
-        text = PyBytes_AS_STRING(replaced);
-        size = PyBytes_GET_SIZE(replaced);
-    }
+    PyObject *replaced;
+    const char *text = utf8(word, &size, &replaced);
+    if (text == NULL)
+        return -1;
     Py_ssize_t padded = (size + 1 + 3) / 4 * 4;
     char *at = reserve(records, *length + 4 + padded);
     if (at != NULL) {

@@ -31,6 +31,7 @@ from volery.trace.events import (
     Slice,
     Verdict,
 )
+from volery.trace.spans import Spans
 
 _quote = json.JSONEncoder(ensure_ascii=False).encode
 
@@ -56,20 +57,14 @@ class TimelineWriter:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._output = Output(path)
-        self._lines: list[str] = []
-        self._first = True
+        self._spans = Spans(self._output.write, self._core, _task)
         self._processes: dict[str, int] = {}
         self._threads: dict[tuple[str, str], str] = {}
-        self._spans = 0
-        self._running: dict[tuple[Any, ...], tuple[Ns, Slice]] = {}
-        self._cores: dict[tuple[Any, ...], str] = {}
-        self._names: dict[tuple[Any, ...], str] = {}
         self._quoted: dict[str, str] = {}
         self._tracks: dict[str, tuple[str, str]] = {}  # category and track of the spans of a process
         self._states: dict[tuple[str, str], Milestone] = {}
-        self._last: Ns = 0
         self._writers: dict[type[Any], Callable[[Any], None]] = {
-            Slice: self._slice,
+            Slice: self._spans.slice,
             Preemption: self._preemption,
             Activation: self._activation,
             Call: self._call,
@@ -100,44 +95,16 @@ class TimelineWriter:
         """End what is still in progress, and close the file. A second call does nothing."""
         if self._output.closed:
             return
-        for running in self._running.values():
-            self._ran(*running)
+        self._spans.end_slices()
         for state in self._states.values():
-            self._state_until(state, max(self._last, state.at))
-        self._write_out()
-        self._output.write(b"[]\n" if self._first else b"\n]\n")
+            self._state_until(state, max(self._spans.last, state.at))
+        self._spans.close()
         self._output.close()
-
-    def _slice(self, event: Slice) -> None:
-        """Write slices of one task that follow each other without a gap as one."""
-        core = event[2:4]
-        running = self._running.get(core)
-        if running is None:
-            self._running[core] = (event.start, event)
-        elif running[1].end == event.start and running[1][4:] == event[4:]:
-            self._running[core] = (running[0], event)
-        else:
-            self._ran(*running)
-            self._running[core] = (event.start, event)
-
-    def _ran(self, start: Ns, event: Slice) -> None:
-        where = self._cores.get(event[2:4])
-        if where is None:
-            where = self._thread(event.processor, str(event.core), f"core {event.core}")
-            self._cores[event[2:4]] = where
-        name = self._names.get(event[4:])
-        if name is None:
-            whole = event.component if event.task == event.component else f"{event.component}/{event.task}"
-            name = self._names[event[4:]] = _quote(whole)
-        self._complete(name, start, event.end, where)
 
     def _preemption(self, event: Preemption) -> None:
         """Write a mark on the track of the core, between the two tasks."""
-        where = self._cores.get(event[1:3]) or self._thread(
-            event.processor, str(event.core), f"core {event.core}"
-        )
         name = _quote(f"{event.by} preempts {event.preempted}")
-        self._line(f'{{"name":{name},"ph":"i","s":"t","ts":{_microseconds(event.at)},{where}}}')
+        self._spans.mark(name, "t", event.at, self._core(event.processor, event.core))
 
     def _activation(self, event: Activation) -> None:
         details = f'{{"deadline": {event.deadline}, {_CALLBACK}}}'
@@ -166,11 +133,12 @@ class TimelineWriter:
         if before is not None:
             self._state_until(before, event.at)
         self._states[key] = event
-        self._last = max(self._last, event.at)
+        self._spans.last = max(self._spans.last, event.at)
 
     def _state_until(self, state: Milestone, end: Ns) -> None:
         track = f"{state.kind} {state.subject}"
-        self._complete(_quote(state.state), state.at, end, self._thread(_FOLLOWED, track, track))
+        where = self._thread(_FOLLOWED, track, track)
+        self._spans.complete(_quote(state.state), state.at, end, where)
 
     def _link_state(self, event: LinkState) -> None:
         self._instant(event.at, f"{event.link}: {event.state}", event.detail)
@@ -181,29 +149,19 @@ class TimelineWriter:
     def _verdict(self, event: Verdict) -> None:
         self._instant(event.at, f"{event.requirement} {'met' if event.met else 'NOT met'}", event.observable)
 
-    def _complete(self, name: str, start: Ns, end: Ns, where: str) -> None:
-        """Write a span of a track whose spans do not overlap; *name* is JSON already."""
-        self._last = max(self._last, end)
-        times = f'"ts":{_microseconds(start)},"dur":{_microseconds(end - start)}'
-        self._line(f'{{"name":{name},"ph":"X",{times},{where}}}')
-
     def _span(self, process: str, name: str, start: Ns, end: Ns, details: str) -> None:
-        """Write a span that may overlap with others: an asynchronous pair; *name* and *details* are JSON."""
-        self._last = max(self._last, end)
-        self._spans += 1
+        """Write a span that may overlap with others of its process; *name* and *details* are JSON."""
         track = self._tracks.get(process)
         if track is None:
             track = self._tracks[process] = f'"cat":{_quote(process)}', self._thread(process, "", process)
-        common = f'{track[0]},"id":{self._spans},{track[1]}'
-        self._line(f'{{"name":{name},"ph":"b","ts":{_microseconds(start)},{common},"args":{details}}}')
-        self._line(f'{{"name":{name},"ph":"e","ts":{_microseconds(end)},{common}}}')
+        self._spans.pair(name, start, end, *track, details)
 
     def _instant(self, at: Ns, name: str, detail: str) -> None:
-        self._last = max(self._last, at)
         where = self._thread(_RUN, "", _RUN)
-        arguments = _quote({"detail": detail})
-        time = _microseconds(at)
-        self._line(f'{{"name":{_quote(name)},"ph":"i","s":"g","ts":{time},{where},"args":{arguments}}}')
+        self._spans.mark(_quote(name), "g", at, f'{where},"args":{_quote({"detail": detail})}')
+
+    def _core(self, processor: str, core: int) -> str:
+        return self._thread(processor, str(core), f"core {core}")
 
     def _thread(self, process: str, thread: str, name: str) -> str:
         """Return the ``pid`` and ``tid`` of a track, which is named when it first occurs."""
@@ -212,10 +170,10 @@ class TimelineWriter:
             return known
         if process not in self._processes:
             pid = self._processes[process] = len(self._processes) + 1
-            self._line(_introduction("process_name", f'"pid":{pid}', process))
+            self._spans.add(_introduction("process_name", f'"pid":{pid}', process))
         where = f'"pid":{self._processes[process]},"tid":{len(self._threads) + 1}'
         self._threads[process, thread] = where
-        self._line(_introduction("thread_name", where, name))
+        self._spans.add(_introduction("thread_name", where, name))
         return where
 
     def _name(self, name: str) -> str:
@@ -225,22 +183,10 @@ class TimelineWriter:
             known = self._quoted[name] = _quote(name)
         return known
 
-    def _line(self, line: str) -> None:
-        self._lines.append(line)
-        if len(self._lines) >= 1000:
-            self._write_out()
 
-    def _write_out(self) -> None:
-        if self._lines:
-            text = ("[\n" if self._first else ",\n") + ",\n".join(self._lines)
-            self._output.write(text.encode("utf-8", "replace"))
-            self._first = False
-        self._lines.clear()
+def _task(task: str, component: str) -> str:
+    return _quote(component if task == component else f"{component}/{task}")
 
 
 def _introduction(what: str, where: str, name: str) -> str:
     return f'{{"name":"{what}","ph":"M",{where},"args":{{"name":{_quote(name)}}}}}'
-
-
-def _microseconds(ns: Ns) -> str:
-    return f"{ns // 1000}.{ns % 1000:03d}"
