@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
-from volery.base.errors import Refused, UsageError
+from volery.base.errors import Refused
+from volery.vehicles.onboard_files import Show, check_absent, write_parts
 from volery.vehicles.services import LogEntry, Services
 from volery.vehicles.telemetry import Telemetry
 
@@ -30,9 +30,7 @@ class OnboardLogs:
         self._check_disarmed("list its logs")
         return self._services.list_logs()
 
-    def download(
-        self, entry: LogEntry, file: str | Path, show: Callable[[int, int], object] | None = None
-    ) -> Path:
+    def download(self, entry: LogEntry, file: str | Path, show: Show | None = None) -> Path:
         """Download a log into a file, which may not exist.
 
         What has arrived is kept if the transfer ends early, and the next call goes on from there.
@@ -46,25 +44,13 @@ class OnboardLogs:
             The path of the file.
         """
         self._check_disarmed(f"read log {entry.number}")
-        path, part = Path(file), Path(f"{file}.part")
-        if path.exists():
-            raise UsageError(f"{path} exists; choose another name")
+        check_absent(file)
         try:
-            have = part.stat().st_size if part.exists() else 0
-            with part.open("ab") as stream:
-                while have < entry.size:
-                    data = self._services.read_log(entry, have, PIECE)
-                    stream.write(data)
-                    stream.flush()
-                    have += len(data)
-                    if show is not None:
-                        show(have, entry.size)
-            part.rename(path)
-        except OSError as error:
-            raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
+            return write_parts(
+                file, entry.size, lambda have: self._services.read_log(entry, have, PIECE), show
+            )
         finally:
             self._services.end_log_transfer()
-        return path
 
     def _check_disarmed(self, asked: str) -> None:
         if self._telemetry.armed:

@@ -13,6 +13,7 @@ from volery.base.time import MS, Ns, S, from_seconds
 from volery.kernel.api import Handle
 from volery.kernel.waiting import sleep
 from volery.vehicles.bounded_vehicle import BoundedVehicle
+from volery.vehicles.onboard_files import OnboardFiles
 from volery.vehicles.onboard_logs import OnboardLogs
 from volery.vehicles.onboard_plan import OnboardPlan
 from volery.vehicles.parameters import Parameters
@@ -59,6 +60,17 @@ class ServicedVehicle(BoundedVehicle):
     def logs(self) -> OnboardLogs:
         """Logs on board: ``list``, ``download``."""
         return OnboardLogs(self._driver.telemetry, self._services("logs on board"))
+
+    @property
+    def files(self) -> OnboardFiles:
+        """Files on board: ``list``, ``download``."""
+        files = self._services("files on board").files
+        if files is None:
+            raise CapabilityError(
+                f"{self.name}: files on board: not with this driver; "
+                "an ArduPilot or PX4 offers them over MAVLink"
+            )
+        return OnboardFiles(self.name, files)
 
     @property
     def payload(self) -> Payload:

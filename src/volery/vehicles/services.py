@@ -47,6 +47,14 @@ class LogEntry(NamedTuple):
     utc: int
 
 
+class FileEntry(NamedTuple):
+    """A file or a folder on board: its name, and its size in bytes (0 of a folder)."""
+
+    name: str
+    size: int
+    is_folder: bool
+
+
 def mavlink_parameter_name(vehicle: str, name: str) -> str:
     """Return a name in capitals; raise ``UsageError`` if no parameter of MAVLink can have it."""
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9_]{1,16}", name):
@@ -54,8 +62,31 @@ def mavlink_parameter_name(vehicle: str, name: str) -> str:
     return name.upper()
 
 
+class FileSystem(Protocol):
+    """The files on board of one autopilot, read only. One is open at a time."""
+
+    def list(self, folder: str) -> list[FileEntry]:
+        """Return what is in a folder."""
+
+    def open(self, path: str) -> int:
+        """Open a file and return its size in bytes."""
+
+    def read(self, path: str, offset: int) -> bytes:
+        """Return bytes of the open file from *offset*, some 40 kB or more; none at its end."""
+
+    def close(self) -> None:
+        """Close the open file."""
+
+    def reset(self) -> None:
+        """Close files that another program left open."""
+
+
 class Services(Protocol):
     """Services of one autopilot. Every method blocks; without an answer it raises ``NotArrived``."""
+
+    @property
+    def files(self) -> FileSystem | None:
+        """Its files; ``None`` where the protocol carries none."""
 
     @property
     def home_first(self) -> bool:

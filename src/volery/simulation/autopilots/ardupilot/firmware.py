@@ -13,6 +13,7 @@ from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.ardupilot import (
     dataflash,
     fence_points,
+    files,
     mission,
     payload,
     pilot_input,
@@ -25,7 +26,7 @@ from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED
 from volery.simulation.autopilots.ardupilot.telemetry import Health
 from volery.simulation.autopilots.flight_stack.flight import Flight
-from volery.simulation.autopilots.mavlink import messages, onboard_files
+from volery.simulation.autopilots.mavlink import messages
 from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.mavlink.firmware import (
     Builder,
@@ -69,7 +70,6 @@ def questions(version: Builder) -> dict[str, QuestionHandler]:
     return {
         "AUTOPILOT_VERSION_REQUEST": on_version,
         "FENCE_FETCH_POINT": fence_points.on_fence_fetch,
-        "FILE_TRANSFER_PROTOCOL": onboard_files.on_file_transfer_with_parameters,
         "RALLY_FETCH_POINT": rally.on_rally_fetch,
         "TERRAIN_CHECK": on_terrain_check,
     }
@@ -336,5 +336,6 @@ def ardupilot_mavlink(
             refuses=lambda name: name.startswith("SIM_") and name not in COPTER_SUPPORTED
         ),
         logs=LogPolicy(dataflash.encode, first=1, while_armed=False),
+        files=files.FILES,
         on_parameter_list=on_parameter_list,
     )

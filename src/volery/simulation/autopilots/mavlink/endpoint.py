@@ -17,6 +17,7 @@ from volery.kernel.api import Action, Handle
 from volery.links.link import Frame, Link
 from volery.links.mavlink_messages import MessageStreams, status_text_chunks
 from volery.simulation.autopilots.mavlink.channel import AUTOPILOT, MavlinkChannel, Peer, StatusTextQueue
+from volery.simulation.autopilots.mavlink.file_service import FileService
 from volery.simulation.autopilots.mavlink.firmware import MavlinkFirmware
 from volery.simulation.autopilots.mavlink.log_service import LogService
 from volery.simulation.autopilots.mavlink.microservices import (
@@ -54,10 +55,12 @@ class MavlinkEndpoint:
         self._parameters = parameters = ParameterService(vehicle, firmware.parameters)
         missions = MissionService(vehicle, firmware)
         logs = LogService(vehicle, firmware.logs)
+        files = FileService(vehicle, firmware.files, logs.content)
         self._commands = CommandService(vehicle, firmware)
         self._handlers: dict[str, Handler] = {
             "COMMAND_INT": self._commands.on_int,
             "COMMAND_LONG": self._commands.on_long,
+            "FILE_TRANSFER_PROTOCOL": files.on_request,
             "LOG_ERASE": logs.on_erase,
             "LOG_REQUEST_DATA": logs.on_data,
             "LOG_REQUEST_END": logs.on_end,

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.mavlink.channel import Peer, StatusTextPolicy
+from volery.simulation.autopilots.mavlink.file_service import FilePolicy
 from volery.simulation.autopilots.mavlink.log_service import LogPolicy
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, Handler
 from volery.simulation.autopilots.onboard_mission import MissionItem
@@ -215,5 +216,6 @@ class MavlinkFirmware:
     parameters: ParameterPolicy = field(default_factory=ParameterPolicy)
     texts: StatusTextPolicy = field(default_factory=StatusTextPolicy)
     logs: LogPolicy
+    files: FilePolicy
     on_parameter_list: VehicleAction = do_nothing
     """Called when a station lists the parameters."""

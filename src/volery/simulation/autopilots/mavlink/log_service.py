@@ -61,7 +61,8 @@ class LogService:
         self._policy = policy
         self._transfer: _Transfer | None = None
 
-    def _file(self, log: FlightLog) -> bytes:
+    def content(self, log: FlightLog) -> bytes:
+        """Return a log as a file."""
         if log.encoded is None:
             log.encoded = self._policy.encode(log)
         return log.encoded
@@ -85,7 +86,7 @@ class LogService:
             if fields["start"] <= number <= fields["end"]:
                 entry = {"id": number, "num_logs": len(logs), "last_log_num": last}
                 ended = EPOCH_US // 1_000_000 + log.ended_at // S
-                peer.send("LOG_ENTRY", {**entry, "time_utc": ended, "size": len(self._file(log))})
+                peer.send("LOG_ENTRY", {**entry, "time_utc": ended, "size": len(self.content(log))})
 
     def on_data(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle LOG_REQUEST_DATA; from its end on, a log is answered with an empty piece."""
@@ -93,7 +94,7 @@ class LogService:
         if self._is_refused() or not 0 <= index < len(self._vehicle.logs):
             return
         self._stop()
-        data = self._file(self._vehicle.logs[index])
+        data = self.content(self._vehicle.logs[index])
         place = min(fields["ofs"], len(data))
         end = min(place + fields["count"], len(data))
         self._transfer = _Transfer(peer, fields["id"], data, place, end)

@@ -11,7 +11,6 @@ from functools import partial
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.autopilot import BootEvent, BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.flight_stack.flight import Flight
-from volery.simulation.autopilots.mavlink import onboard_files
 from volery.simulation.autopilots.mavlink.channel import StatusTextPolicy
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import (
@@ -26,7 +25,7 @@ from volery.simulation.autopilots.mavlink.firmware import (
 )
 from volery.simulation.autopilots.mavlink.log_service import LogPolicy
 from volery.simulation.autopilots.mavlink.messages import DENIED, FAILED, Handler
-from volery.simulation.autopilots.px4 import failsafes, mission, telemetry, ulog
+from volery.simulation.autopilots.px4 import failsafes, files, mission, telemetry, ulog
 from volery.simulation.autopilots.px4.commands import DO_SET_MODE, MESSAGE_HANDLERS, set_mode
 from volery.simulation.autopilots.px4.follow_target import on_follow_target
 from volery.simulation.autopilots.px4.modes import LOITER, READY_AFTER, Commander, commander_of
@@ -214,8 +213,7 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
             commands=commands,
             handlers={**MESSAGE_HANDLERS, "FOLLOW_TARGET": on_follow_target},
             questions={
-                "FILE_TRANSFER_PROTOCOL": onboard_files.on_file_transfer,
-                "SERIAL_CONTROL": onboard_files.on_shell,
+                "SERIAL_CONTROL": files.on_shell,
             },
             set_mode=set_mode,
             set_mode_ack=DO_SET_MODE,
@@ -240,6 +238,7 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
         parameters=PARAMETERS,
         texts=TEXTS,
         logs=LogPolicy(ulog.encode, first=0, while_armed=True),
+        files=files.FILES,
     )
 
 

@@ -33,6 +33,7 @@ class DjiServices:
     """
 
     home_first = False
+    files = None
 
     def __init__(self, kernel: Kernel, backend: DjiBackend) -> None:
         self._kernel = kernel

@@ -62,6 +62,8 @@ class MavrosServices:
         home_first: whether item 0 of a mission is home, as in ArduPilot.
     """
 
+    files = None
+
     def __init__(
         self, kernel: Kernel, node: Node, telemetry: Telemetry, namespace: str, spin: Action, home_first: bool
     ) -> None:

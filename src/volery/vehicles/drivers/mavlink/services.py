@@ -8,24 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import isclose
-from typing import Any, TypeVar
+from typing import Any
 
-from volery.base.errors import CapabilityError, NotArrived, Refused, did_you_mean
+from volery.base.errors import CapabilityError, Refused, did_you_mean
 from volery.base.time import MS, Ns, S
-from volery.kernel.api import Action, Kernel
-from volery.kernel.waiting import Lock, Signal
+from volery.kernel.api import Kernel
+from volery.kernel.waiting import Lock
 from volery.links.link import Frame
 from volery.links.mavlink_messages import constant, entry_name, from_bytewise, mission_type, to_bytewise
+from volery.vehicles.drivers.mavlink.file_transfer import FileTransfer
+from volery.vehicles.drivers.mavlink.pending_requests import PendingRequests
 from volery.vehicles.rtcm import correction_parts
 from volery.vehicles.services import Item, LogEntry, Parameter, mavlink_parameter_name
 from volery.vehicles.telemetry import Telemetry
 
-TRIES = 5
-AGAIN: Ns = 1500 * MS
-"""Time after which a request is sent again: a parameter is read in 0.1 s, a radio delays by a second."""
 ANSWERED_WITHIN: Ns = 10 * S
-STALLED: Ns = S
-"""Time without a further parameter or piece of a log after which the missing ones are requested."""
 MISSING_AT_ONCE = 20
 """Number of missing parameters that are requested together."""
 
@@ -37,11 +34,10 @@ _IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
 _UNSUPPORTED = constant("MAV_RESULT_UNSUPPORTED")
 _REAL32, _REAL64 = constant("MAV_PARAM_TYPE_REAL32"), constant("MAV_PARAM_TYPE_REAL64")
 
-T = TypeVar("T")
 Send = Callable[..., None]
 
 
-class MavlinkServices:
+class MavlinkServices(PendingRequests):
     """``Services`` of one autopilot on a MAVLink link.
 
     Args:
@@ -63,68 +59,15 @@ class MavlinkServices:
         bytewise: bool,
         home_first: bool,
     ) -> None:
+        super().__init__(kernel, telemetry.name)
         self.home_first = home_first
-        self._kernel = kernel
+        self.files = FileTransfer(self, telemetry.name, send_to)
         self._telemetry = telemetry
-        self._name = telemetry.name
         self._send, self._send_to = send, send_to
         self._bytewise = bytewise
-        self._listeners: list[Callable[[Frame], None]] = []
-        self._arrived = Signal(kernel, f"an answer of {telemetry.name}")
         self._plan_lock = Lock(kernel, f"plan of {telemetry.name}")
         self._known: dict[str, Parameter] = {}
         self._correction = 0
-
-    @property
-    def listening(self) -> bool:
-        """Whether a request in progress looks at every message."""
-        return bool(self._listeners)
-
-    def receive(self, frame: Frame) -> None:
-        """Pass a frame of the autopilot to the requests in progress."""
-        if self._listeners:
-            for listener in tuple(self._listeners):
-                listener(frame)
-            self._arrived.notify()
-
-    # -- requests
-
-    def _ask(
-        self,
-        asked: str,
-        send: Action,
-        answer: Callable[[Frame], T | None],
-        *,
-        within: Ns = AGAIN * TRIES,
-        again: Ns = AGAIN,
-        unanswered: str = "",
-    ) -> T:
-        """Send a request, again each *again* ns, until *answer* returns something; return that."""
-        found: list[T] = []
-        failed: list[Exception] = []
-
-        def listen(frame: Frame) -> None:
-            if found or failed:
-                return
-            try:
-                taken = answer(frame)
-            except (CapabilityError, Refused) as error:
-                failed.append(error)
-                return
-            if taken is not None:
-                found.append(taken)
-
-        with self._kernel.joined(), _Listening(self._kernel, self._listeners, listen):
-            until = self._kernel.now() + within
-            while self._kernel.now() < until:
-                with self._kernel:
-                    send()
-                wait = min(again, until - self._kernel.now())
-                if self._arrived.wait_for(lambda: found or failed, wait, ends_activation=True):
-                    if failed:
-                        raise failed[0]
-                    return found[0]
-        raise NotArrived(self._name, asked, f"no answer within {within / S:g} s{unanswered}")
 
     def command(self, asked: str, command: str, *parameters: float, within: Ns = 0) -> None:
         """See ``Services``."""
@@ -149,7 +92,7 @@ class MavlinkServices:
         def send() -> None:
             self._send_to("COMMAND_LONG", command=number, **named)
 
-        self._ask(asked, send, acknowledged, within=within or ANSWERED_WITHIN, again=2 * S)
+        self.ask(asked, send, acknowledged, within=within or ANSWERED_WITHIN, again=2 * S)
 
     # -- parameters
 
@@ -176,7 +119,7 @@ class MavlinkServices:
             return found if found is not None and found.name == name else None
 
         hint = did_you_mean(name, self._known) if name not in self._known else ""
-        return self._ask(
+        return self.ask(
             f"read the parameter {name}",
             lambda: self._send_to("PARAM_REQUEST_READ", param_id=name, param_index=-1),
             answer,
@@ -195,7 +138,7 @@ class MavlinkServices:
             found = self._parameter(frame)
             return found if found is not None and found.name == name else None
 
-        after = self._ask(
+        after = self.ask(
             asked,
             lambda: self._send_to("PARAM_SET", param_id=name, param_value=sent, param_type=before.type),
             answer,
@@ -216,26 +159,24 @@ class MavlinkServices:
                 if frame.fields["param_index"] < frame.fields["param_count"]:
                     by_index[frame.fields["param_index"]] = found
 
-        with self._kernel.joined(), _Listening(self._kernel, self._listeners, listen):
-            stalled = 0
-            with self._kernel:
+        def ask() -> None:
+            missing = [index for index in range(counts[0]) if index not in by_index]
+            for index in missing[:MISSING_AT_ONCE]:
+                self._send_to("PARAM_REQUEST_READ", param_id="", param_index=index)
+            if not counts[0]:
                 self._send_to("PARAM_REQUEST_LIST")
-            while not counts[0] or len(by_index) < counts[0]:
-                before = len(by_index)
-                self._arrived.wait_for(lambda: 0 < counts[0] <= len(by_index), STALLED, ends_activation=True)
-                if len(by_index) > before:
-                    stalled = 0
-                    continue
-                stalled += 1
-                if stalled > TRIES:
-                    what = f"{len(by_index)} of {counts[0]} arrived" if counts[0] else "no answer"
-                    raise NotArrived(self._name, "read all parameters", what)
-                missing = [index for index in range(counts[0]) if index not in by_index]
-                with self._kernel:
-                    for index in missing[:MISSING_AT_ONCE]:
-                        self._send_to("PARAM_REQUEST_READ", param_id="", param_index=index)
-                    if not counts[0]:
-                        self._send_to("PARAM_REQUEST_LIST")
+
+        def so_far() -> str:
+            return f"{len(by_index)} of {counts[0]} arrived" if counts[0] else "no answer"
+
+        self.gather(
+            "read all parameters",
+            ask,
+            listen,
+            count=lambda: len(by_index),
+            whole=lambda: 0 < counts[0] <= len(by_index),
+            so_far=so_far,
+        )
         return {found.name: found for _, found in sorted(by_index.items())}
 
     # -- plans
@@ -250,9 +191,7 @@ class MavlinkServices:
 
         with self._kernel.joined(), self._plan_lock:
             asked = f"read its {_LISTS[kind]}"
-            count = self._ask(
-                asked, lambda: self._send_to("MISSION_REQUEST_LIST", mission_type=kind), counted
-            )
+            count = self.ask(asked, lambda: self._send_to("MISSION_REQUEST_LIST", mission_type=kind), counted)
             items = [self._download_item(asked, kind, number) for number in range(count)]
             with self._kernel:
                 self._send_to("MISSION_ACK", type=0, mission_type=kind)
@@ -272,7 +211,7 @@ class MavlinkServices:
             place = fields["x"] / 1e7, fields["y"] / 1e7
             return Item(fields["command"], fields["frame"], parameters, *place, fields["z"])
 
-        return self._ask(
+        return self.ask(
             asked, lambda: self._send_to("MISSION_REQUEST_INT", seq=number, mission_type=kind), item
         )
 
@@ -299,7 +238,7 @@ class MavlinkServices:
 
         with self._kernel.joined(), self._plan_lock:
             lasting = 30 * S + len(items) * S
-            self._ask(asked, send, answer, within=lasting, again=10 * S + len(items) * 200 * MS)
+            self.ask(asked, send, answer, within=lasting, again=10 * S + len(items) * 200 * MS)
 
     # -- logs
 
@@ -317,7 +256,7 @@ class MavlinkServices:
             whole = len(entries) >= fields["num_logs"]
             return [entries[number] for number in sorted(entries)] if whole else None
 
-        return self._ask(
+        return self.ask(
             "list its logs", lambda: self._send_to("LOG_REQUEST_LIST", start=0, end=0xFFFF), answer
         )
 
@@ -347,7 +286,7 @@ class MavlinkServices:
             rest = offset + count - place
             self._send_to("LOG_REQUEST_DATA", id=entry.number, ofs=place, count=rest)
 
-        return self._ask(f"read log {entry.number} from byte {offset}", send, answer, within=20 * S)
+        return self.ask(f"read log {entry.number} from byte {offset}", send, answer, within=20 * S)
 
     def end_log_transfer(self) -> None:
         """See ``Services``."""
@@ -362,23 +301,6 @@ class MavlinkServices:
             for fields in correction_parts(message, self._correction):
                 self._send("GPS_RTCM_DATA", **fields)
             self._correction = (self._correction + 1) % 32
-
-
-class _Listening:
-    """Adds a listener while the context lasts."""
-
-    def __init__(
-        self, kernel: Kernel, listeners: list[Callable[[Frame], None]], listener: Callable[[Frame], None]
-    ) -> None:
-        self._kernel, self._listeners, self._listener = kernel, listeners, listener
-
-    def __enter__(self) -> None:
-        with self._kernel.guard:
-            self._listeners.append(self._listener)
-
-    def __exit__(self, *_error: object) -> None:
-        with self._kernel.guard:
-            self._listeners.remove(self._listener)
 
 
 _LISTS = {0: "mission", 1: "geofence", 2: "rally points"}

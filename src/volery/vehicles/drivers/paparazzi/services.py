@@ -36,6 +36,7 @@ class PaparazziServices:
     """
 
     home_first = False
+    files = None
 
     def __init__(self, kernel: Kernel, backend: PaparazziBackend) -> None:
         self._kernel = kernel
