@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink import DFReader
 
 pytestmark = pytest.mark.integration
 
@@ -75,3 +76,15 @@ def test_its_console_flies_and_it_forwards(proxied: Any) -> None:
     order("mode LAND")
     hearer.wait_armed(False)
     assert "Got COMMAND_ACK" in said.read_text(errors="replace")
+    order("log list")
+    hearer.wait("HEARTBEAT", lambda _: "numLogs 1" in said.read_text(errors="replace"))
+    order("log download 1 one.bin")
+    hearer.wait("HEARTBEAT", lambda _: "Finished downloading" in said.read_text(errors="replace"))
+    order("ftp get /logs/00000001.BIN two.bin")
+    hearer.wait("HEARTBEAT", lambda _: "Wrote " in said.read_text(errors="replace"))
+    log = DFReader.DFReader_binary(str(folder / "one.bin"))
+    heights = []
+    while (message := log.recv_match(type="POS")) is not None:
+        heights.append(message.RelHomeAlt)
+    assert 9.5 < max(heights) < 11.0
+    assert (folder / "two.bin").read_bytes() == (folder / "one.bin").read_bytes()

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
 from math import nan
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -102,7 +103,15 @@ async def refused(awaited: Awaitable[Any], error: type[Exception]) -> str:
     return str(caught.value._result.result.name)
 
 
-async def flies(address: str, port: int) -> None:
+async def logged(drone: Any, file: Path) -> None:
+    """Download the only log by the log protocol."""
+    (entry,) = await soon(drone.log_files.get_entries())
+    async for _ in drone.log_files.download_log_file(entry, str(file)):
+        pass
+    assert file.stat().st_size == entry.size_bytes
+
+
+async def flies(address: str, port: int, folder: Path) -> None:
     async with connected(address, port) as drone:
         telemetry, action = drone.telemetry, drone.action
         await until_ready(drone)
@@ -130,14 +139,28 @@ async def flies(address: str, port: int) -> None:
         await first(telemetry.flight_mode(), lambda mode: str(mode) == "LAND")
         await first(telemetry.armed(), lambda armed: not armed)
         assert not await first(telemetry.in_air(), lambda flying: not flying)
+        await logged(drone, folder / "one.bin")
 
 
-def test_a_flight_over_tcp(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:
-    asyncio.run(flies(f"tcpout://127.0.0.1:{serve('tcp', 15.0).port}", free_port()))
+def assert_flown_12_m(file: Path) -> None:
+    """Read a DataFlash log as pymavlink does."""
+    from pymavlink import DFReader
+
+    log = DFReader.DFReader_binary(str(file))
+    heights = []
+    while (message := log.recv_match(type="POS")) is not None:
+        heights.append(message.RelHomeAlt)
+    assert 11.0 < max(heights) < 13.5
 
 
-def test_a_flight_over_udp(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:
-    asyncio.run(flies(f"udpin://127.0.0.1:{serve('udp', 15.0).port}", free_port()))
+def test_a_flight_over_tcp(serve: Callable[..., Any], free_port: Callable[[], int], tmp_path: Path) -> None:
+    asyncio.run(flies(f"tcpout://127.0.0.1:{serve('tcp', 15.0).port}", free_port(), tmp_path))
+    assert_flown_12_m(tmp_path / "one.bin")
+
+
+def test_a_flight_over_udp(serve: Callable[..., Any], free_port: Callable[[], int], tmp_path: Path) -> None:
+    asyncio.run(flies(f"udpin://127.0.0.1:{serve('udp', 15.0).port}", free_port(), tmp_path))
+    assert_flown_12_m(tmp_path / "one.bin")
 
 
 async def plans(address: str, port: int) -> None:
@@ -232,8 +255,18 @@ def px4(serve: Callable[..., Any]) -> str:
     return f"udpin://127.0.0.1:{serve('udp', PX4_SPEED, autopilot='px4').port}"
 
 
-async def flies_px4(address: str, port: int) -> None:
+async def filed(drone: Any, folder: Path) -> Path:
+    """Download the only log of a PX4 by MAVLink FTP; return the file."""
+    (day,) = (await soon(drone.ftp.list_directory("/log"))).dirs
+    (name,) = (await soon(drone.ftp.list_directory(f"/log/{day}"))).files
+    async for _ in drone.ftp.download(f"/log/{day}/{name}", str(folder), False):
+        pass
+    return folder / name
+
+
+async def flies_px4(address: str, port: int, folder: Path) -> None:
     from mavsdk.offboard import PositionNedYaw, VelocityBodyYawspeed
+    from pyulog import ULog
 
     async with connected(address, port, PX4_IDLE) as drone:
         telemetry, action, offboard = drone.telemetry, drone.action, drone.offboard
@@ -257,10 +290,16 @@ async def flies_px4(address: str, port: int) -> None:
         await soon(action.land())
         await first(telemetry.armed(), lambda armed: not armed)
         assert not await first(telemetry.in_air(), lambda flying: not flying)
+        await logged(drone, folder / "one.ulg")
+        same = await filed(drone, folder)
+        assert same.read_bytes() == (folder / "one.ulg").read_bytes()
+    local = ULog(str(same)).get_dataset("vehicle_local_position").data
+    assert 7.5 < max(-local["z"]) < 10.0
+    assert max(local["x"]) > 18.0
 
 
-def test_a_flight_of_px4(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:
-    asyncio.run(flies_px4(px4(serve), free_port()))
+def test_a_flight_of_px4(serve: Callable[..., Any], free_port: Callable[[], int], tmp_path: Path) -> None:
+    asyncio.run(flies_px4(px4(serve), free_port(), tmp_path))
 
 
 async def plans_px4(address: str, port: int) -> None:
