@@ -521,3 +521,32 @@ def test_a_run_that_a_listener_cancels_within_a_timer_stops_there() -> None:
     assert kernel.now() == 7 * MS
     assert [event.task for event in slices if isinstance(event, Slice)] == ["low", "high"]
     kernel.close()
+
+
+def test_a_quantum_that_is_not_stated_is_10_ms(virtual: VirtualKernel, slices: Slices) -> None:
+    core = Processor(virtual, "cpu", scheduler="round-robin")
+    compute(virtual, core, "a", at=0, ms=15)
+    compute(virtual, core, "b", at=0, ms=1)
+    virtual.run(S)
+    assert slices() == [(0, 10, "cpu.0", "a"), (10, 11, "cpu.0", "b"), (11, 16, "cpu.0", "a")]
+
+
+def test_background_computing_without_a_priority_comes_before_what_is_less_than_0(
+    virtual: VirtualKernel, slices: Slices
+) -> None:
+    core = Processor(virtual, "cpu")
+    node = ExecutionContext("node", core, None)
+    compute(virtual, core, "idle", at=0, ms=4, priority=-1)
+    virtual.call_at(MS, lambda: core.load(node, 2 * MS))
+    virtual.run(S)
+    assert slices() == [(0, 1, "cpu.0", "idle"), (1, 3, "cpu.0", "node"), (3, 6, "cpu.0", "idle")]
+
+
+def test_a_job_that_ends_as_it_would_be_preempted_is_no_preemption(
+    virtual: VirtualKernel, events: list[Event]
+) -> None:
+    core = Processor(virtual, "cpu")
+    compute(virtual, core, "high", at=4, ms=3, priority=2)
+    compute(virtual, core, "low", at=0, ms=4, priority=1)
+    virtual.run(S)
+    assert [event for event in events if isinstance(event, Preemption)] == []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import FrozenInstanceError, replace
 
 import pytest
 
@@ -86,6 +86,7 @@ def test_a_new_task_is_in_its_scope_and_at_its_beginning() -> None:
         0,
     )
     assert (task.done, task.adopted, task.woken, task.pending_cancellation) == (False, False, False, None)
+    assert (task.name, task.waiting_for, task.contexts) == ("t", "", [OWN])
 
 
 def test_a_cancellation_is_delivered_until_the_task_has_swallowed_ten() -> None:
@@ -151,3 +152,19 @@ def test_children_that_have_ended_are_forgotten() -> None:
     assert alive.is_empty
     assert not busy.is_empty
     assert not top.is_empty
+
+
+def test_hooks_and_deadlines_are_those_of_the_tasks_own_context_within_a_call_too() -> None:
+    released: list[str] = []
+    task = task_of(replace(OWN, on_release=lambda one: released.append(one.context.component)))
+    task.contexts.append(ExecutionContext("called", deadline=MS, on_release=lambda _: released.append("no")))
+    task.release(5 * MS)
+    assert (released, task.deadline) == (["called"], 25 * MS)
+    assert task.finish(6 * MS) == Activation(5 * MS, 6 * MS, "own", 25 * MS)
+
+
+def test_contexts_and_scopes_are_themselves_whatever_is_in_them() -> None:
+    assert len({OWN, replace(OWN)}) == 2
+    assert Scope("s") != Scope("s")
+    with pytest.raises(FrozenInstanceError):
+        OWN.priority = 4  # type: ignore[misc]

@@ -11,9 +11,9 @@ import pytest
 from volery.base.errors import ComponentError, Deadlock, UsageError
 from volery.base.time import MS, S
 from volery.kernel.interrupts import Watchdog
-from volery.kernel.task import Cancelled, ExecutionContext, Scope, Task
-from volery.kernel.virtual import Pacer, VirtualKernel
-from volery.kernel.waiting import Event, Queue, sleep
+from volery.kernel.task import MAX_SWALLOWED_CANCELLATIONS, Cancelled, ExecutionContext, Scope, Task
+from volery.kernel.virtual import NEVER, Pacer, VirtualKernel
+from volery.kernel.waiting import Event, Queue, Signal, sleep
 
 Spawn = Callable[..., Task]
 
@@ -456,3 +456,50 @@ def test_the_reason_of_a_close_reaches_its_tasks(virtual: VirtualKernel, spawn: 
     assert virtual.close("power off") == []
     assert seen == ["power off"]
     assert virtual.root.cancelled == "power off"
+
+
+def test_time_begins_at_0_and_is_skipped_up_to_the_next_event_and_the_end(
+    virtual: VirtualKernel, spawn: Spawn
+) -> None:
+    assert virtual.now() == 0
+    found: list[int] = []
+
+    def body() -> None:
+        found.append(virtual.skip(5 * MS))  # something is due then
+        found.append(virtual.skip(4 * MS))
+        virtual.sleep_until(6 * MS)
+        found.append(virtual.skip(5 * MS))  # beyond the end
+        found.append(virtual.skip(4 * MS))
+        found.append(virtual.now())
+
+    virtual.call_at(5 * MS, lambda: None)
+    spawn(body)
+    virtual.run(10 * MS)
+    assert found == [NEVER, 0, NEVER, 6 * MS, 10 * MS]
+
+
+@pytest.mark.parametrize("waits", ["sleep", "signal"])
+def test_a_task_that_swallows_too_many_cancellations_never_runs_again(
+    waits: str, virtual: VirtualKernel, spawn: Spawn
+) -> None:
+    changed, scope = Signal(virtual, "level"), Scope("mission", virtual.root)
+    swallowed: list[int] = []
+
+    def body() -> None:
+        while True:
+            try:
+                if waits == "sleep":
+                    virtual.sleep_until(virtual.now() + MS)
+                else:
+                    changed.wait_for(lambda: False, MS)
+            except Cancelled:
+                swallowed.append(virtual.now())
+
+    others: list[int] = []
+    virtual.every(MS, lambda: others.append(virtual.now()))
+    task = spawn(body, scope=scope)
+    virtual.call_at(5 * MS, lambda: virtual.cancel(scope, "enough"))
+    virtual.run(20 * MS)
+    assert swallowed == [5 * MS] * MAX_SWALLOWED_CANCELLATIONS
+    assert others[-1] == 20 * MS
+    assert not task.done

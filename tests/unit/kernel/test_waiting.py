@@ -25,6 +25,7 @@ from volery.kernel.waiting import (
     current_task,
     end_activation,
     executing_in,
+    next_release,
     read_clock,
     sleep,
 )
@@ -636,3 +637,27 @@ def test_a_place_is_where_component_code_calls_the_framework() -> None:
     first = [framework["read"]() for _ in range(2)]
     second = framework["read"]()
     assert first[0] == first[1] != second
+
+
+def test_a_loop_counts_anew_when_it_is_more_than_two_periods_late() -> None:
+    assert next_release(0, 10, 30) == (10, 10)
+    assert next_release(0, 10, 31) == (10, 31)
+
+
+def test_the_clock_is_read_outside_of_tasks_too(virtual: VirtualKernel) -> None:
+    read: list[int] = []
+    virtual.call_at(3 * MS, lambda: read.append(read_clock(virtual)))
+    virtual.run(S)
+    assert read == [3 * MS]
+
+
+def test_the_shortest_sleep_is_one_nanosecond(virtual: VirtualKernel, spawn: Spawn) -> None:
+    woken: list[int] = []
+
+    def body() -> None:
+        sleep(virtual, 1)
+        woken.append(virtual.now())
+
+    spawn(body)
+    virtual.run(S)
+    assert woken == [1]

@@ -248,3 +248,44 @@ def test_a_chain_of_one_topic_is_the_latency_of_a_message() -> None:
     ledger = ChainLedger(ChainSetup("eye", ("/image",)))
     ledger.message(Message(S, S + 3 * MS, "/image", "/camera", "/locate", 1))
     assert ledger.record().latency_s.max == pytest.approx(0.003)
+
+
+def test_a_component_that_did_nothing_has_used_nothing() -> None:
+    record = ComponentLedger(ComponentSetup("idle"), "onboard").record(lambda seconds: seconds)
+    assert (record.cpu_s, record.ros_cpu_s, record.energy_j) == (0.0, 0.0, 0.0)
+    assert (record.activations, record.deadline_misses, record.calls) == (0, 0, 0)
+
+
+def test_a_vehicle_that_was_never_disarmed_stands_at_height_0_and_moves_in_all_directions() -> None:
+    ledger = VehicleLedger(VehicleSetup("d", "px4", "multirotor"))
+    ledger.state(state(0, z=0.9, armed=True))
+    ledger.state(state(S, x=3.0, y=-4.0, z=12.9, armed=True))
+    assert ledger.record().airborne_s == 1.0
+    assert ledger.record().distance_m == pytest.approx(13.0)
+    back = VehicleLedger(VehicleSetup("d", "px4", "multirotor"))
+    back.state(state(0, x=3.0, y=4.0, z=13.0))
+    back.state(state(S, x=0.0, y=0.0, z=1.0))
+    assert back.record().distance_m == pytest.approx(13.0)
+
+
+def test_the_p95_of_a_chain_leaves_out_its_slowest() -> None:
+    sent = [
+        Message(at * S, at * S + late * MS, "/image", "/c", "/l", 1)
+        for at, late in enumerate([1] * 97 + [9] * 3)
+    ]
+    ledger = ChainLedger(ChainSetup("eye", ("/image",)))
+    for message in sent:
+        ledger.message(message)
+    latency = ledger.record().latency_s
+    assert latency.p95 == pytest.approx(0.001, rel=0.002)
+    assert latency.max == pytest.approx(0.009)
+
+
+def test_chains_of_two_nodes_are_not_mixed() -> None:
+    found = chain(
+        Message(0, 1 * MS, "/image", "/camera", "/locate", 1),
+        Message(2 * MS, 3 * MS, "/image", "/camera", "/other", 1),
+        Message(4 * MS, 5 * MS, "/pose", "/locate", "/steer", 1),  # of the first image, not of the other's
+        Message(6 * MS, 7 * MS, "/command", "/steer", "/motor", 1),
+    )
+    assert found.record().latency_s.max == pytest.approx(0.007)

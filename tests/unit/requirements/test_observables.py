@@ -105,6 +105,7 @@ def test_a_late_release_violates_the_period_and_one_in_between_does_not():
     assert observed("loop.period_violations", activations(*regular)) == 0.0
     assert observed("loop.period_violations", activations(*regular, (421, 422))) == 1.0
     assert isnan(observed("server.period_violations", activations((0, 1))))
+    assert observed("loop.period_violations", activations((500, 501), (600, 601))) == 0.0  # began late
     others = [one._replace(component="server") for one in activations((0, 1), (500, 501), (900, 901))]
     assert observed("loop.period_violations", activations(*regular) + others) == 0.0
 

@@ -588,10 +588,10 @@ def test_the_last_text_has_its_age_if_it_is_old(rig: Rig) -> None:
     rig.says(0.5, "Vibration")
     rig.says(1.0, "Crash")
     texts: list[str] = []
-    for when in (3.9, 8.0):
+    for when in (3.9, 4.5, 8.0):
         rig.at(when, lambda: texts.append(rig.executor.last_text()))
     rig.kernel.run(10 * S)
-    assert texts == ["; it last said 'Crash'", "; it last said 'Crash' (7 s before)"]
+    assert texts == [f"; it last said 'Crash'{age}" for age in ("", " (4 s before)", " (7 s before)")]
 
 
 def test_another_clock_is_reported_once(rig: Rig) -> None:
@@ -600,6 +600,7 @@ def test_another_clock_is_reported_once(rig: Rig) -> None:
     assert [event.text[:44] for event in rig.events if isinstance(event, Text)] == [
         "its clock runs 2.0 times as fast as this com"
     ]
+    assert [event.severity for event in rig.events if isinstance(event, Text)] == [5]  # a notice
 
 
 def test_distances_to_a_goal(rig: Rig) -> None:
@@ -612,3 +613,49 @@ def test_distances_to_a_goal(rig: Rig) -> None:
     assert isnan(along)
     assert up == 5.0
     assert all(isnan(one) for one in distance_to(NO_GOAL, Position(46.0, -103.0, AMSL(1.0))))
+
+
+def test_a_refusal_without_a_text_is_the_error_half_a_second_later(rig: Rig) -> None:
+    rig.answers(1.0, "400", accepted=False)
+    with pytest.raises(Refused):
+        rig.execute(rig.step(answer="400"))
+    assert rig.kernel.now() == pytest.approx(1.5 * S, abs=0.1 * S)
+
+
+def test_a_cycle_is_not_spun_after_the_time(rig: Rig) -> None:
+    cycles: list[Ns] = []
+
+    def cycle() -> None:
+        cycles.append(rig.kernel.now())
+        rig.kernel.sleep_until(rig.kernel.now() + 100 * MS)
+
+    rig.driver.cycle = cycle
+    assert rig.run(lambda: rig.executor.wait(lambda: False, 300 * MS)) == 0.3
+    assert len(cycles) == 3
+
+
+def test_a_failsafe_on_the_ground_does_not_keep_the_offboard_mode_out(rig: Rig) -> None:
+    rig.seen.mode, rig.seen.failsafe, rig.seen.flying, rig.seen.armed = "LAND", True, False, False
+    rig.sets(1.0, mode="GUIDED")
+    assert rig.execute(rig.step(enters="GUIDED", done=lambda seen: seen.mode == "GUIDED")) == 1.0
+    assert rig.sent[0] == 0.0
+
+
+@pytest.mark.parametrize(("armed_at", "ends"), [(3.0, 3.0), (9.0, 4.0)])
+def test_what_a_signal_interrupted_is_waited_for_until_it_would_show(
+    rig: Rig, armed_at: float, ends: float
+) -> None:
+    def interrupted() -> Step:
+        raise KeyboardInterrupt
+
+    rig.seen.armed = False
+    rig.sets(armed_at, armed=True)
+
+    def script() -> None:
+        rig.kernel.sleep_until(S)
+        with pytest.raises(KeyboardInterrupt):
+            rig.executor.execute("arm", interrupted)  # type: ignore[arg-type]
+        rig.kernel.sleep_until(2 * S)
+        rig.executor.wait_for_interrupted()
+
+    assert rig.run(script) == ends

@@ -34,7 +34,9 @@ class Silent:
         pass
 
 
-def timed_out_after(rate: float, within: Ns, *, sends_its_clock: bool = True) -> tuple[float, list[Event]]:
+def timed_out_after(
+    rate: float, within: Ns, *, sends_its_clock: bool = True, booted_before: Ns = 0
+) -> tuple[float, list[Event]]:
     """Return after how long of the program's time a step of *within* of the vehicle's ends, s, and texts."""
     events: list[Event] = []
     kernel = VirtualKernel(record=events.append)
@@ -44,7 +46,7 @@ def timed_out_after(rate: float, within: Ns, *, sends_its_clock: bool = True) ->
     def report() -> None:
         seen.note_message(kernel.now())
         if sends_its_clock:
-            seen.update_clock(round(rate * kernel.now()) // MS * MS)
+            seen.update_clock(booted_before + round(rate * kernel.now()) // MS * MS)
         seen.changed.notify()
 
     def wait() -> None:
@@ -88,3 +90,9 @@ def test_clocks_are_compared_from_five_seconds_on() -> None:
     assert timed_out_after(10.0, 4900 * MS) == (4.9, [])
     after, texts = timed_out_after(10.0, 5500 * MS)
     assert (after, len(texts)) == (5.0, 1)
+
+
+def test_a_vehicle_that_was_switched_on_before_the_program() -> None:
+    after, texts = timed_out_after(10.0, 100 * S, booted_before=1000 * S)
+    assert after == pytest.approx(10.0, abs=0.3)
+    assert re.search(r"(9\.\d|10\.0) times as fast", texts[0].text)
