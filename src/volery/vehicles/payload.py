@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import nan
 
-from volery.base.errors import CapabilityError, NotArrived, UsageError
+from volery.base.errors import CapabilityError, NotArrived, Refused, UsageError
 from volery.base.position import AMSL, Position
 from volery.vehicles.limits import is_number
 from volery.vehicles.services import Services
@@ -16,6 +16,8 @@ from volery.vehicles.services import Services
 SHORTEST_US, LONGEST_US = 500, 2500
 _MAVLINK_TARGETING = 2.0
 """MAV_MOUNT_MODE_MAVLINK_TARGETING."""
+_NO_SECONDARY = (-1, -1, 0, 0, 0)
+"""Rest of DO_GIMBAL_MANAGER_CONFIGURE: secondary control stays as it is; all gimbals."""
 
 
 class Payload:
@@ -39,11 +41,22 @@ class Payload:
         """
         self._check(f"point_gimbal({pitch!r}, {yaw!r})", (pitch, -180.0, 180.0), (yaw, -360.0, 360.0))
         asked = f"point the gimbal to a pitch of {pitch:g} and a yaw of {yaw:g} degrees"
+        turn = ("MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW", pitch, yaw, nan, nan, 0, 0, 0)
         try:
-            self._services.command(asked, "MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW", pitch, yaw, nan, nan, 0, 0, 0)
+            self._services.command(asked, *turn)
         except CapabilityError:
             mode = _MAVLINK_TARGETING
             self._services.command(asked, "MAV_CMD_DO_MOUNT_CONTROL", pitch, 0, yaw, 0, 0, 0, mode)
+        except Refused:  # a PX4 obeys only the station that has taken control of the gimbal
+            if self._services.sender is None:
+                raise
+            self._services.command(
+                "take control of the gimbal",
+                "MAV_CMD_DO_GIMBAL_MANAGER_CONFIGURE",
+                *self._services.sender,
+                *_NO_SECONDARY,
+            )
+            self._services.command(asked, *turn)
 
     def look_at(self, place: Position | None) -> None:
         """Keep the gimbal, or the nose of a vehicle without one, on a place; ``None`` ends that.

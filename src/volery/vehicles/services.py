@@ -92,6 +92,10 @@ class Services(Protocol):
     def home_first(self) -> bool:
         """Whether item 0 of its mission is home, as in ArduPilot."""
 
+    @property
+    def sender(self) -> tuple[int, int] | None:
+        """System and component id that the autopilot gets commands from; ``None`` if they are not known."""
+
     def parameter_name(self, name: str) -> str:
         """Return the autopilot's spelling of a name; raise ``UsageError`` if it is none."""
 

@@ -34,6 +34,7 @@ class DjiServices:
 
     home_first = False
     files = None
+    sender = None
 
     def __init__(self, kernel: Kernel, backend: DjiBackend) -> None:
         self._kernel = kernel

@@ -259,6 +259,7 @@ class MavlinkClient:
             self._send_to,
             bytewise=self.firmware.bytewise,
             home_first=self.firmware.home_first,
+            sender=(GCS_SYSTEM, GCS_COMPONENT),
         )
         link.receive(self._receive)
         if isinstance(link, SelectiveLink):

@@ -63,6 +63,7 @@ class MavrosServices:
     """
 
     files = None
+    sender = None
 
     def __init__(
         self, kernel: Kernel, node: Node, telemetry: Telemetry, namespace: str, spin: Action, home_first: bool

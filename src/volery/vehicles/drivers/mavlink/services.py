@@ -47,6 +47,7 @@ class MavlinkServices(PendingRequests):
         send_to: sends a message, given its name and its fields without the target.
         bytewise: whether whole parameters lie in the bytes of the float, as in PX4.
         home_first: whether item 0 of a mission is home, as in ArduPilot.
+        sender: system and component ids that the messages are sent with.
     """
 
     def __init__(
@@ -58,9 +59,11 @@ class MavlinkServices(PendingRequests):
         *,
         bytewise: bool,
         home_first: bool,
+        sender: tuple[int, int] | None = None,
     ) -> None:
         super().__init__(kernel, telemetry.name)
         self.home_first = home_first
+        self.sender = sender
         self.files = FileTransfer(self, telemetry.name, send_to)
         self._telemetry = telemetry
         self._send, self._send_to = send, send_to
@@ -74,12 +77,14 @@ class MavlinkServices(PendingRequests):
         number = constant(command)
         named = {f"param{place}": float(value) for place, value in enumerate(parameters, 1)}
         began = self._kernel.now()
+        in_progress = [False]  # it is not sent again then: PX4 rejects what it carries out already
 
         def acknowledged(frame: Frame) -> bool | None:
             if frame.name != "COMMAND_ACK" or frame.fields["command"] != number:
                 return None
             result = frame.fields["result"]
             if result == _IN_PROGRESS:
+                in_progress[0] = True
                 return None
             if result == _UNSUPPORTED:
                 raise CapabilityError(f"{self._name}: {asked}: the autopilot does not support {command}")
@@ -90,7 +95,8 @@ class MavlinkServices(PendingRequests):
             return True
 
         def send() -> None:
-            self._send_to("COMMAND_LONG", command=number, **named)
+            if not in_progress[0]:
+                self._send_to("COMMAND_LONG", command=number, **named)
 
         self.ask(asked, send, acknowledged, within=within or ANSWERED_WITHIN, again=2 * S)
 

@@ -37,6 +37,7 @@ class PaparazziServices:
 
     home_first = False
     files = None
+    sender = None
 
     def __init__(self, kernel: Kernel, backend: PaparazziBackend) -> None:
         self._kernel = kernel
