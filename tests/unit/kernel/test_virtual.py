@@ -503,3 +503,14 @@ def test_a_task_that_swallows_too_many_cancellations_never_runs_again(
     assert swallowed == [5 * MS] * MAX_SWALLOWED_CANCELLATIONS
     assert others[-1] == 20 * MS
     assert not task.done
+
+
+def test_a_callback_cannot_sleep_and_has_nothing_to_compute(virtual: VirtualKernel, spawn: Spawn) -> None:
+    consumed: list[bool] = []
+    virtual.call_at(MS, lambda: consumed.append(virtual.consume(MS)))
+    spawn(lambda: consumed.append(virtual.consume(MS)))
+    virtual.run(S)
+    assert consumed == [True, False]
+    virtual.call_at(virtual.now(), lambda: virtual.sleep_until(5 * S))
+    with pytest.raises(UsageError, match="a framework callback must not block, but waits for a time"):
+        virtual.run(S)

@@ -661,3 +661,34 @@ def test_the_shortest_sleep_is_one_nanosecond(virtual: VirtualKernel, spawn: Spa
     spawn(body)
     virtual.run(S)
     assert woken == [1]
+
+
+def test_the_next_release_of_a_rate_is_due_a_period_later(virtual: VirtualKernel) -> None:
+    found: list[int] = []
+
+    def body() -> None:
+        rate = Rate(virtual, 10 * MS)
+        found.append(rate.due)
+        rate.sleep()
+        found.append(rate.due)
+
+    virtual.spawn(body, "loop", ExecutionContext("loop"))
+    virtual.run(S)
+    assert found == [10 * MS, 20 * MS]
+
+
+@pytest.mark.parametrize(("computed", "ended"), [(10, 1), (9, 0)])
+def test_a_loop_that_asks_for_no_sleep_has_ended_its_activation_where_it_is_late(
+    computed: int, ended: int, virtual: VirtualKernel, events: list[Recorded]
+) -> None:
+    until: list[int] = []
+
+    def body() -> None:
+        virtual.consume(computed * MS)
+        sleep(virtual, 0)
+        until.append(len([event for event in events if isinstance(event, Activation)]))
+
+    cpu = Processor(virtual, "cpu")
+    virtual.spawn(body, "loop", ExecutionContext("loop", cpu, 1, period=10 * MS))
+    virtual.run(S)
+    assert until == [ended]

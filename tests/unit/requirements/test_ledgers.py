@@ -268,16 +268,16 @@ def test_a_vehicle_that_was_never_disarmed_stands_at_height_0_and_moves_in_all_d
     assert back.record().distance_m == pytest.approx(13.0)
 
 
-def test_the_p95_of_a_chain_leaves_out_its_slowest() -> None:
+def test_the_p95_of_a_chain_is_not_its_slowest() -> None:
     sent = [
         Message(at * S, at * S + late * MS, "/image", "/c", "/l", 1)
-        for at, late in enumerate([1] * 97 + [9] * 3)
+        for at, late in enumerate([1] * 90 + [5] * 7 + [9] * 3)
     ]
     ledger = ChainLedger(ChainSetup("eye", ("/image",)))
     for message in sent:
         ledger.message(message)
     latency = ledger.record().latency_s
-    assert latency.p95 == pytest.approx(0.001, rel=0.002)
+    assert latency.p95 == pytest.approx(0.005, rel=0.002)
     assert latency.max == pytest.approx(0.009)
 
 

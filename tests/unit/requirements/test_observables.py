@@ -290,3 +290,8 @@ def test_time_starts_at_exactly_nothing():
     assert observed("loop.cpu_time", []) == 0.0
     assert observed("onboard.utilisation", []) == 0.0
     assert observed("loop.activations", []) == 0.0
+
+
+def test_time_on_a_processor_counts_from_the_start_of_each_slice():
+    slices = [Slice(at * S, at * S + 500 * MS, "onboard", 0, "loop", "loop") for at in (2, 4)]
+    assert observed("loop.cpu_time", slices) == 1.0
