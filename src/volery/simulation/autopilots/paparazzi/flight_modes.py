@@ -13,7 +13,14 @@ from volery.base.time import MS, Ns, from_seconds, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ManualFlight, Stabilize
 from volery.simulation.autopilots.paparazzi.flight_plan import Demand, Vertical
-from volery.simulation.autopilots.paparazzi.guidance_loops import SUBSTEP, GuidanceLoops, as_obeyed
+from volery.simulation.autopilots.paparazzi.guidance_loops import (
+    CLIMB_GAIN,
+    HEIGHT_GAIN,
+    SUBSTEP,
+    GuidanceLoops,
+    Limits,
+    as_obeyed,
+)
 from volery.simulation.autopilots.paparazzi.rotorcraft_state import state_of
 from volery.simulation.autopilots.vehicle_state import IDLE, Manoeuvre, Vehicle
 
@@ -22,9 +29,6 @@ LIFT_OFF_M = 0.3
 
 BELOW_M, SINKING_M_S = 0.2, 0.1
 """Distance below the vehicle [m] and sink rate [m/s] from which GUIDED keeps it on the ground."""
-
-OFFSET_AT_LIFT_OFF = 0.35
-"""Height to which GUIDED lifts a standing aircraft when its motors run; observed 0.4 to 0.5 m [m]."""
 
 FOLLOW_GAIN, FOLLOW_LEAD = 0.4, 0.25
 """How the flight stack follows the guidance loops: gain [1/s] and lead [s]."""
@@ -71,15 +75,16 @@ class Guidance(Manoeuvre):
             loops.plane.frozen = None
         elif loops.plane.frozen is None:
             loops.plane.frozen = loops.plane.place, loops.plane.velocity
+        limits = Limits(tuning.speed, tuning.speed_up, tuning.speed_down)
         for _ in range(self._substeps()):
-            if plane_is_velocity:
-                loops.plane.step_at(plane, tuning.speed)
-            else:
-                loops.plane.step_to(plane, tuning.speed)
-            if down_is_velocity:
-                loops.height.step_at(-down, tuning.speed_up, tuning.speed_down)
-            else:
-                loops.height.step_to(-down, tuning.speed_up, tuning.speed_down)
+            loops.step(
+                plane,
+                -down,
+                limits,
+                plane_is_velocity=plane_is_velocity,
+                up_is_velocity=down_is_velocity,
+                in_flight=vehicle.ground.lifted,
+            )
         vehicle.drive(
             Setpoint(
                 Control.VELOCITY,
@@ -101,8 +106,7 @@ class Guidance(Manoeuvre):
         late = vehicle.kernel.now() - self._last_step_ns > self.RESTART_AFTER
         lost = state_of(vehicle).frozen is not None
         if self._loops is None or late or (not lost and self._loops.away_from(estimate.position)):
-            offset = 0.0 if vehicle.ground.lifted else OFFSET_AT_LIFT_OFF
-            self._loops = GuidanceLoops(estimate.position, estimate.velocity, offset)
+            self._loops = GuidanceLoops(estimate.position, estimate.velocity)
             self._last_step_ns = vehicle.kernel.now()
         return self._loops
 
@@ -193,23 +197,26 @@ class Direct(Stabilize):
 class ClimbByStick(AltitudeHold):
     """ATTITUDE_RC_CLIMB: sticks command lean angles and yaw rate.
 
-    Version 6.2 updates the vertical reference in NAV only: here it keeps the vertical speed at which the mode
-    began, whatever the throttle says, unless RC_CLIMB_BY_THROTTLE is set.
+    Version 6.2 does not move the vertical reference in this mode: it stays at the height and climb rate at
+    which the mode began, whatever the throttle says, unless RC_CLIMB_BY_THROTTLE is set.
     """
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
-        self._kept = 0.0
+        self._kept_height = self._kept_rate = 0.0
 
     def enter(self) -> None:
-        """Take the present vertical speed."""
-        self._kept = 0.0 if self.vehicle.landed else -self.vehicle.estimate.velocity[2]
+        """Take the present height and climb rate as reference."""
+        estimate = self.vehicle.estimate
+        self._kept_height = -estimate.position[2]
+        self._kept_rate = 0.0 if self.vehicle.landed else -estimate.velocity[2]
 
     def climb(self, throttle: float) -> float:
         """Return the climb rate [m/s]."""
         if self.vehicle.parameters["RC_CLIMB_BY_THROTTLE"]:
             return super().climb(throttle)
-        return self._kept
+        below = self._kept_height + self.vehicle.estimate.position[2]
+        return self._kept_rate + HEIGHT_GAIN / CLIMB_GAIN * below
 
 
 class HoldHeight(AltitudeHold):

@@ -61,7 +61,7 @@ FIGURES: Mapping[str, Figure] = {
     "GUIDANCE_V_REF_MAX_CLIMB": Figure(3.0, "m/s up"),
     "GUIDANCE_V_REF_MAX_DESCENT": Figure(3.0, "m/s down"),
     "GUIDANCE_V_REF_MAX_ACCEL": Figure(1.0, "m/s^2 up and down"),
-    "STABILIZATION_ATTITUDE_SP_MAX_PHI": Figure(30.0, "degrees of lean"),
+    "STABILIZATION_ATTITUDE_SP_MAX_PHI": Figure(45.0, "degrees of lean"),
     "STABILIZATION_ATTITUDE_SP_MAX_R": Figure(90.0, "degrees/s of turn by stick"),
     "ARRIVED_AT_WAYPOINT": Figure(3.0, "m from a waypoint at which the plan goes on"),
     "NAV_CLIMB_VSPEED": Figure(0.5, "m/s up in block Takeoff"),

@@ -411,6 +411,8 @@ class _DescentByThrust:
     """Thrust per error of speed [1/(m/s)] and per its integral [1/m], as shares of the weight."""
     LEAST, MOST = 0.6, 1.2
     """Limits of the thrust as shares of the weight."""
+    STEADY_M_S = 0.2
+    """Error of the speed with which the present thrust is the weight."""
     USUAL = 0.5
     """Thrust that carries an aircraft which has reported none."""
 
@@ -421,7 +423,7 @@ class _DescentByThrust:
         self._integral = 0.0
 
     def begin(self) -> None:
-        """Hold the thrust that was reported last, which carries the aircraft."""
+        """Hold the thrust that was reported last; it carries the aircraft unless that was swinging."""
         self._weight = self._steps.decoder.thrust / MAX_PPRZ or self.USUAL
         self._command(1.0)
 
@@ -430,9 +432,14 @@ class _DescentByThrust:
         self._touch_down.watch()
         up = self._steps.telemetry.velocity.up
         error = 0.0 if isnan(up) else -SINKING_M_S - up
-        self._integral += error * to_seconds(WATCH_PERIOD)
         share = 1.0 + self.GAIN * error + self.INTEGRAL_GAIN * self._integral
-        self._command(min(self.MOST, max(self.LEAST, share)))
+        limited = min(self.MOST, max(self.LEAST, share))
+        if abs(error) < self.STEADY_M_S:
+            self._weight *= 1.0 + self.INTEGRAL_GAIN * self._integral
+            self._integral = 0.0
+        if limited == share or error * (share - limited) < 0.0:
+            self._integral += error * to_seconds(WATCH_PERIOD)
+        self._command(limited)
 
     def _command(self, share: float) -> None:
         throttle = min(1.0, share * self._weight)

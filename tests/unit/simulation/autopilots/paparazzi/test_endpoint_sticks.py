@@ -63,8 +63,8 @@ def test_direct_sticks_are_lean_angles_and_thrust(craft: Any) -> None:
     assert craft.up > 2.0
     hold(craft, 1.0, mode=MANUAL, throttle=64, roll=64, pitch=-64)
     roll, pitch, _ = craft.autopilot.vehicle.estimate.attitude
-    assert roll == pytest.approx(radians(15.0), abs=0.06)
-    assert pitch == pytest.approx(radians(-15.0), abs=0.06)
+    assert roll == pytest.approx(radians(22.5), abs=0.06)
+    assert pitch == pytest.approx(radians(-22.5), abs=0.06)
     frame = craft.autopilot.vehicle.firmware_state.radio.frame
     assert (frame.roll, frame.pitch, frame.throttle) == (4800, -4800, 4800)
 

@@ -187,8 +187,9 @@ def test_a_leg_of_50_m_is_flown_as_recorded(craft: Any) -> None:
     assert max(speed for _, _, speed in flown) == pytest.approx(7.5, abs=0.8)
     assert max(north for _, north, _ in flown) == pytest.approx(52.3, abs=0.6)
     assert min(north for at, north, _ in flown if at > 12.0) == pytest.approx(48.4, abs=0.6)
-    settled = max(at for at, north, speed in flown if abs(north - 50.0) > 0.5 or abs(speed) > 0.3)
-    assert settled == pytest.approx(17.7, abs=1.5)
+    swings = [(abs(north - 50.0), abs(speed)) for at, north, speed in flown if at > 17.7]
+    assert max(off for off, _ in swings) < 0.5
+    assert max(speed for _, speed in swings) < 0.4  # in NPS it swings at 0.3 to 0.39 m/s then
 
 
 def test_a_velocity_and_its_stop_swing_as_recorded(craft: Any) -> None:
@@ -212,21 +213,21 @@ def test_a_velocity_and_its_stop_swing_as_recorded(craft: Any) -> None:
 
 
 def test_it_climbs_and_sinks_at_3_m_s_and_ends_high(craft: Any) -> None:
-    """Observed: up at most 3.5 m/s, down 3.1 m/s; 0.5 to 0.65 m too high, fading at about 1 cm/s."""
+    """Observed: up at most 3.5 m/s, down 3.1 m/s; 0.4 to 0.65 m too high, fading at about 1 cm/s."""
     craft.guided()
     craft.guide(0x00, 0.0, 0.0, -32.0)
     climbed = []
     for _ in range(130):
         craft.run(0.1)
         climbed.append(-velocity(craft)[2])
-    assert max(climbed) == pytest.approx(3.3, abs=0.4)
-    assert 0.15 < craft.up - 32.0 < 0.7
+    assert max(climbed) == pytest.approx(3.5, rel=0.1)
+    assert 0.3 < craft.up - 32.0 < 0.65
     craft.guide(0x00, 0.0, 0.0, -10.0)
     sunk = []
     for _ in range(100):
         craft.run(0.1)
         sunk.append(velocity(craft)[2])
-    assert max(sunk) == pytest.approx(3.1, abs=0.4)
+    assert max(sunk) == pytest.approx(3.1, rel=0.1)
 
 
 def test_for_another_aircraft_it_is_not(craft: Any) -> None:

@@ -86,6 +86,7 @@ class FakePaparazzi:
     sticks_by_datalink: bool = True
     throttle: float = 0.0
     climbs_by_stick: bool = True
+    swinging: float = 1.0
     lands_late: bool = False
     on_ground: Callable[[], object] = bool
     silenced: set[str] = field(default_factory=set)
@@ -270,7 +271,7 @@ class FakePaparazzi:
         if craft.mode == "GUIDED" and craft.up < 0.0:
             craft.up, craft.velocity, craft.flying = 0.0, (0.0, 0.0, 0.0), self.lands_late
             self.on_ground()
-        carried = HOVER_THRUST if craft.up > 0.0 else max(0.0, craft.thrust - THRUST_LOST)
+        carried = HOVER_THRUST * self.swinging if craft.up > 0.0 else max(0.0, craft.thrust - THRUST_LOST)
         craft.thrust = carried if craft.armed else 0.0
         if craft.mode == "NAV" and craft.flying and craft.north**2 + craft.east**2 > FARTHEST_M**2:
             self.enter("HOME")

@@ -603,6 +603,21 @@ def test_a_failsafe_that_does_not_sink_is_landed_by_sticks(bench: Make) -> None:
     assert (at.craft.armed, at.craft.up) == (False, 0.0)
 
 
+def test_a_thrust_reported_while_it_swings_is_not_taken_for_its_weight(bench: Make) -> None:
+    """On the ground 0.6 of a thrust 1.6 times its weight would never fall below the thrust of the descent."""
+    at = bench()
+    keep_height(at)
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        at.craft.fix, at.autopilot.swinging = "NO_FIX", 1.6
+        sleep(at.kernel, 2 * S)
+        drone.land()
+
+    at.fly(mission)
+    assert (at.craft.armed, at.craft.up) == (False, 0.0)
+
+
 def test_neither_failsafe_nor_sticks_bring_it_down(bench: Make) -> None:
     at = bench()
     keep_height(at)
