@@ -1,4 +1,4 @@
-"""``volery params``, ``volery mission`` and ``volery logs``: what an autopilot keeps on board.
+"""``volery params``, ``mission``, ``logs`` and ``files``: what an autopilot keeps on board.
 
 None of these commands moves a vehicle, and one that flies goes on flying.
 """
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.text import Text
 
 from volery.base.errors import UsageError, choices
 from volery.cli.command import FAILED, OK, Commands
@@ -187,5 +188,33 @@ def logs(
         output.show(table)
     else:
         output.note("there are no logs on board")
+    output.give([one._asdict() for one in entries])
+    return OK
+
+
+@commands.add("quiet", "json", "debug")
+def files(
+    output: Output,
+    url: Url,
+    path: Annotated[str, typer.Argument(metavar="PATH", help="Folder to list, or file to download.")] = "/",
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Download PATH into this file.")] = None,
+    kind: Kind = "drone",
+) -> int:
+    """List a folder on board of an autopilot, or download a file of it, by MAVLink FTP."""
+    with _attached(url, kind) as vehicle:
+        if out is not None:
+            vehicle.files.download(path, out)
+            output.note(f"{out.stat().st_size} bytes: {out}")
+            return OK
+        entries = vehicle.files.list(path)
+    table = make_table("name", number_column("bytes"))
+    for one in entries:
+        table.add_row(
+            Text(f"{one.name}/" if one.is_folder else one.name), "" if one.is_folder else str(one.size)
+        )
+    if entries:
+        output.show(table)
+    else:
+        output.note(f"{path} is empty")
     output.give([one._asdict() for one in entries])
     return OK

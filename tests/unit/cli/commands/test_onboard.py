@@ -1,4 +1,4 @@
-"""``volery params``, ``mission`` and ``logs`` on a simulated autopilot, as a user calls them."""
+"""``volery params``, ``mission``, ``logs`` and ``files`` on a simulated autopilot, as a user calls them."""
 
 from __future__ import annotations
 
@@ -37,6 +37,9 @@ def test_mistakes_are_answered_in_one_line(tmp_path: Path) -> None:
         (("mission", "upload", "sim:px4", tmp_path / "no.plan"), "there is no such file"),
         (("mission", "download", "sim:px4", tmp_path / "a.plan", "--only", "fences"), "no part 'fences'"),
         (("logs", "sim:ardupilot", "--get", "7"), "--get 7: there is no such log"),
+        (("files", "sim:ardupilot", "/none"), "list /none: there is no such file or folder"),
+        (("files", "sim:px4", "/log", "--out", tmp_path / "x"), "open /log: there is no such file or folder"),
+        (("files", "sim:paparazzi"), "files on board: not with this driver; an ArduPilot or PX4 offers them"),
     ):
         result = volery(*words)
         assert result.exit_code != 0
@@ -50,3 +53,12 @@ def test_a_plan_and_the_logs(tmp_path: Path) -> None:
     assert json.loads(file.read_text(encoding="utf-8"))["fileType"] == "Plan"
     assert "0 mission items" in volery("mission", "upload", "sim:ardupilot", file).output
     assert volery("logs", "sim:ardupilot", "--json").exit_code == 0
+
+
+def test_files_are_listed_and_downloaded(tmp_path: Path) -> None:
+    assert volery("files", "sim:ardupilot").output.strip() == "/ is empty"
+    packed = tmp_path / "param.pck"
+    assert volery("files", "sim:ardupilot", "@PARAM/param.pck", "--out", packed).exit_code == 0
+    assert packed.read_bytes()[:2] == b"\x1b\x67"  # the magic number of ArduPilot's packed parameters
+    again = volery("files", "sim:ardupilot", "@PARAM/param.pck", "--out", packed)
+    assert "exists; choose another name" in again.output
