@@ -15,7 +15,6 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
-from rich.traceback import Traceback
 
 from volery.base.errors import UsageError, choices
 from volery.base.time import clock, to_seconds
@@ -206,6 +205,8 @@ def show_outcome(output: Output, run: Run) -> int:
         output.note(f"report: {report}" if report.exists() else f"run folder: {run.folder}")
     if run.error is not None:
         if output.debug:
+            from rich.traceback import Traceback  # noqa: PLC0415  # loads the highlighter of source text
+
             output.notes.print(Traceback.from_exception(type(run.error), run.error, run.error.__traceback__))
         output.complain(f"volery: {run.error}")
     elif not run.completed:

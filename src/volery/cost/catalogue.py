@@ -37,7 +37,7 @@ class ProcessorEntry(BaseModel):
     A law is absent where there are no figures.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     name: str
     description: str
@@ -109,7 +109,7 @@ class ProcessorEntry(BaseModel):
 class Catalogue(BaseModel):
     """Processors by the name of their kind."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     processors: dict[str, ProcessorEntry]
 

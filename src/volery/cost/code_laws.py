@@ -64,7 +64,7 @@ class CodeLaw(WithProvenance):
 class OperationTiming(BaseModel):
     """One class of operations: ``latency`` in cycles, and how many may start in a cycle."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     latency: float
     per_cycle: float
@@ -76,7 +76,7 @@ PipeGroup = Literal["integer", "branch", "multiply", "divide", "load", "store", 
 class IssueQueue(BaseModel):
     """Operations that wait for their operands before the pipes of these groups."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     entries: int = Field(gt=0)
     pipes: tuple[PipeGroup, ...] = Field(min_length=1)
@@ -108,7 +108,7 @@ class Cache(BaseModel):
     that of the load operations.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     bytes: int = Field(gt=0)
     ways: int = Field(gt=0)

@@ -22,7 +22,7 @@ Provenance = Literal["estimated", "measured", "calculated", "required"]
 class WithProvenance(BaseModel):
     """Base of all figures and laws: how they were obtained, from which source, where they are valid."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     provenance: Provenance
     source: str
@@ -40,7 +40,7 @@ class Figure(WithProvenance):
 class Line(BaseModel):
     """A quantity that is linear in the frequency: slope times frequency plus ``offset``."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     offset: float
     per_mhz: float = 0.0

@@ -79,7 +79,7 @@ ALIKE: Mapping[str, str] = {
 class LibraryCall(BaseModel):
     """Time of one function: ``points`` in ns by size."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     size: str
     points: Mapping[int, float] = Field(min_length=1)

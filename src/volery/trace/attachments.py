@@ -11,8 +11,6 @@ import json
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
-
 from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.trace.events import NONE
@@ -28,24 +26,26 @@ def to_json(description: DataclassInstance) -> bytes:
     return json.dumps(asdict(description), ensure_ascii=False, separators=(",", ":")).encode()
 
 
-def from_json(data: bytes, adapter: TypeAdapter[D], schema: str, what: str) -> D:
+def from_json(data: bytes, kind: type[D], schema: str, what: str) -> D:
     """Return what ``to_json`` wrote.
 
     Args:
         data: UTF-8 JSON.
-        adapter: Validates the description.
+        kind: The dataclass of the description.
         schema: The schema that the description must name.
         what: What messages call the description.
 
     Raises:
         UsageError: *data* is not a description of that schema.
     """
+    from pydantic import TypeAdapter, ValidationError  # noqa: PLC0415  # writing a trace needs neither
+
     try:
         raw: Any = json.loads(data)
         version = raw.get("schema") if isinstance(raw, dict) else None
         if version != schema:
             raise UsageError(f"the trace's {what} has schema {version!r}; this version reads {schema!r}")
-        return adapter.validate_python(raw)
+        return TypeAdapter(kind).validate_python(raw)
     except (ValueError, ValidationError) as error:
         raise UsageError(f"the trace's {what} cannot be read: {error}") from error
 
@@ -159,16 +159,13 @@ class RunSetup:
     schema: str = SETUP_SCHEMA
 
 
-_SETUP = TypeAdapter(RunSetup)
-
-
 def setup_from_json(data: bytes) -> RunSetup:
     """Return the set-up that ``to_json`` wrote.
 
     Raises:
         UsageError: *data* is anything else.
     """
-    return from_json(data, _SETUP, SETUP_SCHEMA, SETUP_ATTACHMENT)
+    return from_json(data, RunSetup, SETUP_SCHEMA, SETUP_ATTACHMENT)
 
 
 Point = tuple[float, float]
@@ -224,13 +221,10 @@ class Scenery:
     schema: str = SCENERY_SCHEMA
 
 
-_SCENERY = TypeAdapter(Scenery)
-
-
 def scenery_from_json(data: bytes) -> Scenery:
     """Return the scenery that ``to_json`` wrote.
 
     Raises:
         UsageError: *data* is anything else.
     """
-    return from_json(data, _SCENERY, SCENERY_SCHEMA, "map")
+    return from_json(data, Scenery, SCENERY_SCHEMA, "map")

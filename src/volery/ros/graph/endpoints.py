@@ -163,12 +163,12 @@ class EmbeddedPublisher:
             return
         content = node.graph.copy(message) if node.graph.as_bytes else message.copy()
         size = 0
-        if self._recorded or (self._checked and not fresh):
+        if self._recorded or self._checked:
             data = copied_to_cdr(content)
             size = len(data)
             if self._recorded:
                 node.kernel.record(Published(sent, self.topic, self.type, node.name, data))
-        elif self._sized or self._checked:
+        elif self._sized:
             size = cdr_size(content)
         self._due = sent + self._spacing
         if self._latches:

@@ -9,9 +9,11 @@ error says so. The field layouts are for code generators.
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from copy import copy
 from functools import cache
 from hashlib import md5
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
@@ -69,9 +71,53 @@ def _fixed_size(name: str) -> int:
     return len(encode(message_class(name)()))
 
 
+@cache
+def _varying(name: str) -> Callable[[Any], tuple[Any, ...]] | None:
+    """Return what reads a message's strings and lists of numbers; None for a type with other lists."""
+    paths = _varying_paths(name)
+    if paths is None:
+        return None
+    read = attrgetter(*paths)
+    return read if len(paths) > 1 else lambda message: (read(message),)
+
+
+def _varying_paths(name: str, above: str = "") -> list[str] | None:
+    """Return the paths of a type's strings and lists of numbers; None if it has other lists."""
+    found: list[str] = []
+    for label, (kind, detail) in store().fielddefs[name][1]:
+        below: list[str] | None = []
+        if kind == rosbags.Nodetype.NAME:
+            below = _varying_paths(str(detail), f"{above}{label}.")
+        elif kind != rosbags.Nodetype.BASE:
+            item, of = detail[0]
+            numbers = item == rosbags.Nodetype.BASE and of[0] != "string"
+            below = [above + label] if numbers else None
+        elif detail[0] == "string":
+            below = [above + label]
+        if below is None:
+            return None
+        found += below
+    return found
+
+
+_sizes: dict[tuple[str, *tuple[int, ...]], int] = {}
+"""Sizes of encodings by type and lengths of strings and lists: nothing else changes a size."""
+
+
 def cdr_size(message: Message) -> int:
-    """Return the number of bytes that ``copied_to_cdr`` gives."""
-    return _fixed_size(message.__msgtype__) or len(copied_to_cdr(message))
+    """Return the number of bytes that ``copied_to_cdr`` gives; what has a known size is not encoded."""
+    name = message.__msgtype__
+    fixed = _fixed_size(name)
+    if fixed:
+        return fixed
+    read = _varying(name)
+    if read is None:
+        return len(copied_to_cdr(message))
+    key = (name, *[len(one.encode() if isinstance(one, str) else one) for one in read(message)])
+    size = _sizes.get(key)
+    if size is None:
+        size = _sizes[key] = len(copied_to_cdr(message))
+    return size
 
 
 def _culprit(message: Message) -> str:

@@ -15,6 +15,21 @@ def test_every_type_starts_with_defaults_and_survives_its_bytes(name: str) -> No
     assert fresh.copy() == fresh
 
 
+def test_a_size_follows_the_lengths_of_strings_and_lists() -> None:
+    for text, numbers in (
+        ("", []),
+        ("map", [1.0]),
+        ("Zürich", [1.0, 2.0]),
+        ("map", [1.0] * 9),
+        ("mapp", [1.0] * 9),
+    ):
+        joy = messages.new("sensor_msgs/Joy", header={"frame_id": text}, axes=numbers).copy()
+        assert messages.cdr_size(joy) == len(messages.to_cdr(joy))
+    listed = messages.new("diagnostic_msgs/DiagnosticArray")
+    listed.status = [messages.new("diagnostic_msgs/DiagnosticStatus", name=name) for name in ("a", "motor")]
+    assert messages.cdr_size(listed.copy()) == len(messages.to_cdr(listed))
+
+
 @pytest.mark.parametrize("name", messages.service_types())
 def test_every_service_has_a_request_and_a_response(name: str) -> None:
     kind = messages.service(name)
