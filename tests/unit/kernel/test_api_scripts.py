@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 
 import pytest
@@ -176,3 +177,25 @@ def test_the_wall_runs_on_between_scripts() -> None:
     with kernel.adopt("script"):
         assert ticked.wait(1000 * S)
     assert kernel.close() == []
+
+
+def test_only_the_thread_of_a_script_passes_virtual_time(virtual: VirtualKernel) -> None:
+    said: list[str] = []
+
+    def elsewhere() -> None:
+        try:
+            with virtual.joined():
+                said.append("joined")
+        except UsageError as error:
+            said.append(str(error).partition(":")[0])
+
+    def in_another_thread() -> None:
+        thread = threading.Thread(target=elsewhere, name="worker")
+        thread.start()
+        thread.join()
+
+    in_another_thread()
+    with virtual.adopt("script"):
+        elsewhere()
+        in_another_thread()
+    assert said == ["joined", "joined", "the thread 'worker' cannot wait in virtual time"]

@@ -514,3 +514,13 @@ def test_a_callback_cannot_sleep_and_has_nothing_to_compute(virtual: VirtualKern
     virtual.call_at(virtual.now(), lambda: virtual.sleep_until(5 * S))
     with pytest.raises(UsageError, match="a framework callback must not block, but waits for a time"):
         virtual.run(S)
+
+
+def test_the_watchdog_ends_with_its_kernel() -> None:
+    kernel = VirtualKernel(watchdog_s=0.04)
+    kernel.call_at(MS, lambda: None)
+    kernel.run(S)
+    (dog,) = [thread for thread in threading.enumerate() if thread.name == "watchdog"]
+    kernel.close()
+    dog.join(5.0)
+    assert not dog.is_alive()

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.base.errors import UsageError
@@ -123,3 +125,19 @@ def test_a_key_is_read_from_a_file_of_its_owner(tmp_path: Path) -> None:
 def test_signing_is_for_mavlink_only(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="pprzlink has no signatures"):
         listen(None, parse_listen(f"udp://:1?signing={tmp_path}"), codec=PPRZLINK)  # type: ignore[arg-type]
+
+
+@given(st.data())
+def test_no_change_of_a_signed_frame_passes_and_the_next_one_is_received(data: st.DataObject) -> None:
+    theirs, parser = SignedMavlink(KEY), SignedMavlink(KEY).parser()
+    raw = bytearray(theirs.encode(AWAY, 1))
+    at = data.draw(st.integers(0, len(raw) - 1))
+    raw[at] ^= data.draw(st.integers(1, 255))
+    assert parser.feed(bytes(raw)) == []
+    beats = [parser.feed(theirs.encode(BEAT, number)) for number in range(2, 24)]
+    assert [frame.name for frame in beats[-1]] == ["HEARTBEAT"]  # a false length takes some frames with it
+
+
+@given(st.binary(max_size=300), st.binary(min_size=32, max_size=32).filter(lambda key: key != KEY))
+def test_nothing_that_was_signed_under_another_key_passes(junk: bytes, key: bytes) -> None:
+    assert names(SignedMavlink(KEY), junk, SignedMavlink(key).encode(AWAY, 1), encode(AWAY, 2)) == []

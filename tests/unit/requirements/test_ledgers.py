@@ -121,7 +121,7 @@ def test_a_deadline_is_missed_after_it_and_not_at_it() -> None:
         Activation(0, 10 * MS + 1, "control", 10 * MS),
         Activation(0, 12 * MS, "control", 10 * MS),
         Activation(0, 50 * MS, "control", NONE),
-        Activation(0, 1 * MS, "control", 10 * MS),
+        *[Activation(0, end * MS, "control", 10 * MS) for end in (1, 2)],
     )
     assert ledger.misses == 2
 

@@ -154,6 +154,8 @@ def test_a_fence_with_longitude_before_latitude_is_named_only_if_that_is_the_mis
         assert "outside the fence's polygon" in said
         hints[name] = "are they swapped?" in said
     assert hints == {"swapped": True, "elsewhere": False}
+    beyond = tuple((latitude, longitude + 82.5) for latitude, longitude in around)  # no latitude if swapped
+    assert "are they swapped?" not in Bounds(home, Limits(), Fence(beyond)).home_violation
 
 
 def test_limits_and_fences_do_not_change() -> None:
