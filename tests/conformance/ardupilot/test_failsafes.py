@@ -98,10 +98,22 @@ def test_losing_the_transmitter_returns(bench: Any) -> None:
     assert rig.vehicle.mode.number == RTL
 
 
-def test_without_the_transmitter_it_does_not_arm(bench: Any) -> None:
-    rig = bench(parameters={"SIM_RC_FAIL": 1})
+@pytest.mark.parametrize(("failure", "said"), [(1, "RC not found"), (2, "Throttle below failsafe")])
+def test_without_the_transmitter_it_does_not_arm(failure: int, said: str, bench: Any) -> None:
+    rig = bench(parameters={"SIM_RC_FAIL": failure})
     rig.run(0.5)
     rig.mode(GUIDED)
+    assert rig.command(400, 1) == 4
+    assert f"Arm: {said}" in rig.texts()
+    assert rig.command(401) == 0  # RUN_PREARM_CHECKS
+    assert f"PreArm: {said}" in rig.texts()
+
+
+def test_a_transmitter_that_was_received_once_is_lost_not_missing(bench: Any) -> None:
+    rig = bench()
+    rig.run(1.0)
+    set_parameter(rig, "SIM_RC_FAIL", 1)
+    rig.run(0.5)
     assert rig.command(400, 1) == 4
     assert "Arm: Throttle below failsafe" in rig.texts()
 

@@ -13,6 +13,11 @@ import volery.simulation.autopilots
 from rigs.station import TARGET
 from volery.base.errors import UsageError
 from volery.simulation.autopilots.ardupilot import FIRMWARE
+from volery.simulation.autopilots.ardupilot.parameter_checks import (
+    COPTER_PARAMETERS,
+    SOURCE_PARAMETERS,
+    WHEEL_ENCODER,
+)
 
 REAL32, INT8 = 9, 2
 
@@ -158,6 +163,7 @@ def test_supported_parameters_exist_and_are_read_and_no_others_are() -> None:
     }
     read |= {f"RC{channel}_OPTION" for channel in range(5, 17)} | {"FLTMODE_CH", "MODE_CH"}
     read |= {f"{modes}{position}" for modes in ("FLTMODE", "MODE") for position in range(1, 7)}
+    read |= {*SOURCE_PARAMETERS, *COPTER_PARAMETERS, WHEEL_ENCODER}
     stated = set(FIRMWARE.kinds["multirotor"].rules.parameters.supported) | set(
         FIRMWARE.kinds["rover"].rules.parameters.supported
     )

@@ -170,6 +170,8 @@ class FailsafeState:
     """Values of the parameters that inject faults, as they were last applied."""
     simulated_at: int = -1
     """Changes of parameters when these were last compared."""
+    rc_received: bool = False
+    """Whether a transmitter or overrides have been received since boot."""
     crashing_since: Ns = NEVER
     """Since when [ns] a vehicle leans far from where it should."""
     true_since: dict[str, Ns] = field(default_factory=dict)

@@ -9,7 +9,11 @@ from volery.base.frames import Vector
 from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, AuxiliaryFunctions
-from volery.simulation.autopilots.ardupilot.failsafes import COPTER_FAILSAFES
+from volery.simulation.autopilots.ardupilot.failsafes import (
+    COPTER_FAILSAFES,
+    radio_never_received,
+    radio_too_low,
+)
 from volery.simulation.autopilots.ardupilot.fence import FENCE_CHECKS, check_fence, respond_copter
 from volery.simulation.autopilots.ardupilot.firmware import (
     ardupilot_mavlink,
@@ -35,6 +39,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
     in_position_modes,
     mode_not_armable,
 )
+from volery.simulation.autopilots.ardupilot.parameter_checks import copter_problems
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED, copter_tuning
 from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.telemetry import (
@@ -159,6 +164,8 @@ CHECKS = (
     Check("AHRS: EKF3 not started", in_other_modes(0.0, 4.28)),
     Check("AHRS: waiting for home", in_position_modes(0.0, 19.852)),
     Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
+    Check("RC not found", radio_never_received),
+    Check("Throttle below failsafe", radio_too_low),
     *SHARED_CHECKS,
     *FENCE_CHECKS,
     *STOP_CHECKS,
@@ -169,7 +176,7 @@ HEALTH = Health(0x5371FC2F, 0x53619C2F, 0x57719C2F, round(22.0 * S), round(22.0 
 
 def failing_prearm_checks(vehicle: Vehicle) -> list[str]:
     """Return the texts of the pre-arm checks that fail."""
-    return failing_checks(vehicle, CHECKS)
+    return failing_checks(vehicle, CHECKS, copter_problems)
 
 
 def arming_problems(vehicle: Vehicle) -> list[str]:
@@ -178,10 +185,7 @@ def arming_problems(vehicle: Vehicle) -> list[str]:
     may_arm_auto = vehicle.mode.name == "AUTO" and round(vehicle.parameters["AUTO_OPTIONS"]) & 1
     if not may_arm_auto:
         found += mode_not_armable(vehicle)
-    throttle = vehicle.tuning.sticks.throttle
-    if vehicle.parameters["FS_THR_ENABLE"] and vehicle.rc[throttle] < vehicle.parameters["FS_THR_VALUE"]:
-        found.append("Throttle below failsafe")
-    elif not vehicle.mode.starts_high and _throttle_is_high(vehicle):
+    if not vehicle.mode.starts_high and _throttle_is_high(vehicle):
         found.append("Throttle too high")
     return found
 

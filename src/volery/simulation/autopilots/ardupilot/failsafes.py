@@ -40,6 +40,16 @@ def radio_lost(vehicle: Vehicle) -> bool:
     return vehicle.rc[vehicle.tuning.sticks.throttle] < vehicle.parameters["FS_THR_VALUE"]
 
 
+def radio_never_received(vehicle: Vehicle) -> bool:
+    """Return whether FS_THR_ENABLE expects a transmitter and none was received since boot."""
+    return vehicle.parameters["FS_THR_ENABLE"] != 0.0 and not vehicle.failsafes.rc_received
+
+
+def radio_too_low(vehicle: Vehicle) -> bool:
+    """Return whether a transmitter that was received is lost now."""
+    return vehicle.failsafes.rc_received and radio_lost(vehicle)
+
+
 def _battery_below(vehicle: Vehicle, volts: str, charge: str) -> bool:
     parameters, estimate = vehicle.parameters, vehicle.estimate
     if vehicle.uptime() < 3 * S:

@@ -78,11 +78,13 @@ SHARED_CHECKS = (
 """The last checks of copter and rover."""
 
 
-def failing_checks(vehicle: Vehicle, checks: Sequence[Check]) -> list[str]:
-    """Return the texts of the checks that fail, in the firmware's order."""
+def failing_checks(
+    vehicle: Vehicle, checks: Sequence[Check], parameter_checks: Callable[[Vehicle], list[str]]
+) -> list[str]:
+    """Return the texts of the checks that fail, in the firmware's order; parameters are checked last."""
     if vehicle.parameters["ARMING_CHECK"] == 0.0:
         return []
-    return [check.text for check in checks if check.fails(vehicle)]
+    return [check.text for check in checks if check.fails(vehicle)] + parameter_checks(vehicle)
 
 
 def mode_not_armable(vehicle: Vehicle) -> list[str]:

@@ -10,6 +10,11 @@ from math import pi, radians
 from types import MappingProxyType
 
 from volery.base.time import MS, from_seconds
+from volery.simulation.autopilots.ardupilot.parameter_checks import (
+    COPTER_PARAMETERS,
+    SOURCE_PARAMETERS,
+    WHEEL_ENCODER,
+)
 from volery.simulation.autopilots.autopilot_parameters import Parameters, Tuning
 from volery.simulation.autopilots.manual_control import ChannelRange, StickMap
 
@@ -33,6 +38,7 @@ _STICKS = {
 
 _SHARED = {
     **_STICKS,
+    **dict.fromkeys(SOURCE_PARAMETERS, "source of the estimator, or its sensor: checked before arming"),
     "ARMING_CHECK": "0 skips all checks; any other value runs all of them",
     **{
         f"RC{channel}_OPTION": "switch: modes, arming, stop, interlock, fence, gripper, relays, mission"
@@ -87,10 +93,11 @@ ROTOR_LAG_S = 0.04
 COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
     {
         **_SHARED,
+        **dict.fromkeys(COPTER_PARAMETERS, "checked before arming"),
         "ANGLE_MAX": "largest lean",
         "ATC_RAT_YAW_FLTE": "filter of the yaw rate's error",
         "ATC_RAT_YAW_I": "integral gain of the yaw rate loop",
-        "ATC_RAT_YAW_P": "gain of the yaw rate loop; 0: another loop, without a filter",
+        "ATC_RAT_YAW_P": "gain of the yaw rate loop",
         "AUTO_OPTIONS": "bit 0 allows arming in AUTO, bit 1 its take-off without a raised throttle",
         "CIRCLE_RADIUS": "circle of LOITER_TURNS",
         "CIRCLE_RATE": "yaw rate on that circle",
@@ -149,6 +156,7 @@ ROVER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         **{f"MODE{position}": "mode of that position of the mode switch" for position in range(1, 7)},
         "MODE_CH": "channel of the mode switch; 0: none",
         "RTL_SPEED": "speed of the return; 0: WP_SPEED",
+        WHEEL_ENCODER: "source of the estimator: checked before arming",
         "WP_RADIUS": "radius within which a waypoint is reached",
         "WP_SPEED": "speed",
     }

@@ -100,6 +100,9 @@ def sticks_moved(vehicle: Vehicle) -> None:
 def on_step(vehicle: Vehicle) -> None:
     """Simulate a failing transmitter and expire overrides, at each tick."""
     simulate_rc_failure(vehicle)
+    if not vehicle.failsafes.rc_received:
+        pulses = vehicle.parameters["SIM_RC_FAIL"] != NO_PULSES
+        vehicle.failsafes.rc_received = pulses or bool(vehicle.rc.overridden)
     if vehicle.parameters.changes != vehicle.failsafes.simulated_at:
         vehicle.failsafes.simulated_at = vehicle.parameters.changes
         simulate_faults(vehicle)

@@ -32,6 +32,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
     failing_checks,
     mode_not_armable,
 )
+from volery.simulation.autopilots.ardupilot.parameter_checks import source_problems
 from volery.simulation.autopilots.ardupilot.parameters import ROVER_SUPPORTED, rover_tuning
 from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.telemetry import (
@@ -181,7 +182,7 @@ STREAM_PARAMETERS = {
 
 def failing_prearm_checks(vehicle: Vehicle) -> list[str]:
     """Return the texts of the pre-arm checks that fail."""
-    return failing_checks(vehicle, CHECKS)
+    return failing_checks(vehicle, CHECKS, source_problems)
 
 
 def arming_problems(vehicle: Vehicle) -> list[str]:
