@@ -19,7 +19,7 @@ def twins_in_c(tmp_path_factory: pytest.TempPathFactory) -> dict[str, ModuleType
     modules = {}
     for library in folder.rglob("*.so"):
         name = library.name.partition(".")[0]
-        spec = spec_from_file_location(f"volery.trace.{name}", library)
+        spec = spec_from_file_location(f"volery.{library.parent.name}.{name}", library)
         assert spec is not None
         assert spec.loader is not None
         modules[name] = module_from_spec(spec)

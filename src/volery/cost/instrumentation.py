@@ -19,8 +19,6 @@ import ast
 import copy
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from itertools import repeat
-from operator import length_hint
 from typing import Any
 
 from volery.cost.library_calls import OPERATORS, LibraryCalls, LibraryTable
@@ -39,6 +37,7 @@ from volery.cost.python_operations import (
     operation_table,
     operations_of,
 )
+from volery.cost.ticks import Ticks
 
 CELL = "__volery_steps__"
 TICK = "__volery_tick_"
@@ -69,7 +68,6 @@ _BODIES = ("body", "orelse", "finalbody", "handlers", "cases")
 _NEEDS_COUNTER = (ast.Call, *_COMPREHENSIONS)
 
 _LEADING_BITS = 5
-_MANY = 2**62
 _EMPTY: dict[str, str] = {}
 _VIEWS: tuple[type, ...] = (type(_EMPTY.keys()), type(_EMPTY.values()), type(_EMPTY.items()))
 _CONTAINERS: frozenset[type] = frozenset(
@@ -468,9 +466,8 @@ def _prologue_length(body: list[ast.stmt]) -> int:
 class StepCounter:
     """Counts what the instrumented code of one run executes. One flow of control runs at a time.
 
-    Statements add to one cell. Inside expressions, where nothing can be assigned, an iterator of ``None`` is
-    advanced, one for each weight: that is cheap, its value is false, and its length hint tells how often it
-    was advanced.
+    Statements add to one cell. Inside expressions, where nothing can be assigned, a counter of ``Ticks`` is
+    called, one for each weight: its value is false.
 
     Attributes:
         taken: Steps of the whole run.
@@ -493,17 +490,12 @@ class StepCounter:
         self._cell = [0]
         self.taken = 0
         self.libraries = LibraryCalls(self._cell, libraries) if libraries else None
-        self._ticks: dict[int, repeat[None]] = {}  # by weight
-        self._left: list[int] = []  # length hints at the last reading
+        self._ticks = Ticks()
+        self._counters: dict[int, Callable[[], None]] = {}  # by weight
 
     def take(self) -> int:
         """Return the steps since the last call."""
-        steps, self._cell[0] = self._cell[0], 0
-        left = list(map(length_hint, self._ticks.values()))
-        if left != self._left:
-            for weight, now, before in zip(self._ticks, left, self._left, strict=True):
-                steps += weight * (before - now)
-            self._left = left
+        steps, self._cell[0] = self._cell[0] + self._ticks.take(), 0
         self.taken += steps
         return steps
 
@@ -513,9 +505,8 @@ class StepCounter:
             tree, self._weights, self.libraries.libraries if self.libraries else ()
         )
         for weight in sorted(ticks):
-            if weight not in self._ticks:
-                self._ticks[weight] = repeat(None, _MANY)
-                self._left.append(_MANY)
+            if weight not in self._counters:
+                self._counters[weight] = self._ticks.counter(weight)
         return counted
 
     def names(self) -> dict[str, Any]:
@@ -527,7 +518,7 @@ class StepCounter:
                 f"{ITERATED}{name}__": self._item_counter(name)
                 for name in (*ITERATING_BUILTINS, *ITERATING_METHODS)
             },
-            **{f"{TICK}{weight}__": tick.__next__ for weight, tick in self._ticks.items()},
+            **{f"{TICK}{weight}__": counter for weight, counter in self._counters.items()},
         }
 
     def _library_names(self) -> dict[str, Any]:
