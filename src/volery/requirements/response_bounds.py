@@ -24,8 +24,9 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 from volery.base.time import MS, US, Ns
 from volery.trace.attachments import ComponentSetup, ProcessorSetup
@@ -179,6 +180,11 @@ BACKGROUND = " (background)"
 """Ends the name of what is executed beside a component's own flows of control."""
 
 
+def _chosen(choose: Callable[[Ns, Ns], Ns], one: list[Ns], other: list[Ns]) -> list[Ns]:
+    """Return what *choose* returns for the items of two lists, and the rest of the longer one."""
+    return [*map(choose, one, other), *one[len(other) :], *other[len(one) :]]
+
+
 class _Releases:
     """Spans of releases and longest response time of a component's activations."""
 
@@ -196,14 +202,10 @@ class _Releases:
             kept = [min(one, event.released) for one in self._last]
             self._last = deque(kept, maxlen=IN_A_ROW + 1)
         self._last.append(event.released)
-        recent, spans = list(self._last), self.spans
+        recent = list(self._last)
         for end in range(len(recent) - 1, 0 if late else len(recent) - 2, -1):
-            for back in range(1, end + 1):
-                span = recent[end] - recent[end - back]
-                if back > len(spans):
-                    spans.append(span)
-                elif span < spans[back - 1]:
-                    spans[back - 1] = span
+            spans = [recent[end] - before for before in reversed(recent[:end])]
+            self.spans = _chosen(min, self.spans, spans)
 
     def curve(self, period: Ns) -> tuple[Ns, ...]:
         """Return the least times that 2, 3, ... releases take; empty if they are unknown."""
@@ -240,13 +242,7 @@ class _Work:
     def ended(self) -> None:
         self._last.append(self.since)
         self.since = 0
-        executed = 0
-        for number, cost in enumerate(reversed(self._last)):
-            executed += cost
-            if number >= len(self.costs):
-                self.costs.append(executed)
-            elif executed > self.costs[number]:
-                self.costs[number] = executed
+        self.costs = _chosen(max, self.costs, list(accumulate(reversed(self._last))))
 
 
 class Demands:
