@@ -15,6 +15,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 from fastcrc.crc16 import mcrf4xx
@@ -161,6 +162,8 @@ class MessageType:
         self._names = tuple(field.name for field in self._fields)
         self._known = frozenset(self._names)
         self._plain = all(field.length == 0 for field in self._fields)
+        several = self._plain and len(self._names) > 1
+        self._values: Callable[[Any], tuple[Any, ...]] | None = itemgetter(*self._names) if several else None
         self._make_dict: Callable[..., dict[str, Any]] | None = None  # made when the first one is decoded
 
     def pack(self, fields: Mapping[str, Any]) -> bytes:
@@ -169,6 +172,11 @@ class MessageType:
         Raises:
             UsageError: A field does not exist or does not fit; the error names it.
         """
+        if self._values is not None and len(fields) == len(self._names):
+            try:
+                return self._struct.pack(*self._values(fields))
+            except (KeyError, struct.error, OverflowError, TypeError):
+                pass  # the field is found below
         if not self._known.issuperset(fields):
             wrong = next(name for name in fields if name not in self._known)
             hint = did_you_mean(wrong, self.field_names)
