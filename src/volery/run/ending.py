@@ -7,6 +7,7 @@ the tasks that did not end. The first signal starts this; a second one stops at 
 
 from __future__ import annotations
 
+import gc
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -129,6 +130,7 @@ class Ending:
 
     def pass_time(self) -> list[str]:
         """Execute the run to its end. Return the names of tasks that did not end."""
+        gc.freeze()  # what exists now stays until the end: collections need not look at it
         try:
             self._kernel.run(FOREVER)
         except VoleryError as error:  # a deadlock, or code that froze time: the vehicles still land
@@ -136,6 +138,8 @@ class Ending:
             self._kernel.run(FOREVER)
         except KeyboardInterrupt:
             self.stop_hard("interrupted", "stopped at once by a second signal")
+        finally:
+            gc.unfreeze()
         return self._kernel.close(self.reason)
 
     def stop_hard(self, status: Status, reason: str) -> None:
