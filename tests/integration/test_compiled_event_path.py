@@ -20,7 +20,8 @@ RUNS = (
     ),
 )
 COMMAND = "from volery.cli.main import main; main()"
-WHICH = "import volery.kernel.virtual as a, volery.requirements.ledgers as b; print(a.__file__, b.__file__)"
+MODULES = ("kernel.virtual", "requirements.ledgers", "trace.chunk", "trace.spans", "cost.ticks")
+WHICH = f"from importlib import import_module as i; print(*(i('volery.' + m).__file__ for m in {MODULES}))"
 
 
 def run(package: Path, *arguments: str, accepted: tuple[int, ...] = (0,)) -> str:
