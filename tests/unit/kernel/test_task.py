@@ -128,12 +128,13 @@ def test_a_task_that_is_spawned_in_a_cancelled_scope_is_cancelled() -> None:
 
 def test_a_mark_reaches_all_below_and_the_first_reason_stays() -> None:
     top = Scope("top")
-    low = top.child("middle").child("low")
+    middle = top.child("middle")
+    low = middle.child("low")
     inside, outside = task_of(scope=low), task_of(scope=top)
     low.mark("first")
     assert outside.pending_cancellation is None
     top.mark("second")
-    assert (low.cancelled, top.cancelled) == ("first", "second")
+    assert (low.cancelled, middle.cancelled, top.cancelled) == ("first", "second", "second")
     assert str(inside.pending_cancellation) == "first"
     assert str(outside.pending_cancellation) == "second"
     assert list(top.all_tasks()) == [outside, inside]

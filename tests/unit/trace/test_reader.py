@@ -365,3 +365,22 @@ def test_the_file_is_closed_at_the_end(tmp_path: Path) -> None:
         list(reading.events())
         assert not reading._file.closed
     assert reading._file.closed
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.8])
+def test_whole_records_of_a_chunk_that_is_cut_are_read(tmp_path: Path, share: float) -> None:
+    path = tmp_path / "trace.mcap"
+    events = write_sample(path, 0.9)
+    uncompressed(path)
+    data, place = path.read_bytes(), 8
+    while data[place] != Opcode.CHUNK:
+        place += 9 + int.from_bytes(data[place + 1 : place + 9], "little")
+    length = int.from_bytes(data[place + 1 : place + 9], "little")
+    cut = place + int(share * length)
+    for end in range(cut, cut + 40, 3):
+        path.write_bytes(data[:end])
+        trace = read(path)
+        assert 0 < len(trace.events) < len(events)
+        assert [repr(event) for event in trace.events] == [repr(one) for one in events[: len(trace.events)]]
+        assert trace.lost.startswith("the writer never finished; what follows ")
+    assert len(trace.events) > share * len(events) / 2

@@ -435,7 +435,7 @@ def test_the_offboard_mode_is_not_commanded_over_a_failsafe(rig: Rig) -> None:
 @pytest.mark.parametrize(("lasts", "flying"), [(False, True), (True, False)])
 def test_there_is_nothing_to_take_back(rig: Rig, lasts: bool, flying: bool) -> None:
     rig.seen.failsafe_lasts, rig.seen.flying = lasts, flying
-    assert not rig.executor.take_back()
+    assert rig.executor.take_back() is False
 
 
 # -- the link
