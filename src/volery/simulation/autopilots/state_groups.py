@@ -134,6 +134,20 @@ class OutputState:
     """Number of the last order to change an output repeatedly."""
 
 
+class GuidedLimits(NamedTuple):
+    """Limits at which a mission takes the vehicle back from a companion computer; 0: none."""
+
+    seconds: float = 0.0
+    lowest: float = 0.0
+    """Height [m] above the estimator's origin, as ``highest``."""
+    highest: float = 0.0
+    distance: float = 0.0
+    """Horizontal distance [m] from where it was handed over."""
+
+
+NO_LIMITS = GuidedLimits()
+
+
 @dataclass
 class CommandedLimits:
     """Limits and heading that commands and mission items have set for the present mode; ``None``: not set."""
@@ -152,6 +166,7 @@ class CommandedLimits:
     """That rate [rad/s]."""
     look_at: Vector | None = None
     """Region of interest that the nose follows, for firmwares that turn it: north, east, down [m]."""
+    guided_limits: GuidedLimits = NO_LIMITS
 
     def forget_speeds(self) -> None:
         """Return to the firmware's own speeds."""

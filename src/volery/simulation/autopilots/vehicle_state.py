@@ -62,6 +62,11 @@ class Manoeuvre:
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
 
+    @property
+    def flown(self) -> Manoeuvre:
+        """The manoeuvre that gives the set-points: this one, or the part of it that is flown now."""
+        return self
+
     def enter(self) -> None:
         """Begin the manoeuvre."""
 

@@ -240,7 +240,7 @@ def go_to(vehicle: Vehicle, frame: int, place: tuple[float, float, float], yaw: 
     point = vehicle.point(frame, *place)
     if not all_within(point, FARTHEST_POINT) or not fence_admits(vehicle, point):
         return False
-    manoeuvre = vehicle.manoeuvre
+    manoeuvre = vehicle.manoeuvre.flown
     if isinstance(manoeuvre, Guided):
         manoeuvre.go_to(point, Turn(yaw))
     elif isinstance(manoeuvre, GuidedRover):
@@ -260,7 +260,7 @@ def on_set_yaw_speed(vehicle: Vehicle, command: Command) -> int:
 
     With a positive param3 the angle adds to the heading that was last asked for.
     """
-    manoeuvre = vehicle.manoeuvre
+    manoeuvre = vehicle.manoeuvre.flown
     if not isinstance(manoeuvre, GuidedRover):
         return FAILED
     heading = radians(command.param1)

@@ -1,7 +1,7 @@
 """Targets of GUIDED: SET_POSITION_TARGET_LOCAL_NED, SET_POSITION_TARGET_GLOBAL_INT and SET_ATTITUDE_TARGET.
 
-A group of three (position, velocity, acceleration) counts only as a whole. Outside GUIDED the messages are
-ignored.
+A group of three (position, velocity, acceleration) counts only as a whole. Outside GUIDED and the mission
+item NAV_GUIDED_ENABLE the messages are ignored.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def _of_global(vehicle: Vehicle, fields: dict[str, Any]) -> Target | None:
 
 
 def _obey(vehicle: Vehicle, target: Target | None) -> None:
-    guided = vehicle.manoeuvre
+    guided = vehicle.manoeuvre.flown
     if target is None or not isinstance(guided, Guided) or (target.force and target.acceleration is not None):
         return
     if target.position is not None:
@@ -154,7 +154,7 @@ def _states_attitude(fields: dict[str, Any]) -> bool:
 
 def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_ATTITUDE_TARGET: attitude, yaw rate, and thrust as a climb rate."""
-    guided, mask = vehicle.manoeuvre, fields["type_mask"]
+    guided, mask = vehicle.manoeuvre.flown, fields["type_mask"]
     if not isinstance(guided, Guided) or not _states_attitude(fields):
         return
     w, x, y, z = fields["q"]
@@ -166,7 +166,7 @@ def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> N
 
 def rover_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_ATTITUDE_TARGET of a rover: a share of its speed, with a heading or a turn rate."""
-    guided, mask = vehicle.manoeuvre, fields["type_mask"]
+    guided, mask = vehicle.manoeuvre.flown, fields["type_mask"]
     if not isinstance(guided, GuidedRover) or not _states_attitude(fields):
         return
     speed = min(1.0, max(-1.0, fields["thrust"])) * vehicle.tuning.speed
@@ -204,7 +204,7 @@ def _drive(vehicle: Vehicle, target: Target | None, ahead: float) -> None:
         target: The target; ``None``: ignored.
         ahead: First component of the velocity as sent: its sign is the direction of driving beside a turn.
     """
-    guided = vehicle.manoeuvre
+    guided = vehicle.manoeuvre.flown
     if target is None or not isinstance(guided, GuidedRover):
         return
     turns = target.turn.yaw is not None or target.turn.rate is not None

@@ -7,6 +7,7 @@ from math import isinf, isnan
 
 from volery.base.time import to_seconds
 from volery.simulation.autopilots.ardupilot.commands import HIGHEST, change_speed, turn_to
+from volery.simulation.autopilots.ardupilot.guided_items import copter_guided_leg, set_limits
 from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, INFO, NOTICE, change_mode, disarm
 from volery.simulation.autopilots.ardupilot.payload import GRIPPER, SET_RELAY, SET_SERVO, act_on_payload
 from volery.simulation.autopilots.manoeuvres.manual_flight import HoldPlace
@@ -27,6 +28,8 @@ from volery.simulation.autopilots.onboard_mission import (
     GLOBAL_RELATIVE_INT,
     GLOBAL_TERRAIN,
     GLOBAL_TERRAIN_INT,
+    GUIDED_ENABLE,
+    GUIDED_LIMITS,
     JUMP,
     JUMP_TAG,
     LAND,
@@ -69,12 +72,14 @@ NAMES = {
     SET_SERVO: "SetServo",
     GRIPPER: "Gripper",
     DO_AUX_FUNCTION: "AuxFunction",
+    GUIDED_ENABLE: "GuidedEnable",
+    GUIDED_LIMITS: "GuidedLimits",
 }
 """Names of the items in the firmware's status texts."""
 
-KEPT_ONLY = frozenset({92, 94, 189, 195, 197, 201, 203, 205, 206, 182, 184, 207, 208, 212, 222, JUMP_TAG})
+KEPT_ONLY = frozenset({94, 189, 195, 197, 201, 203, 205, 206, 182, 184, 207, 208, 212, JUMP_TAG})
 """Items that are stored and read back without effect: cameras, repeated servos and relays, fences, regions of
-interest, payload places, limits of GUIDED, and tags that only DO_JUMP_TAG looks for.
+interest, payload places, and tags that only DO_JUMP_TAG looks for.
 """
 
 PLACED = frozenset(
@@ -92,9 +97,9 @@ PLACED = frozenset(
 )
 """Items whose place is checked and whose frame is stored."""
 
-KEEPS_FRAME = PLACED | {189, 191, 195, 201}
-"""Items whose frame is stored; the others read back frame 0. The last four: landing sequence, go-around and
-regions of interest.
+KEEPS_FRAME = PLACED | {GUIDED_ENABLE, 94, 189, 191, 195, 201}
+"""Items whose frame is stored; the others read back frame 0. The last five: payload place, landing sequence,
+go-around and regions of interest.
 """
 
 STORED_FRAMES = {
@@ -188,6 +193,8 @@ def act(vehicle: Vehicle, item: MissionItem) -> None:
             vehicle.set_home_here()
         else:
             vehicle.set_home(item.x / 1e7, item.y / 1e7, item.z)
+    elif item.command == GUIDED_LIMITS:
+        set_limits(vehicle, item)
     else:
         act_on_payload(vehicle, item)
 
@@ -199,6 +206,8 @@ UNSTATED = -1.0
 
 def leg_of_copter(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
     """Return the leg of an item. A delay without a duration lasts until a time of day."""
+    if item.command == GUIDED_ENABLE:
+        return copter_guided_leg(vehicle, item)
     if item.command == DELAY:
         if item.param1 <= 0.0:
             item = item._replace(param1=_seconds_until(vehicle, item))

@@ -18,6 +18,7 @@ from volery.simulation.autopilots.ardupilot.firmware import (
     streams,
 )
 from volery.simulation.autopilots.ardupilot.guided import rover_attitude, rover_global, rover_local
+from volery.simulation.autopilots.ardupilot.guided_items import rover_guided_leg
 from volery.simulation.autopilots.ardupilot.modes import (
     CUSTOM,
     GUIDED,
@@ -55,7 +56,7 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import (
     Simple,
     Steering,
 )
-from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, MissionRules
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission, Leg, MissionRules
 from volery.simulation.autopilots.manoeuvres.rover_driving import (
     GuidedRover,
     Manual,
@@ -66,7 +67,7 @@ from volery.simulation.autopilots.manoeuvres.rover_driving import (
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import LinkStart
 from volery.simulation.autopilots.mavlink.messages import Fields
-from volery.simulation.autopilots.onboard_mission import DO_AUX_FUNCTION
+from volery.simulation.autopilots.onboard_mission import DO_AUX_FUNCTION, GUIDED_ENABLE, MissionItem
 from volery.simulation.autopilots.vehicle_state import (
     Mode,
     ParameterTable,
@@ -112,6 +113,13 @@ def returned(vehicle: Vehicle) -> None:
     vehicle.send_text(INFO, "Reached destination")
 
 
+def leg(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
+    """Return the leg of an item."""
+    if item.command == GUIDED_ENABLE:
+        return rover_guided_leg(vehicle, item, guided_arrived, guided_stale)
+    return rover_leg(vehicle, item, goes_on)
+
+
 MODES = {
     mode.number: mode
     for mode in (
@@ -126,7 +134,7 @@ MODES = {
             10,
             "AUTO",
             AUTO_BITS,
-            lambda vehicle: FlyMission(vehicle, rover_leg, ROVER_MISSION),
+            lambda vehicle: FlyMission(vehicle, leg, ROVER_MISSION),
             STEERED,
             needs_position=True,
         ),

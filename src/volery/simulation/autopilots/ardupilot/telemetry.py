@@ -248,7 +248,7 @@ VELOCITY_ONLY = 0b1100_0000_0111
 
 def local_target(vehicle: Vehicle) -> Fields | None:
     """Return POSITION_TARGET_LOCAL_NED while the vehicle flies to a point or follows a velocity."""
-    manoeuvre = vehicle.manoeuvre
+    manoeuvre = vehicle.manoeuvre.flown
     if not vehicle.armed:
         return None
     fields: Fields = {"time_boot_ms": boot_ms(vehicle), "coordinate_frame": 1}

@@ -97,7 +97,7 @@ class FlyMission(Manoeuvre):
         self._rules = rules
         self._leaves_ground = leaves_ground
         self._leg: Leg | None = None
-        self._flown = (0, MissionItem(WAYPOINT))
+        self._of_leg = (0, MissionItem(WAYPOINT))
         """Index and item of the leg; an upload may replace the mission meanwhile."""
         self._reached_at: Ns | None = None
         self._jumps: dict[int, int] = {}
@@ -107,6 +107,11 @@ class FlyMission(Manoeuvre):
         """What is flown during a pause."""
         self.started = False
         """Whether the mission may leave the ground: by a start command, or by *leaves_ground*."""
+
+    @property
+    def flown(self) -> Manoeuvre:
+        """The manoeuvre of the leg, if there is one."""
+        return self if self._leg is None else self._leg.manoeuvre
 
     def enter(self) -> None:
         """Wait for the next step: the mission begins once the vehicle is armed."""
@@ -185,7 +190,7 @@ class FlyMission(Manoeuvre):
             self._advance_to(max(self._rules.first_item, plan.current))
 
     def _finish(self) -> None:
-        index, item = self._flown
+        index, item = self._of_leg
         self._rules.item_done(self.vehicle, index, item)
         self._advance_to(index + 1)
 
@@ -215,7 +220,7 @@ class FlyMission(Manoeuvre):
         vehicle = self.vehicle
         vehicle.mission.current = index
         self._rules.item_begins(vehicle, index, item)
-        self._flown = index, item
+        self._of_leg = index, item
         self._leg = self._make_leg(vehicle, item, self._goes_on(index))
         self._reached_at = None
         self._leg.manoeuvre.enter()

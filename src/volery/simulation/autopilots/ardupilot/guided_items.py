@@ -1,0 +1,62 @@
+"""GUIDED within a mission of ArduPilot: the item NAV_GUIDED_ENABLE hands the vehicle to a companion computer.
+
+Targets then count as in the mode GUIDED. The item ends at a limit that DO_GUIDED_LIMITS has set before it;
+without limits it ends only when a rover comes near the item's place. The original rover also sends that place
+to the companion computer, which is not done here.
+"""
+
+from __future__ import annotations
+
+from math import hypot
+
+from volery.base.time import from_seconds
+from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Leg
+from volery.simulation.autopilots.manoeuvres.rover_driving import GuidedRover
+from volery.simulation.autopilots.onboard_mission import MissionItem
+from volery.simulation.autopilots.state_groups import GuidedLimits
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle, VehicleAction
+
+
+def set_limits(vehicle: Vehicle, item: MissionItem) -> None:
+    """Execute DO_GUIDED_LIMITS: whole seconds, least and largest height, and distance; 0: no limit."""
+    vehicle.commanded.guided_limits = GuidedLimits(int(item.param1), item.param2, item.param3, item.param4)
+
+
+def copter_guided_leg(vehicle: Vehicle, item: MissionItem) -> Leg:
+    """Return the leg of NAV_GUIDED_ENABLE of a copter."""
+    return _leg(vehicle, item, Guided(vehicle))
+
+
+def rover_guided_leg(
+    vehicle: Vehicle, item: MissionItem, on_arrival: VehicleAction, on_timeout: VehicleAction
+) -> Leg:
+    """Return the leg of NAV_GUIDED_ENABLE of a rover, which is at its end near the item's place, too."""
+    leg = _leg(vehicle, item, GuidedRover(vehicle, on_arrival, on_timeout))
+    if not item.has_place:
+        return leg
+    north, east, _ = vehicle.point(item.frame, item.x / 1e7, item.y / 1e7, item.z)
+
+    def near() -> bool:
+        here = vehicle.estimate.position
+        return hypot(north - here[0], east - here[1]) <= vehicle.tuning.waypoint_radius
+
+    return Leg(leg.manoeuvre, lambda: leg.done() or near())
+
+
+def _leg(vehicle: Vehicle, item: MissionItem, guided: Manoeuvre) -> Leg:
+    begun, start = vehicle.kernel.now(), vehicle.estimate.position
+    limits = vehicle.commanded.guided_limits
+    enables = int(item.param1) > 0
+
+    def ended() -> bool:
+        north, east, down = vehicle.estimate.position
+        return (
+            not enables
+            or 0 < from_seconds(limits.seconds) <= vehicle.kernel.now() - begun
+            or (limits.lowest != 0.0 and -down < limits.lowest)
+            or (limits.highest != 0.0 and -down > limits.highest)
+            or 0.0 < limits.distance < hypot(north - start[0], east - start[1])
+        )
+
+    return Leg(guided, ended)
