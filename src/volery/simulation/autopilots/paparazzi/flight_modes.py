@@ -11,6 +11,7 @@ from math import cos, isfinite, sin
 from volery.base.frames import Vector, enu_to_ned, wrap
 from volery.base.time import MS, Ns, from_seconds, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.autopilots.flight_stack.guidance import approach
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ManualFlight, Stabilize
 from volery.simulation.autopilots.paparazzi.flight_plan import Demand, Vertical
 from volery.simulation.autopilots.paparazzi.guidance_loops import (
@@ -35,6 +36,9 @@ FOLLOW_GAIN, FOLLOW_LEAD = 0.4, 0.25
 
 FOLLOW_ACCEL, FOLLOW_JERK, FASTEST = 10.0, 80.0, 15.0
 """Limits of the flight stack [m/s^2, m/s^3, m/s]; the guidance loops limit the motion."""
+
+TURN_GAIN, TURN_BRAKE = 3.5, 2.4
+"""Approach to a heading [1/s, rad/s^2]: 90 degrees within 3 were recorded after 1.15 s, 180 after 2.15 s."""
 
 
 class Guidance(Manoeuvre):
@@ -89,8 +93,7 @@ class Guidance(Manoeuvre):
             Setpoint(
                 Control.VELOCITY,
                 velocity=loops.correction(estimate.position, FOLLOW_GAIN, FOLLOW_LEAD),
-                yaw=yaw,
-                yaw_rate=yaw_rate,
+                yaw_rate=yaw_rate if yaw is None else self._turn_to(yaw),
                 speed=FASTEST,
                 speed_up=FASTEST,
                 speed_down=FASTEST,
@@ -100,6 +103,10 @@ class Guidance(Manoeuvre):
                 jerk=FOLLOW_JERK,
             )
         )
+
+    def _turn_to(self, yaw: float) -> float:
+        """Return the turn rate towards a heading [rad/s]."""
+        return approach(wrap(yaw - self.vehicle.estimate.attitude[2]), TURN_GAIN, TURN_BRAKE)
 
     def _moved_loops(self) -> GuidanceLoops:
         vehicle, estimate = self.vehicle, self.vehicle.estimate

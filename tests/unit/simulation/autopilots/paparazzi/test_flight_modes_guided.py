@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, dist, inf, nan, pi, sin
+from math import cos, degrees, dist, inf, nan, pi, radians, sin
 from typing import Any
 
 import pytest
@@ -210,6 +210,21 @@ def test_a_velocity_and_its_stop_swing_as_recorded(craft: Any) -> None:
         ways.append(-craft.position[0] - way)
     assert max(ways) == pytest.approx(2.6, abs=0.6)
     assert max(ways) - min(ways[ways.index(max(ways)) :]) == pytest.approx(3.0, abs=0.7)
+
+
+@pytest.mark.parametrize(("degrees_of_turn", "recorded"), [(90.0, 1.15), (175.0, 2.15)])
+def test_it_turns_as_fast_as_recorded(degrees_of_turn: float, recorded: float, craft: Any) -> None:
+    craft.guided()
+    craft.guide(0x00, 0.0, 0.0, -10.0, 0.0)
+    craft.run(6.0)
+    craft.guide(0x00, 0.0, 0.0, -10.0, radians(degrees_of_turn))
+    turned = []
+    while len(turned) < 80:
+        craft.run(0.05)
+        turned.append(degrees(heading(craft)) % 360.0)
+    reached = next(place for place, now in enumerate(turned, 1) if abs(now - degrees_of_turn) < 3.0)
+    assert reached * 0.05 == pytest.approx(recorded, rel=0.1)
+    assert max(turned[10:]) < degrees_of_turn + 2.0
 
 
 def test_it_climbs_and_sinks_at_3_m_s_and_ends_high(craft: Any) -> None:
