@@ -659,3 +659,37 @@ def test_what_a_signal_interrupted_is_waited_for_until_it_would_show(
         rig.executor.wait_for_interrupted()
 
     assert rig.run(script) == ends
+
+
+def test_a_successor_aborts_at_once_and_not_at_the_next_message(rig: Rig) -> None:
+    rig.at(1.25, lambda: rig.executor.abort_for("the operator"))
+    ended: list[float] = []
+
+    def script() -> None:
+        with pytest.raises(Overridden):
+            rig.executor.execute("goto", lambda: [rig.step()])
+        ended.append(to_seconds(rig.kernel.now()))
+
+    rig.run(script)
+    assert ended == [1.25]
+
+
+def test_a_step_that_is_spun_is_late_and_lost_as_another(rig: Rig) -> None:
+    rig.driver.cycle = lambda: rig.kernel.sleep_until(rig.kernel.now() + 100 * MS)
+    with pytest.raises(NotArrived, match="within 2 s"):
+        rig.execute(rig.step(within=2 * S))
+    assert rig.kernel.now() == pytest.approx(2 * S, abs=0.2 * S)
+
+
+def test_a_failsafe_is_taken_back_once(rig: Rig) -> None:
+    rig.seen.mode, rig.seen.failsafe, rig.seen.failsafe_lasts = "RTL", True, True
+    done = rig.step(enters="GUIDED", done=lambda _: True)
+
+    def script() -> None:
+        assert rig.executor.take_back()
+        rig.executor.execute("land", lambda: [done])
+        rig.executor.execute("goto", lambda: [done])
+
+    with pytest.raises(Failsafe, match="goto: .*is in a failsafe, in RTL"):
+        rig.run(script)
+    assert len(rig.sent) == 1

@@ -3,7 +3,7 @@ from __future__ import annotations
 from dataclasses import FrozenInstanceError
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from volery.base.errors import UsageError
@@ -122,11 +122,12 @@ metres = st.floats(-300, 300)
 
 
 @given(metres, metres, metres, metres)
+@example(-174.0, 167.0, 113.0, -173.0)  # just past a corner
 def test_against_a_path_taken_in_small_steps(x0: float, y0: float, x1: float, y1: float) -> None:
     """A path is refused if one of its points is clearly inside the zone, and not if none is even near."""
     fence = Fence(no_fly=(Zone("school", SQUARE),))
     refused = bool(check(at(x0, y0), at(x1, y1), fence))
-    points = [(x0 + (x1 - x0) * k / 200, y0 + (y1 - y0) * k / 200) for k in range(201)]
+    points = [(x0 + (x1 - x0) * k / 1000, y0 + (y1 - y0) * k / 1000) for k in range(1001)]  # 85 cm at most
     depths = [min(50 - abs(x), 50 - abs(y - 70)) for x, y in points]
     starts_inside = depths[0] > 0
     if max(depths) > 0.5 and not starts_inside:
