@@ -149,6 +149,20 @@ NO_LIMITS = GuidedLimits()
 
 
 @dataclass
+class GearState:
+    """Landing gear, as its outputs were last set."""
+
+    deployed: bool | None = None
+    """``None`` until it has moved."""
+    started: bool = False
+    """Whether the position at the start has been taken."""
+    height: int = 0
+    """Height above home [m], climb and landing at the last tick."""
+    climbing: bool = False
+    landing: bool = False
+
+
+@dataclass
 class CommandedLimits:
     """Limits and heading that commands and mission items have set for the present mode; ``None``: not set."""
 

@@ -28,6 +28,7 @@ from volery.simulation.autopilots.state_groups import (
     CommandedLimits,
     FailsafeState,
     FenceState,
+    GearState,
     GroundState,
     Home,
     OutputState,
@@ -259,6 +260,7 @@ class Vehicle:
         self.ground = GroundState()
         self.commanded = CommandedLimits()
         self.outputs = OutputState()
+        self.gear = GearState()
         self.switches = SwitchState()
         self.failsafes = FailsafeState()
         self.fence = FenceState()

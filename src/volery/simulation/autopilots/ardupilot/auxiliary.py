@@ -12,6 +12,7 @@ from functools import partial
 from typing import NamedTuple
 
 from volery.simulation.autopilots.ardupilot.fence import enable_fence
+from volery.simulation.autopilots.ardupilot.landing_gear import switch_gear
 from volery.simulation.autopilots.ardupilot.mission import mission_grew
 from volery.simulation.autopilots.ardupilot.modes import (
     INFO,
@@ -220,6 +221,7 @@ FUNCTIONS: Mapping[int, Callable[[Vehicle, int], None]] = {
     11: _fence,
     19: _gripper,
     24: _restart_mission,
+    29: switch_gear,
     EMERGENCY_STOP: _emergency_stop,
     INTERLOCK: _interlock,
     46: _overrides,

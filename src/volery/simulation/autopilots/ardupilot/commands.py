@@ -10,6 +10,7 @@ from volery.base.frames import wrap
 from volery.simulation.autopilots.ardupilot import payload
 from volery.simulation.autopilots.ardupilot.battery import on_battery_reset
 from volery.simulation.autopilots.ardupilot.fence import fence_admits, on_fence_enable
+from volery.simulation.autopilots.ardupilot.landing_gear import on_airframe_configuration
 from volery.simulation.autopilots.ardupilot.modes import (
     CRITICAL,
     FORCE,
@@ -44,7 +45,7 @@ FLIGHT_TERMINATION, REPOSITION, PAUSE_CONTINUE, SET_YAW_SPEED, SET_MISSION_CURRE
 REPEAT_RELAY, REPEAT_SERVO, FENCE_ENABLE, RUN_PREARM_CHECKS = 182, 184, 207, 401
 ROI_LOCATION, ROI_NONE, ROI, MOTOR_TEST = 195, 197, 201, 209
 START_MAG_CAL, ACCEPT_MAG_CAL, CANCEL_MAG_CAL = 42424, 42425, 42426
-BATTERY_RESET, VTOL_LAND, JUMP_TO_TAG = 42651, 85, 601
+BATTERY_RESET, VTOL_LAND, JUMP_TO_TAG, AIRFRAME_CONFIGURATION = 42651, 85, 601, 2520
 CALIBRATION, STORAGE, REBOOT, MISSION_START, ARM_DISARM, GET_HOME = 241, 245, 246, 300, 400, 410
 
 HIGHEST = 83_000.0
@@ -413,6 +414,7 @@ def copter_commands(
         LOITER_UNLIMITED: to_mode(modes["LOITER"]),
         CONDITION_YAW: on_condition_yaw,
         PAUSE_CONTINUE: on_pause,
+        AIRFRAME_CONFIGURATION: on_airframe_configuration,
     }
 
 

@@ -23,6 +23,7 @@ from volery.simulation.autopilots.ardupilot.firmware import (
     streams,
 )
 from volery.simulation.autopilots.ardupilot.guided import copter_attitude, copter_global, copter_local
+from volery.simulation.autopilots.ardupilot.landing_gear import watch_gear
 from volery.simulation.autopilots.ardupilot.modes import (
     COPTER_DISARMED,
     CUSTOM,
@@ -224,6 +225,7 @@ def on_step(vehicle: Vehicle) -> None:
         pilot_input.read_mode_switch(vehicle, "FLTMODE_CH", "FLTMODE")
         pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
         AUXILIARY.read_switches(vehicle)
+    watch_gear(vehicle)
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_copter)
     commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))

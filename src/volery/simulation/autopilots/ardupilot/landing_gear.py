@@ -1,0 +1,89 @@
+"""Landing gear of a simulated ArduPilot copter: outputs with the function 29, deployed or retracted.
+
+The gear moves by AIRFRAME_CONFIGURATION, by a switch, at the start (LGR_STARTUP), at heights (LGR_DEPLOY_ALT,
+LGR_RETRACT_ALT), after a take-off in AUTO or GUIDED and before a landing (LGR_OPTIONS). The body does not
+change with it: only the outputs do. Pins that sense the gear are not simulated.
+"""
+
+from __future__ import annotations
+
+from volery.simulation.autopilots.ardupilot.modes import INFO
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, Command
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+GEAR_OUTPUT = 29
+"""SERVOn_FUNCTION."""
+OUTPUTS = range(1, 17)
+STARTS_RETRACTED, STARTS_DEPLOYED = 1, 2
+"""LGR_STARTUP."""
+RETRACTS_AFTER_TAKEOFF, DEPLOYS_FOR_LANDING = 1, 2
+"""Bits of LGR_OPTIONS."""
+RETRACT = 1
+"""param2 of AIRFRAME_CONFIGURATION; any other value deploys."""
+CLIMBS_BY_ITSELF = ("AUTO", "GUIDED")
+
+
+def _outputs(vehicle: Vehicle) -> list[int]:
+    return [n for n in OUTPUTS if vehicle.parameters[f"SERVO{n}_FUNCTION"] == GEAR_OUTPUT]
+
+
+def move_gear(vehicle: Vehicle, deploy: bool) -> None:
+    """Deploy or retract, if LGR_ENABLE allows: outputs go to their upper or lower end."""
+    parameters, gear = vehicle.parameters, vehicle.gear
+    if not parameters["LGR_ENABLE"]:
+        return
+    outputs = _outputs(vehicle)
+    for number in outputs:
+        upper = deploy != bool(parameters[f"SERVO{number}_REVERSED"])
+        vehicle.outputs.servos[number] = round(parameters[f"SERVO{number}_{'MAX' if upper else 'MIN'}"])
+    if outputs and not (deploy and gear.deployed):
+        vehicle.send_text(INFO, f"LandingGear: {'DEPLOY' if deploy else 'RETRACT'}")
+    gear.deployed = deploy
+
+
+def on_airframe_configuration(vehicle: Vehicle, command: Command) -> int:
+    """Handle AIRFRAME_CONFIGURATION; the number of the gear (param1) is not read."""
+    move_gear(vehicle, deploy=int(command.param2) != RETRACT)
+    return ACCEPTED
+
+
+def switch_gear(vehicle: Vehicle, position: int) -> None:
+    """Deploy with the switch down, retract with it up; the middle changes nothing."""
+    if position:
+        move_gear(vehicle, deploy=position < 0)
+
+
+def watch_gear(vehicle: Vehicle) -> None:
+    """Move the gear where the start, a height, a take-off or a landing demands it, at each tick."""
+    parameters, gear = vehicle.parameters, vehicle.gear
+    if not parameters["LGR_ENABLE"]:
+        return
+    if not gear.started:
+        gear.started = True
+        startup = round(parameters["LGR_STARTUP"])
+        if startup in (STARTS_RETRACTED, STARTS_DEPLOYED):
+            move_gear(vehicle, deploy=startup == STARTS_DEPLOYED)
+    _at_heights(vehicle)
+    options, manoeuvre = round(parameters["LGR_OPTIONS"]), vehicle.manoeuvre
+    climbs = vehicle.armed and manoeuvre.taking_off and vehicle.mode.name in CLIMBS_BY_ITSELF
+    lands = vehicle.armed and manoeuvre.landing
+    climbed = gear.climbing and not climbs and vehicle.armed and not vehicle.landed
+    if climbed and options & RETRACTS_AFTER_TAKEOFF and vehicle.mode.name in CLIMBS_BY_ITSELF:
+        move_gear(vehicle, deploy=False)
+    if lands and not gear.landing and options & DEPLOYS_FOR_LANDING:
+        move_gear(vehicle, deploy=True)
+    gear.climbing, gear.landing = climbs, lands
+
+
+def _at_heights(vehicle: Vehicle) -> None:
+    """Deploy or retract an armed vehicle that passes a height above home, in whole metres; 0: none."""
+    gear = vehicle.gear
+    lower, upper = vehicle.parameters["LGR_DEPLOY_ALT"], vehicle.parameters["LGR_RETRACT_ALT"]
+    height, before = max(0, int(vehicle.height)), gear.height
+    gear.height = height
+    if not vehicle.armed or not _outputs(vehicle):
+        return
+    if gear.deployed is not True and lower > 0 and height <= lower < before:
+        move_gear(vehicle, deploy=True)
+    elif gear.deployed is not False and upper > 0 and lower <= upper and before < upper <= height:
+        move_gear(vehicle, deploy=False)
