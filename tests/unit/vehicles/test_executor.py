@@ -690,6 +690,6 @@ def test_a_failsafe_is_taken_back_once(rig: Rig) -> None:
         rig.executor.execute("land", lambda: [done])
         rig.executor.execute("goto", lambda: [done])
 
-    with pytest.raises(Failsafe, match="goto: .*is in a failsafe, in RTL"):
+    with pytest.raises(Failsafe, match=r"goto: .*is in a failsafe, in RTL"):
         rig.run(script)
     assert len(rig.sent) == 1
