@@ -2,16 +2,27 @@ import os
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from volery.base.errors import ModelError, UsageError
 from volery.base.time import S
 from volery.calibration.meters.rospy import imported
-from volery.calibration.node_comparison import NodeComparison, NodeEstimate, compare, compare_nodes
+from volery.calibration.node_comparison import (
+    NodeComparison,
+    NodeEstimate,
+    compare,
+    compare_nodes,
+    node_estimates,
+)
 from volery.calibration.node_processes import node_programs, process_cpu
 from volery.cli.commands.cost import _verdict
 from volery.model.system_loader import load
+from volery.requirements.record import RunRecord
 from volery.run.assembly.model_checks import vocabulary
 
 MODEL = """
@@ -73,6 +84,26 @@ def test_a_node_in_the_tables() -> None:
     assert NODE.ros_share == pytest.approx(0.9)
     assert NODE.ros_error == pytest.approx(0.02 / 0.09)
     assert NODE.impact == pytest.approx(0.9 * 0.02 / 0.09)
+
+
+@given(
+    charged_s=st.floats(0.0, 1e3),
+    ros_s=st.floats(0.0, 1e3),
+    measured_s=st.floats(1e-6, 1e3),
+    wide=st.booleans(),
+)
+def test_ros_is_never_more_than_the_whole(
+    charged_s: float, ros_s: float, measured_s: float, wide: bool
+) -> None:
+    record = SimpleNamespace(
+        components={"n": SimpleNamespace(cpu_s=charged_s, ros_cpu_s=ros_s, ros_calls={"publish": 1})}
+    )
+    estimate = node_estimates(cast("RunRecord", record), ["n"])["n"]
+    assert 0.0 <= estimate.ros_s <= estimate.whole_s
+    runs_s = (measured_s / 3.0, measured_s, 3.0 * measured_s) if wide else (measured_s,)
+    compared = NodeComparison("n", "rospy", estimate, runs_s)
+    assert 0.0 <= compared.ros_share <= 1.0
+    assert 0.0 <= compared.measured_ros_s <= compared.measured_s
 
 
 @pytest.mark.parametrize("runs_s", [(0.02, 0.03, 0.12, 0.3, 0.6), (0.0001, 0.12, 0.5)])

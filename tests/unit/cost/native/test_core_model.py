@@ -3,6 +3,7 @@ import pytest
 
 from volery.cost import IssueQueue, LibraryLaw, load_catalogue
 from volery.cost.native.block_costs import ExecutionSequence, execute
+from volery.cost.native.core_model import BLOCKED
 from volery.cost.native.instruction_tables import instruction_tables
 from volery.cost.native.machine_code import End, Instruction, MachineBlock
 
@@ -82,6 +83,11 @@ def test_a_store_is_found_by_its_address_however_it_is_written():
 
 def test_a_load_of_parts_of_several_stores_waits_until_they_retire():
     assert through_memory((640, 636)) > through_memory((640, 640))
+
+
+def test_a_blocked_load_waits_as_long_as_measured():
+    blocked = through_memory((640, 636)) - through_memory((640, 640))
+    assert blocked == pytest.approx(BLOCKED, abs=1.0)
 
 
 def between_misses(calls: int, window: int) -> float:
