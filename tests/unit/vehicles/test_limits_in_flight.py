@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import Any
 
 import pytest
@@ -139,3 +140,14 @@ def test_one_report_of_a_position_is_converted_once(monkeypatch: pytest.MonkeyPa
     assert sorted(converted) == sorted([here.latitude, goal.latitude])
     assert not bounds.violations(place(0, 40))
     assert len(converted) == 3
+
+
+def test_what_is_exactly_at_a_limit_is_within_it() -> None:
+    goal = place(30, 40)
+    east, north, up = Bounds(HOME, Limits(), None).local(goal)
+    distance = hypot(east, north)
+    bounds = Bounds(HOME, Limits(farthest=distance, highest=up), None)
+    assert bounds.path_violation(((0.0, 0.0, 1.0), (east, north, up)), goal) == ""
+    assert "0.9 km from home, but the limit is 0.8 km" in Bounds(
+        HOME, Limits(farthest=800.0), None
+    ).path_violation(((0.0, 0.0, 1.0), (900.0, 0.0, 1.0)), goal)
