@@ -164,6 +164,7 @@ def test_supported_parameters_exist_and_are_read_and_no_others_are() -> None:
     read |= {f"RC{channel}_OPTION" for channel in range(5, 17)} | {"FLTMODE_CH", "MODE_CH"}
     read |= {f"{modes}{position}" for modes in ("FLTMODE", "MODE") for position in range(1, 7)}
     read |= {*SOURCE_PARAMETERS, *COPTER_PARAMETERS, WHEEL_ENCODER}
+    read |= {f"BTN_{part}{number}" for part in ("PIN", "FUNC", "OPTIONS") for number in range(1, 5)}
     stated = set(FIRMWARE.kinds["multirotor"].rules.parameters.supported) | set(
         FIRMWARE.kinds["rover"].rules.parameters.supported
     )

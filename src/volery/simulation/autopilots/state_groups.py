@@ -134,6 +134,20 @@ class OutputState:
     """Number of the last order to change an output repeatedly."""
 
 
+@dataclass
+class ButtonState:
+    """Buttons on the pins of an autopilot."""
+
+    pressed: int | None = None
+    """One bit for each button whose pin is high; ``None`` until they are first read."""
+    changed_at: Ns = NEVER
+    changed_ms: int = 0
+    """Time of the last change, and the same since boot [ms]."""
+    reported_at: Ns = NEVER
+    on: set[int] = field(default_factory=set)
+    """Buttons whose function has last run as pressed, from 0."""
+
+
 class GuidedLimits(NamedTuple):
     """Limits at which a mission takes the vehicle back from a companion computer; 0: none."""
 

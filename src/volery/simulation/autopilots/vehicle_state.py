@@ -25,6 +25,7 @@ from volery.simulation.autopilots.protocol_endpoint import VehicleOutput
 from volery.simulation.autopilots.state_groups import (
     NEVER,
     ArmingState,
+    ButtonState,
     CommandedLimits,
     FailsafeState,
     FenceState,
@@ -261,6 +262,7 @@ class Vehicle:
         self.commanded = CommandedLimits()
         self.outputs = OutputState()
         self.gear = GearState()
+        self.buttons = ButtonState()
         self.switches = SwitchState()
         self.failsafes = FailsafeState()
         self.fence = FenceState()

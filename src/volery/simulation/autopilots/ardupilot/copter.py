@@ -9,6 +9,7 @@ from volery.base.frames import Vector
 from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, AuxiliaryFunctions
+from volery.simulation.autopilots.ardupilot.buttons import read_buttons
 from volery.simulation.autopilots.ardupilot.failsafes import (
     COPTER_FAILSAFES,
     radio_never_received,
@@ -225,6 +226,7 @@ def on_step(vehicle: Vehicle) -> None:
         pilot_input.read_mode_switch(vehicle, "FLTMODE_CH", "FLTMODE")
         pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
         AUXILIARY.read_switches(vehicle)
+    read_buttons(vehicle, AUXILIARY)
     watch_gear(vehicle)
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_copter)

@@ -7,6 +7,7 @@ from functools import cache, partial
 from volery.base.time import MS, S
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, AuxiliaryFunctions
+from volery.simulation.autopilots.ardupilot.buttons import read_buttons
 from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES
 from volery.simulation.autopilots.ardupilot.fence import FENCE_CHECKS, check_fence, respond_rover
 from volery.simulation.autopilots.ardupilot.firmware import (
@@ -223,6 +224,7 @@ def on_step(vehicle: Vehicle) -> None:
         pilot_input.read_mode_switch(vehicle, "MODE_CH", "MODE")
         pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
         AUXILIARY.read_switches(vehicle)
+    read_buttons(vehicle, AUXILIARY)
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_rover)
     if vehicle.armed:
