@@ -232,7 +232,7 @@ SENSOR_SUITES: dict[str, SensorSuite] = {
         gps=GpsReceiver(
             horizontal=ErrorModel(0.5, 0.1, 30.0),
             vertical=ErrorModel(0.5, 0.3, 30.0),
-            velocity=ErrorModel(0.07, 0.4, 5.0),
+            velocity=ErrorModel(0.07, 0.25, 5.0),
             rate=8.0,
         ),
     ),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from math import atan2, cos, dist, hypot, pi, sin
+from math import atan2, cos, dist, hypot, inf, pi, sin
 
 from volery.base.frames import Vector
 from volery.base.time import Ns, to_seconds
@@ -102,9 +102,12 @@ class TakeOff(Hold):
         return True
 
     def cruise(self) -> Cruise:
-        """Return the speeds of the trajectory, with the climb rate of the ramp."""
-        climb = climb_share(self.vehicle) * self.vehicle.parameters["MPC_TKO_SPEED"]
-        return super().cruise()._replace(up=climb)
+        """Return the limits of the trajectory, with those of the ramp: its climb rate and acceleration."""
+        p = self.vehicle.parameters
+        low = self.vehicle.firmware_state.above_ground < p["MPC_LAND_ALT1"]
+        lift = p["MPC_TKO_SPEED"] / max(0.1, p["MPC_TKO_RAMP_T"]) if low else inf
+        climb = climb_share(self.vehicle) * p["MPC_TKO_SPEED"]
+        return super().cruise()._replace(up=climb, lift=lift)
 
     def arrived(self, passing: bool = False) -> bool:
         """Return whether the vehicle is within NAV_MC_ALT_RAD below the altitude, or above it."""
@@ -114,6 +117,17 @@ class TakeOff(Hold):
 
 class Descent(Land):
     """AUTO.LAND: sink more slowly below MPC_LAND_ALT1, ALT2 and ALT3."""
+
+    def step(self) -> None:
+        """Move the trajectory down over the point and follow it."""
+        vehicle = self.vehicle
+        if not vehicle.has_position or self.point is None or vehicle.estimate.landed:
+            super().step()
+            return
+        tuning = vehicle.tuning
+        control: PositionLoops = vehicle.firmware_state.control
+        limits = Cruise(tuning.speed, tuning.speed_up, self.sink())
+        control.fly_to((self.point[0], self.point[1], inf), limits, vehicle.commanded.yaw)
 
     def sink(self) -> float:
         """Return the sink rate at the present height [m/s]."""

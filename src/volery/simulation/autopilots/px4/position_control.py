@@ -10,7 +10,7 @@ unwind. The flight stack follows the position and velocity of that airframe.
 
 from __future__ import annotations
 
-from math import dist, hypot, isfinite, sqrt, tan
+from math import dist, hypot, inf, isfinite, sqrt, tan
 from typing import NamedTuple
 
 from volery.base.frames import Vector
@@ -28,10 +28,19 @@ DRAG = 1.0
 LEAN_LAG, THRUST_LAG = 0.15, 0.06
 """Lag from commanded to flown acceleration in the plane (attitude loops) and along the thrust [s]."""
 
+HOVER_TIME = 11.0
+"""Time constant of the estimated hover thrust (MPC_USE_HTE) [s]."""
+
 GRAVITY = 9.80665
 
 ACCEL_GAIN = 20.0
 """Gain on a velocity error below which the trajectory's acceleration fades linearly [1/s]."""
+
+CLAMP_EACH = 0.5
+"""Speed below which a limit no longer keeps the direction of the trajectory [m/s], as in PX4's sources."""
+
+BEYOND = 1e6
+"""Factor on a distance whose product is beyond any limit of speed [1/s]."""
 
 FOLLOW_GAIN, FOLLOW_LEAD = 0.95, 0.25
 """How the flight stack follows the airframe of the loops: gain [1/s] and lead [s]."""
@@ -53,11 +62,12 @@ def braking_speed(jerk: float, accel: float, distance: float) -> float:
 
 
 class Cruise(NamedTuple):
-    """Limits of a trajectory: speeds in the plane, up and down [m/s]."""
+    """Limits of a trajectory: speeds in the plane, up and down [m/s], acceleration of a climb [m/s^2]."""
 
     speed: float
     up: float
     down: float
+    lift: float = inf
 
 
 class Trajectory:
@@ -72,7 +82,7 @@ class Trajectory:
 
         Args:
             vehicle: The vehicle, for its parameters.
-            point: North, east, down [m].
+            point: North, east, down [m]; down may be infinite: it sinks at ``cruise.down``.
             cruise: Limits of speed.
             flown: Position of the aircraft [m].
             passed: Time [s].
@@ -81,16 +91,17 @@ class Trajectory:
         jerk, push = p["MPC_JERK_AUTO"], p["MPC_ACC_HOR"]
         ahead = [goal - here for goal, here in zip(point, self.position, strict=True)]
         climbs = ahead[2] < 0.0
-        lift = p["MPC_ACC_UP_MAX"] if climbs else p["MPC_ACC_DOWN_MAX"]
+        lift = min(cruise.lift, p["MPC_ACC_UP_MAX"]) if climbs else p["MPC_ACC_DOWN_MAX"]
         level = hypot(ahead[0], ahead[1])
         plane = min(cruise.speed, braking_speed(jerk, push, level))
-        brake = p["MPC_ACC_DOWN_MAX"] if climbs else p["MPC_ACC_UP_MAX"]
-        along = min(cruise.up if climbs else cruise.down, braking_speed(jerk, brake, abs(ahead[2])))
-        speed = _straight(level, abs(ahead[2]), plane, along)
-        distance = hypot(level, ahead[2])
-        share = speed / distance if distance > 1e-9 else 0.0
+        if isfinite(ahead[2]):
+            along = min(cruise.up if climbs else cruise.down, braking_speed(jerk, lift, abs(ahead[2])))
+            wished = _straight(ahead, plane, along)
+        else:
+            north, east = shorten(BEYOND * ahead[0], BEYOND * ahead[1], plane)
+            wished = north, east, cruise.down
         passed *= self._stretch(flown, p["MPC_XY_ERR_MAX"])
-        dn, de, dd = (share * way - v for way, v in zip(ahead, self.velocity, strict=True))
+        dn, de, dd = (speed - v for speed, v in zip(wished, self.velocity, strict=True))
         gap = hypot(dn, de)
         wanted = min(push, approach(gap, ACCEL_GAIN, jerk)) / gap if gap > 1e-9 else 0.0
         change_n, change_e = shorten(dn * wanted - self.accel[0], de * wanted - self.accel[1], jerk * passed)
@@ -110,15 +121,27 @@ class Trajectory:
         return 1.0 - min(1.0, hypot(north, east) / most)
 
 
-def _straight(level: float, height: float, plane: float, along: float) -> float:
-    """Return the speed along a straight line that exceeds neither the plane's nor the height's limit."""
+def _straight(ahead: list[float], plane: float, along: float) -> Vector:
+    """Return the velocity along a straight line that exceeds neither the plane's nor the height's limit.
+
+    Below ``CLAMP_EACH`` a limit shortens its own components alone: a slow end of the height does not slow the
+    plane. As PX4's ``clampToXYNorm`` and ``clampToZNorm`` do.
+    """
+    level, height = hypot(ahead[0], ahead[1]), abs(ahead[2])
     distance = hypot(level, height)
-    speed = hypot(plane, along)
-    if level * speed > plane * distance:
-        speed = plane * distance / level
-    if height * speed > along * distance:
-        speed = along * distance / height
-    return speed
+    if distance < 1e-9:
+        return 0.0, 0.0, 0.0
+    share = hypot(plane, along) / distance
+    sideways, upright = share, share
+    if level * sideways > plane:
+        if plane >= CLAMP_EACH or level * sideways >= CLAMP_EACH:
+            upright *= plane / (level * sideways)
+        sideways = plane / level
+    if height * upright > along:
+        if along >= CLAMP_EACH or height * upright >= CLAMP_EACH:
+            sideways *= along / (height * upright)
+        upright = along / height
+    return ahead[0] * sideways, ahead[1] * sideways, ahead[2] * upright
 
 
 class Wanted(NamedTuple):
@@ -137,12 +160,15 @@ class AirframeLoops:
         self.accel = [0.0, 0.0, 0.0]
         self._thrust = [DRAG * v for v in velocity]
         self._integral = list(self._thrust)
+        self._hover = 1.0
+        """Estimated thrust that hovers, over the true one."""
 
     def stand(self, position: Vector) -> None:
         """Keep the airframe on the ground; its climb may grow."""
         self.position = list(position)
         for axis in range(2):
             self.velocity[axis] = self.accel[axis] = self._thrust[axis] = self._integral[axis] = 0.0
+        self._hover = 1.0
 
     def step(self, vehicle: Vehicle, wanted: Wanted, limits: Cruise) -> None:
         """Fly one substep."""
@@ -170,24 +196,37 @@ class AirframeLoops:
                 miss[axis] = speeds[axis] - self.velocity[axis]
                 push[axis] += gain * miss[axis] + self._integral[axis] - slope * self.accel[axis]
         push[2] = max(-GRAVITY, min(GRAVITY, push[2]))
-        given = 1.0 - push[2] / GRAVITY
         most = tan(vehicle.tuning.tilt) * GRAVITY
         north, east = shorten(push[0], push[1], most)
-        north, east = north * given, east * given
-        if hypot(push[0], push[1]) > hypot(north, east):
+        supposed = 1.0 - push[2] / GRAVITY
+        if supposed * hypot(north, east) < hypot(push[0], push[1]):
             unwind = 2.0 / max(0.1, plane[0])
-            miss[0] -= unwind * (push[0] - north)
-            miss[1] -= unwind * (push[1] - east)
+            miss[0] -= unwind * (push[0] - supposed * north)
+            miss[1] -= unwind * (push[1] - supposed * east)
+        given = supposed * self._hover
+        north, east, down = north * given, east * given, GRAVITY * (1.0 - given)
         for axis, (_, integral, _) in enumerate((plane, plane, along)):
             if not free[axis]:
                 self._integral[axis] += integral * miss[axis] * SUBSTEP
         self._integral[2] = max(-GRAVITY, min(GRAVITY, self._integral[2]))
-        for axis, (wanted, lag) in enumerate(((north, LEAN_LAG), (east, LEAN_LAG), (push[2], THRUST_LAG))):
+        for axis, (wanted, lag) in enumerate(((north, LEAN_LAG), (east, LEAN_LAG), (down, THRUST_LAG))):
             self._thrust[axis] += SUBSTEP / lag * (wanted - self._thrust[axis])
             self.accel[axis] = self._thrust[axis] - DRAG * self.velocity[axis]
             before = self.velocity[axis]
             self.velocity[axis] += self.accel[axis] * SUBSTEP
             self.position[axis] += 0.5 * (before + self.velocity[axis]) * SUBSTEP
+        self._estimate_hover(given, push[2])
+
+    def _estimate_hover(self, given: float, push: float) -> None:
+        """Estimate the thrust that hovers from thrust and acceleration; the integral keeps the thrust.
+
+        A climb or descent at constant speed against the drag changes the estimate, so that the commanded
+        acceleration returns to 0.
+        """
+        hovers = given * GRAVITY / max(0.1 * GRAVITY, GRAVITY - self.accel[2])
+        before = self._hover
+        self._hover += SUBSTEP / HOVER_TIME * (max(0.2, min(1.8, hovers)) - before)
+        self._integral[2] += (push - GRAVITY) * before / self._hover + GRAVITY - push
 
 
 class PositionLoops:
@@ -203,7 +242,7 @@ class PositionLoops:
         """Move the trajectory towards a point and follow it.
 
         Args:
-            point: North, east, down [m].
+            point: North, east, down [m]; down may be infinite: it sinks at ``cruise.down``.
             cruise: Limits of speed.
             yaw: Heading [rad]; ``None``: keep it.
         """

@@ -1,0 +1,62 @@
+"""Laws of PX4's trajectory and loops: limits along a straight line, the estimated hover thrust."""
+
+from math import hypot
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from volery.simulation.autopilots.px4.position_control import (
+    SUBSTEP,
+    AirframeLoops,
+    Cruise,
+    Wanted,
+    _straight,
+)
+
+GAINS = {
+    "MPC_XY_P": 0.95,
+    "MPC_Z_P": 1.0,
+    "MPC_XY_VEL_P_ACC": 1.8,
+    "MPC_XY_VEL_I_ACC": 0.4,
+    "MPC_XY_VEL_D_ACC": 0.2,
+    "MPC_Z_VEL_P_ACC": 4.0,
+    "MPC_Z_VEL_I_ACC": 2.0,
+    "MPC_Z_VEL_D_ACC": 0.0,
+}
+LIMITS = Cruise(12.0, 3.0, 1.5)
+
+
+def vehicle() -> Any:
+    return SimpleNamespace(parameters=GAINS, tuning=SimpleNamespace(tilt=0.785))
+
+
+def flown(velocity: tuple[float, float, float], seconds: float) -> AirframeLoops:
+    nothing = float("nan")
+    loops, wanted = AirframeLoops((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), Wanted(*[(nothing,) * 3] * 3)
+    for _ in range(round(seconds / SUBSTEP)):
+        loops.step(vehicle(), wanted._replace(velocity=velocity), LIMITS)
+    return loops
+
+
+def test_a_fast_limit_keeps_the_direction() -> None:
+    north, east, down = _straight([80.0, 0.0, 60.0], 5.0, 1.5)
+    assert (north, east, down) == pytest.approx((2.0, 0.0, 1.5))
+
+
+def test_a_slow_end_of_the_height_does_not_slow_the_plane() -> None:
+    """clampToZNorm scales the height alone where both its speed and its limit are below 0.5 m/s."""
+    north, east, down = _straight([9.0, 0.0, 1.0], 3.0, 0.3)
+    assert hypot(north, east) == pytest.approx(3.0 * 9.0 / hypot(9.0, 1.0), rel=0.03)
+    assert down == pytest.approx(0.3)
+
+
+def test_at_the_point_nothing_moves() -> None:
+    assert _straight([0.0, 0.0, 0.0], 5.0, 1.0) == (0.0, 0.0, 0.0)
+
+
+def test_the_integral_holds_the_whole_drag_at_the_end_of_a_long_descent() -> None:
+    """Logged of PX4 1.14 in SIH at 4.7 m/s: 4.8 m/s^2. Without the estimated hover thrust it was 4.0."""
+    loops = flown((4.8, 0.0, 1.1), 60.0)
+    assert loops.velocity == pytest.approx([4.8, 0.0, 1.1], abs=0.02)
+    assert loops._integral[0] > 4.7
