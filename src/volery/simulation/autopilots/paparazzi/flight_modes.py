@@ -112,9 +112,11 @@ class Guidance(Manoeuvre):
         vehicle, estimate = self.vehicle, self.vehicle.estimate
         late = vehicle.kernel.now() - self._last_step_ns > self.RESTART_AFTER
         lost = state_of(vehicle).frozen is not None
-        if self._loops is None or late or (not lost and self._loops.away_from(estimate.position)):
+        if self._loops is None or late:
             self._loops = GuidanceLoops(estimate.position, estimate.velocity)
             self._last_step_ns = vehicle.kernel.now()
+        elif not lost and self._loops.away_from(estimate.position):
+            self._loops.move_to(estimate.position, estimate.velocity)
         return self._loops
 
     def _substeps(self) -> int:

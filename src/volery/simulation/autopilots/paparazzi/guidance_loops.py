@@ -69,7 +69,7 @@ DRAG = 0.5 * 1.12 * 0.0151 / 0.4
 """Drag by the square of the speed [1/m]: 0.0151 m^2, air at 900 m."""
 
 RESYNCHRONIZE = 8.0
-"""Distance from the response at which the aircraft is elsewhere: the response then starts anew [m]."""
+"""Distance from the response at which the aircraft is elsewhere: the response then goes on from there [m]."""
 
 NO_NUMBER = -8_388_608.0
 """What the firmware's integers make of a value that is not a number [m or m/s]."""
@@ -271,7 +271,7 @@ class Limits(NamedTuple):
 
 
 class GuidanceLoops:
-    """Both responses of one aircraft, restarted where it is whenever it is not where they are."""
+    """Both responses of one aircraft, moved to where it is whenever it is not where they are."""
 
     def __init__(self, position: Vector, velocity: Vector) -> None:
         self.plane = PlaneLoop((position[0], position[1]), (velocity[0], velocity[1]))
@@ -309,6 +309,11 @@ class GuidanceLoops:
         north, east = self.plane.place
         off = hypot(position[0] - north, position[1] - east, position[2] + self.height.height)
         return off > RESYNCHRONIZE
+
+    def move_to(self, position: Vector, velocity: Vector) -> None:
+        """Continue from where the aircraft is: wind has carried it off; references and integrals remain."""
+        self.plane.place, self.plane.velocity = (position[0], position[1]), (velocity[0], velocity[1])
+        self.height.height, self.height.climb = -position[2], -velocity[2]
 
     def correction(self, position: Vector, gain: float, lead: float) -> Vector:
         """Return the velocity, north, east, down [m/s], that keeps the aircraft on the response.
