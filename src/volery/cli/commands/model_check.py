@@ -134,7 +134,7 @@ def _record(one: Finding) -> dict[str, Any]:
 
 def _summary(system: System) -> Text:
     line = Text(system.name, style="bold")
-    line.append("  is a valid model", style="green")
+    line.append(" is a valid model", style="green")
     allocations = choices(system.allocations).replace(" or ", " and ")
     scenarios = choices(system.scenarios).replace(" or ", " and ")
     line.append(f"  allocations: {allocations}  scenarios: {scenarios}", style="dim")
