@@ -89,8 +89,8 @@ def _varying_paths(name: str, above: str = "") -> list[str] | None:
         if kind == rosbags.Nodetype.NAME:
             below = _varying_paths(str(detail), f"{above}{label}.")
         elif kind != rosbags.Nodetype.BASE:
-            item, of = detail[0]
-            numbers = item == rosbags.Nodetype.BASE and of[0] != "string"
+            item: Any = detail[0]  # kind and detail of an element
+            numbers = item[0] == rosbags.Nodetype.BASE and item[1][0] != "string"
             below = [above + label] if numbers else None
         elif detail[0] == "string":
             below = [above + label]
@@ -100,7 +100,7 @@ def _varying_paths(name: str, above: str = "") -> list[str] | None:
     return found
 
 
-_sizes: dict[tuple[str, *tuple[int, ...]], int] = {}
+_sizes: dict[tuple[str, tuple[int, ...]], int] = {}
 """Sizes of encodings by type and lengths of strings and lists: nothing else changes a size."""
 
 
@@ -113,7 +113,8 @@ def cdr_size(message: Message) -> int:
     read = _varying(name)
     if read is None:
         return len(copied_to_cdr(message))
-    key = (name, *[len(one.encode() if isinstance(one, str) else one) for one in read(message)])
+    lengths = [len(one.encode() if isinstance(one, str) else one) for one in read(message)]
+    key = name, tuple(lengths)
     size = _sizes.get(key)
     if size is None:
         size = _sizes[key] = len(copied_to_cdr(message))
