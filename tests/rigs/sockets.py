@@ -17,7 +17,8 @@ from volery.links.coded_link import CodedLink
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor
-from volery.vehicles import Drone, drivers
+from volery.vehicles import Drone
+from volery.vehicles.driver import drivers
 
 HERE = "127.0.0.1"
 PACE = 20.0
