@@ -124,6 +124,7 @@ class Vehicle(ServicedVehicle, ABC):
         self._truth = truth
         self._in_progress: tuple[Task | None, str] | None = None
         self._monitor: Handle | None = None  # monitors what goes on after a call has returned
+        self._looked_at: Ns = -MONITOR_PERIOD  # last check of a stream
         self._straying: VehicleError | None = None  # the same, while the vehicle is being held for it
         self._bounds_error: VehicleError | None = None  # found by the monitor; raised by the next call
         self._manual_control_at: Ns | None = None
@@ -365,6 +366,8 @@ class Vehicle(ServicedVehicle, ABC):
         if upset is not None:
             raise upset
         try:
+            if policy.goes_on:
+                self._look(asked, check)
             self._executor.execute(asked, plan, restarts=restarts, check=check)
         except _MONITORED as error:
             raise type(error)(self.name, asked, f"{error.what}; {self._react(error)}") from None
@@ -409,6 +412,16 @@ class Vehicle(ServicedVehicle, ABC):
             return
         check = self._flight_monitor.check_of(IN_PLACE, self.limits, self._usable_bounds())
         self._keep_monitoring(f"after {asked}", check)
+
+    def _look(self, asked: str, check: Check) -> None:
+        """Check at a call, if that is due: in a quick loop each call replaces the monitor before it looks."""
+        now = self.kernel.now()
+        if now - self._looked_at < MONITOR_PERIOD:
+            return
+        self._looked_at = now
+        error = check(asked, now)
+        if error is not None:
+            raise error
 
     def _keep_monitoring(self, asked: str, check: Check) -> None:
         """Check each ``MONITOR_PERIOD``, unless telemetry arrives in a node's loop that may not run."""

@@ -13,6 +13,7 @@ from volery.base.frames import Vector
 from volery.base.position import AboveHome, Position
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
+from volery.kernel.waiting import sleep
 from volery.trace.events import Operation
 from volery.vehicles import Limits
 from volery.vehicles.drivers.mavlink.obstacle_decoder import ObstacleDecoder
@@ -126,6 +127,25 @@ def test_a_drone_is_stopped_before_an_obstacle(bench: Make) -> None:
     with pytest.raises(ObstacleNear, match=r"7\.[0-9] m to the north.*it holds there"):
         at.fly(mission)
     assert [one.outcome for one in at.recorded(Operation)][-1] == "ObstacleNear"
+
+
+@pytest.mark.parametrize("period", [S // 20, S // 10, S // 4])
+def test_velocities_in_a_loop_are_stopped_however_quick_it_is(bench: Make, period: int) -> None:
+    """Each call replaces the monitor of the one before, which would have looked later."""
+    at = bench(limits=Limits(clearance=5.0))
+    at.kernel.every(S // 5, lambda: say_distance(at))
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        at.craft.velocity, at.craft.north = (4.0, 0.0, 0.0), 40.0
+        for _ in range(400):
+            drone.set_velocity(north=4.0)
+            sleep(at.kernel, period)
+            at.craft.north += 4.0 * period / S
+
+    with pytest.raises(ObstacleNear):
+        at.fly(mission)
+    assert 48.0 < at.craft.north < 52.0
 
 
 def say_distance(at: Any) -> None:
