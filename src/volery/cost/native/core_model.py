@@ -155,7 +155,7 @@ SLOT_CYCLES = 4096
 PLACES = 8192
 CHUNK = 4
 BLOCKED = 15.0
-"""Cycles that a load of parts of several stores takes more than a forwarded one, on an Intel Xeon with AMX."""
+"""Cycles that a load of parts of several stores takes more than one forwarded, on an Intel Xeon with AMX."""
 
 # columns of the instruction table
 SIZE, LOAD, LOADS, OPERATION, TIMES, STORE, PLACE, KIND, DISPLACEMENT = range(9)
