@@ -30,8 +30,10 @@ MARGIN = 1.2
 ASSUMED_ENDURANCE_S = 360.0
 """Hover on a full battery that is assumed until the consumption is measured; few multirotors fly less."""
 MEASURED_OVER: Ns = MINUTE
-MEASURED_FROM: Ns = 20 * S
-"""Longest and shortest time over which the consumption is measured."""
+MEASURED_FROM: Ns = 40 * S
+"""Longest and shortest time over which the consumption is measured. PX4's simulated battery loses half of its
+charge in the first 30 s, and then nothing.
+"""
 DROP = 0.03
 """A loss between two reports by more than this is a failing battery, and not consumption."""
 

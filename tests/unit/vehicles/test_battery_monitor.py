@@ -174,3 +174,20 @@ def test_a_drone_that_is_left_hovering_lands_with_its_reserve(autopilot: str) ->
         landed = [event for event in stage.events if getattr(event, "operation", "") == "land"]
         assert [event.outcome for event in landed] == ["ok"]
     stage.close()
+
+
+def test_the_simulated_battery_of_px4_does_not_end_a_flight() -> None:
+    """In its first 30 s it loses half of its charge, and then nothing."""
+    drone = Reported(1.0, height=20.0)
+    for second in range(120):
+        drone.report(max(0.5, 1.0 - second / 60.0))
+        assert drone.check(second) is None, second
+
+
+def test_a_battery_that_lasts_for_two_minutes_does() -> None:
+    drone = Reported(1.0, height=20.0)
+    found = []
+    for second in range(110):
+        drone.report(1.0 - second / 120.0)
+        found.append(drone.check(second))
+    assert isinstance(next(error for error in found if error is not None), CriticalBattery)
