@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 Ns = int
 """A point in time since the start of a run, or a duration, in nanoseconds."""
 
-US: Ns = 1_000
-MS: Ns = 1_000_000
-S: Ns = 1_000_000_000
-MINUTE: Ns = 60 * S
-HOUR: Ns = 60 * MINUTE
+US: Final[Ns] = 1_000
+MS: Final[Ns] = 1_000_000
+S: Final[Ns] = 1_000_000_000
+MINUTE: Final[Ns] = 60 * S
+HOUR: Final[Ns] = 60 * MINUTE
 
 
 def from_seconds(seconds: float) -> Ns:

@@ -14,7 +14,6 @@ import threading
 from collections import deque
 from contextlib import contextmanager, suppress
 from functools import partial
-from heapq import heappop, heappush, heapreplace
 from itertools import count
 from queue import Empty, SimpleQueue
 from time import monotonic_ns
@@ -25,6 +24,7 @@ from greenlet import GreenletExit, getcurrent, greenlet
 from volery.base.errors import Deadlock, UsageError
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import PeriodicAction
+from volery.kernel.event_heap import EventHeap, heappop, heappush, heapreplace
 from volery.kernel.interrupts import LONGEST_WAIT_S, Interrupts, Watchdog
 from volery.kernel.task import Cancelled, ExecutionContext, Scope, Task
 from volery.trace.events import Record, ignore
@@ -121,7 +121,9 @@ class VirtualKernel:
         self._now: Ns = 0
         self._until: Ns = 0
         self._horizon: Ns = NEVER  # until then tasks may switch without the hub
-        self._heap: list[tuple[Ns, int, Task | Entry]] = [(FOREVER + 1, VOID, Entry(_end_of_time, VOID))]
+        self._heap: EventHeap[tuple[Ns, int, Task | Entry]] = EventHeap(
+            [(FOREVER + 1, VOID, Entry(_end_of_time, VOID))]
+        )
         self._tickets = count(1)
         self._current: Task | None = None
         self._adopted: Task | None = None
