@@ -44,14 +44,14 @@ from volery.simulation.world.state_layout import (
     P_MAX_TURN_RATE,
     P_RESISTANCE,
     P_ROLLING,
-    P_ROTOR_LAG,
+    P_ROTOR_DECAY,
     P_ROTOR_SPIN,
     P_ROTOR_X,
     P_ROTOR_Y,
     P_SKID_STEERED,
-    P_SPEED_LAG,
+    P_SPEED_DECAY,
     P_SPIN_DAMPING,
-    P_STEERING_LAG,
+    P_STEERING_DECAY,
     P_STIFFNESS,
     P_THRUST,
     P_TORQUE,
@@ -288,6 +288,11 @@ class Rover:
 BodySpec = Multirotor | Rover
 
 
+def _decay_in_half_a_step(lag: float) -> float:
+    """Return the factor on a distance from its target over half a step, of a quantity with a lag [s]."""
+    return exponential(-0.5 * STEP_S / lag)
+
+
 def _fill_multirotor(row: Array, spec: Multirotor) -> None:
     weight = spec.mass * STANDARD_GRAVITY
     row[P_KIND] = MULTIROTOR
@@ -303,7 +308,7 @@ def _fill_multirotor(row: Array, spec: Multirotor) -> None:
         row[P_ROTOR_SPIN + index] = rotor.spin
     row[P_THRUST] = spec.thrust_coefficient
     row[P_TORQUE] = spec.torque_coefficient
-    row[P_ROTOR_LAG] = spec.rotor_lag
+    row[P_ROTOR_DECAY] = _decay_in_half_a_step(spec.rotor_lag)
     row[P_MAX_ROTOR_SPEED] = spec.top_speed
     row[P_EFFICIENCY] = spec.efficiency
 
@@ -312,9 +317,9 @@ def _fill_rover(row: Array, spec: Rover) -> None:
     row[P_KIND] = ROVER
     row[P_WHEELBASE] = spec.wheelbase
     row[P_MAX_STEERING] = radians(spec.steer_top_deg)
-    row[P_STEERING_LAG] = spec.steer_lag
+    row[P_STEERING_DECAY] = _decay_in_half_a_step(spec.steer_lag)
     row[P_MAX_SPEED] = spec.speed_top
-    row[P_SPEED_LAG] = spec.speed_lag
+    row[P_SPEED_DECAY] = _decay_in_half_a_step(spec.speed_lag)
     row[P_ROLLING] = spec.rolling
     row[P_DRIVE_EFFICIENCY] = spec.efficiency
     row[P_SKID_STEERED] = float(spec.skid)

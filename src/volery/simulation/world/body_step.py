@@ -19,14 +19,17 @@ from volery.simulation.world.dynamics import (
     rotation_matrix,
     rover_slope,
     total_thrust,
+    turn_rotors,
+    turn_wheels,
     volts_amps,
 )
 from volery.simulation.world.environment_models import GUST_EVERY, advance_gust, ground_height
 from volery.simulation.world.sensors import sample_sensors
 from volery.simulation.world.state_layout import (
     ACTIVE_STEPS,
+    ADVANCED,
     BODIES_ARGUMENTS,
-    INTEGRATED,
+    MOTION,
     MULTIROTOR,
     P_FEET,
     P_GRAVITY,
@@ -35,9 +38,11 @@ from volery.simulation.world.state_layout import (
     P_MASS,
     S_AMPS,
     S_ATTITUDE,
+    S_CHARGE,
     S_CONTACT_SPEED,
     S_CONTACTS,
     S_DISTANCE,
+    S_ENERGY,
     S_GROUND,
     S_GUST,
     S_ON_GROUND,
@@ -59,7 +64,6 @@ from volery.simulation.world.state_layout import (
     W_LAST_VELOCITY,
     W_ROTATION,
     W_SLOPE,
-    W_SLOPE_SUM,
     W_STATE,
     W_THROTTLE,
     Array,
@@ -79,34 +83,42 @@ _STANDING_ROTOR = 1e-6  # [rad/s] below which a rotor stands: it would slow down
 
 
 @numeric
-def _slope(row: Array, flying: bool, resting: bool) -> None:
+def _slope(row: Array, flying: bool) -> None:
     if flying:
-        multirotor_slope(row, resting)
+        multirotor_slope(row)
     else:
-        rover_slope(row, resting)
+        rover_slope(row)
 
 
 @numeric
-def _integrate(row: Array, flying: bool) -> None:
-    """Advance the integrated columns by the classical fourth-order Runge-Kutta step (Kutta 1901)."""
-    resting = row[S_RESTING] > 0.5
-    for i in range(INTEGRATED):
+def _drive(row: Array, flying: bool, at: int, to: int) -> None:
+    if flying:
+        turn_rotors(row, at, to)
+    else:
+        turn_wheels(row, at, to)
+
+
+@numeric
+def _advance(row: Array, flying: bool) -> None:
+    """Advance the motion by a step of the midpoint method (Runge 1895), rotors and wheels by their exact law.
+
+    A body at rest keeps its position; its rotors may turn.
+    """
+    if row[S_RESTING] > 0.5:
+        if flying:
+            turn_rotors(row, 0, W_STATE)
+            turn_rotors(row, W_STATE, 0)
+        return
+    for i in range(ADVANCED):
         row[W_STATE + i] = row[i]
-    _slope(row, flying, resting)
-    for i in range(INTEGRATED):
-        row[W_SLOPE_SUM + i] = row[W_SLOPE + i]
+    _slope(row, flying)
+    for i in range(MOTION):
         row[W_STATE + i] = row[i] + 0.5 * STEP_S * row[W_SLOPE + i]
-    _slope(row, flying, resting)
-    for i in range(INTEGRATED):
-        row[W_SLOPE_SUM + i] += 2.0 * row[W_SLOPE + i]
-        row[W_STATE + i] = row[i] + 0.5 * STEP_S * row[W_SLOPE + i]
-    _slope(row, flying, resting)
-    for i in range(INTEGRATED):
-        row[W_SLOPE_SUM + i] += 2.0 * row[W_SLOPE + i]
-        row[W_STATE + i] = row[i] + STEP_S * row[W_SLOPE + i]
-    _slope(row, flying, resting)
-    for i in range(INTEGRATED):
-        row[i] += STEP_S / 6.0 * (row[W_SLOPE_SUM + i] + row[W_SLOPE + i])
+    _drive(row, flying, 0, W_STATE)
+    _slope(row, flying)
+    for i in range(MOTION):
+        row[i] += STEP_S * row[W_SLOPE + i]
+    _drive(row, flying, W_STATE, 0)
 
 
 @numeric
@@ -186,18 +198,30 @@ def _measure_motion(row: Array) -> None:
 
 
 @numeric
-def _power(row: Array, flying: bool) -> None:
-    power = electrical_power(row, 0) if flying else _rover_power(row)
-    volts, amps = volts_amps(row, 0, power)
+def _load_battery(row: Array, flying: bool) -> None:
+    """Compute the voltage and the current at the terminals, which hold until the end of the next step."""
+    power = electrical_power(row) if flying else _rover_power(row)
+    volts, amps = volts_amps(row, power)
     row[S_VOLTS] = volts
     row[S_AMPS] = amps
+
+
+@numeric
+def _discharge(row: Array, flying: bool) -> None:
+    """Draw charge and energy of a step from the battery, by the method of Heun (1900)."""
+    amps, watts = row[S_AMPS], row[S_VOLTS] * row[S_AMPS]
+    row[S_CHARGE] += STEP_S * amps
+    _load_battery(row, flying)
+    row[S_CHARGE] += 0.5 * STEP_S * (row[S_AMPS] - amps)
+    row[S_ENERGY] += 0.5 * STEP_S * (watts + row[S_VOLTS] * row[S_AMPS])
     row[S_PAYLOAD_ENERGY] += row[U_PAYLOAD] * STEP_S
 
 
 @numeric
 def _rover_power(row: Array) -> float:
     """Return the power [W] that a rover draws from its battery."""
-    drive = drive_power(row, row[S_SPEED], row[W_SLOPE + S_SPEED])
+    acceleration = (row[S_SPEED] - row[W_STATE + S_SPEED]) / (0.5 * STEP_S)
+    drive = drive_power(row, row[S_SPEED], acceleration)
     power: float = drive + row[P_IDLE_POWER] + row[U_PAYLOAD]
     return power
 
@@ -217,7 +241,7 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
         row[W_LAST_VELOCITY + axis] = row[S_VELOCITY + axis]
         row[W_AIR_VELOCITY + axis] = row[U_WIND + axis] + row[S_GUST + axis]
     row[W_GROUND] = row[S_GROUND]
-    _integrate(row, flying)
+    _advance(row, flying)
     height_before = row[S_POSITION + 2]
     row[S_GROUND] = ground_height(bodies.heights, bodies.grid, row[S_POSITION], row[S_POSITION + 1])
     if flying:
@@ -229,7 +253,7 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
         _settle_rover(row, height_before)
         rotation_matrix(row, S_ATTITUDE, W_ROTATION)
     _measure_motion(row)
-    _power(row, flying)
+    _discharge(row, flying)
     k = bodies.reached[body] + 1
     bodies.reached[body] = k
     if k % GUST_EVERY == 0:
@@ -243,7 +267,7 @@ def start_body(bodies: Bodies, body: int, row: Array) -> None:
     rotation_matrix(row, S_ATTITUDE, W_ROTATION)
     for axis in range(3):
         row[S_SPECIFIC_FORCE + axis] = row[W_ROTATION + 6 + axis] * row[P_GRAVITY]
-    _power(row, row[P_KIND] == MULTIROTOR)
+    _load_battery(row, row[P_KIND] == MULTIROTOR)
     sample_sensors(row, bodies.keys[body], bodies.reached[body])
     row[S_STARTED] = 1.0
 
@@ -257,9 +281,9 @@ def goal_of(bodies: Bodies, body: int) -> int:
 
 @numeric
 def is_finite(row: Array) -> bool:
-    """Return whether the integrated state consists of finite numbers."""
+    """Return whether position, motion and rotor speeds are finite numbers."""
     total = 0.0
-    for i in range(INTEGRATED):
+    for i in range(ADVANCED):
         total += row[i] - row[i]
     return total == 0.0
 

@@ -8,6 +8,7 @@ Battery: Thevenin's circuit without its RC branch (Tremblay and Dessaint, World 
   IEEE Trans. Energy Conversion 21 (2006), eq. 2, from 5 % on; that cell was charged to 4.1 V, this to 4.2 V.
   Valid from 0 to 40 degrees C, at currents up to about 20 C. Voltage recovers at once after a load; ageing
   and self-discharge are not modelled.
+* Voltage and current are those of the power at the end of a step, and hold over the next one.
 * Beyond the battery's largest power (OCV^2 / 4R) the current stays at OCV / 2R: the battery browns out.
 
 Multirotor: a rigid body under four rotors, drag, gravity and the ground.
@@ -41,7 +42,6 @@ from math import sqrt
 from volery.base.numeric_code import numeric
 from volery.simulation.world.arithmetic import sine_cosine
 from volery.simulation.world.state_layout import (
-    INTEGRATED,
     P_CAPACITY,
     P_CELLS,
     P_DAMPING,
@@ -63,25 +63,26 @@ from volery.simulation.world.state_layout import (
     P_MAX_TURN_RATE,
     P_RESISTANCE,
     P_ROLLING,
-    P_ROTOR_LAG,
+    P_ROTOR_DECAY,
     P_ROTOR_SPIN,
     P_ROTOR_X,
     P_ROTOR_Y,
     P_SKID_STEERED,
-    P_SPEED_LAG,
+    P_SPEED_DECAY,
     P_SPIN_DAMPING,
-    P_STEERING_LAG,
+    P_STEERING_DECAY,
     P_STIFFNESS,
     P_THRUST,
     P_TORQUE,
     P_WHEELBASE,
     S_ATTITUDE,
     S_CHARGE,
-    S_ENERGY,
     S_POSITION,
     S_RATES,
     S_ROTORS,
     S_VELOCITY,
+    S_VOLTS,
+    STEP_S,
     U_MOTOR_HEALTH,
     U_PAYLOAD,
     W_AIR_VELOCITY,
@@ -142,11 +143,11 @@ _SLIP = 0.05  # [m/s] below which friction grows linearly with speed
 
 
 @numeric
-def electrical_power(row: Array, at: int) -> float:
-    """Return the power [W] that rotors, autopilot and payload draw, in the state from column *at*."""
+def electrical_power(row: Array) -> float:
+    """Return the power [W] that rotors, autopilot and payload draw."""
     cubes = 0.0
     for i in range(4):
-        speed = row[at + S_ROTORS + i]
+        speed = row[S_ROTORS + i]
         cubes += speed * speed * speed
     shaft = row[P_TORQUE] * cubes
     power: float = shaft / row[P_EFFICIENCY] + row[P_IDLE_POWER] + row[U_PAYLOAD]
@@ -154,9 +155,9 @@ def electrical_power(row: Array, at: int) -> float:
 
 
 @numeric
-def volts_amps(row: Array, at: int, power: float) -> tuple[float, float]:
-    """Return voltage [V] and current [A] at the terminals at a power [W], in the state from column *at*."""
-    left = 1.0 - row[at + S_CHARGE] / row[P_CAPACITY]
+def volts_amps(row: Array, power: float) -> tuple[float, float]:
+    """Return voltage [V] and current [A] at the terminals at a power [W]."""
+    left = 1.0 - row[S_CHARGE] / row[P_CAPACITY]
     open_volts = cell_voltage(left) * row[P_CELLS]
     amps = battery_current(open_volts, row[P_RESISTANCE], power)
     return open_volts - row[P_RESISTANCE] * amps, amps
@@ -243,17 +244,15 @@ def _add_ground_contact(row: Array) -> None:
 
 
 @numeric
-def _rotor_and_battery_slope(row: Array) -> None:
-    """Compute the slopes of rotor speeds, charge and energy: these change also at rest."""
-    power = electrical_power(row, W_STATE)
-    volts, amps = volts_amps(row, W_STATE, power)
-    top = row[P_MAX_ROTOR_SPEED] * volts / row[P_FULL_VOLTS]
+def turn_rotors(row: Array, at: int, to: int) -> None:
+    """Advance the rotor speeds by half a step, from the state in column *at* to that in column *to*.
+
+    Exact, because motor commands and voltage hold over a step.
+    """
+    top = row[P_MAX_ROTOR_SPEED] * row[S_VOLTS] / row[P_FULL_VOLTS]
     for i in range(4):
-        row[W_SLOPE + S_ROTORS + i] = (row[W_THROTTLE + i] * top - row[W_STATE + S_ROTORS + i]) / row[
-            P_ROTOR_LAG
-        ]
-    row[W_SLOPE + S_CHARGE] = amps
-    row[W_SLOPE + S_ENERGY] = volts * amps
+        target = row[W_THROTTLE + i] * top
+        row[to + S_ROTORS + i] = target + row[P_ROTOR_DECAY] * (row[at + S_ROTORS + i] - target)
 
 
 @numeric
@@ -301,18 +300,8 @@ def _attitude_slope(row: Array) -> None:
 
 
 @numeric
-def multirotor_slope(row: Array, resting: bool) -> None:
-    """Compute the slope of a multirotor's state.
-
-    Args:
-        row: State row; the state is read from W_STATE and the slope is written to W_SLOPE.
-        resting: The body stands on the ground and keeps its position; its rotors may turn.
-    """
-    _rotor_and_battery_slope(row)
-    if resting:
-        for i in range(S_ROTORS):
-            row[W_SLOPE + i] = 0.0
-        return
+def multirotor_slope(row: Array) -> None:
+    """Compute the slope of a multirotor's motion in ``W_SLOPE``, at the state in ``W_STATE``."""
     rotation_matrix(row, W_STATE + S_ATTITUDE, W_ROTATION)
     _add_rotor_and_air_loads(row)
     reach = row[P_FEET] + row[P_FEET + 1] + row[P_FEET + 2]
@@ -384,29 +373,30 @@ def turn_rate(row: Array, speed: float, steer: float) -> float:
 
 
 @numeric
-def rover_slope(row: Array, resting: bool) -> None:
-    """Compute the slope of a rover's state; the commands are steering (left positive) and throttle."""
-    for i in range(INTEGRATED):
-        row[W_SLOPE + i] = 0.0
+def turn_wheels(row: Array, at: int, to: int) -> None:
+    """Advance steering and speed by half a step, from the state in column *at* to that in column *to*.
+
+    The commands are steering (left positive) and throttle. Exact, because they hold over a step.
+    """
+    top = row[P_MAX_TURN_RATE] if row[P_SKID_STEERED] > 0.5 else row[P_MAX_STEERING]
+    steer = row[W_THROTTLE] * top
+    row[to + S_STEER] = steer + row[P_STEERING_DECAY] * (row[at + S_STEER] - steer)
+    speed = row[at + S_SPEED]
+    gain = (1.0 - row[P_SPEED_DECAY]) * (row[W_THROTTLE + 1] * row[P_MAX_SPEED] - speed)
+    most = 0.5 * STEP_S * row[P_GRIP]
+    row[to + S_SPEED] = speed + min(max(gain, -most), most)
+
+
+@numeric
+def rover_slope(row: Array) -> None:
+    """Compute the slope of a rover's motion in ``W_SLOPE``, at the state in ``W_STATE``."""
     speed = row[W_STATE + S_SPEED]
-    skid = row[P_SKID_STEERED] > 0.5
-    top = row[P_MAX_TURN_RATE] if skid else row[P_MAX_STEERING]
-    power = row[P_IDLE_POWER] + row[U_PAYLOAD]
-    if not resting:
-        row[W_SLOPE + S_STEER] = (row[W_THROTTLE] * top - row[W_STATE + S_STEER]) / row[P_STEERING_LAG]
-        target = row[W_THROTTLE + 1] * row[P_MAX_SPEED]
-        push = (target - speed) / row[P_SPEED_LAG]
-        row[W_SLOPE + S_SPEED] = min(max(push, -row[P_GRIP]), row[P_GRIP])
-        rate = turn_rate(row, speed, row[W_STATE + S_STEER])
-        w, z = row[W_STATE + S_ATTITUDE], row[W_STATE + S_ATTITUDE + 3]
-        row[W_SLOPE + S_ATTITUDE] = -0.5 * z * rate
-        row[W_SLOPE + S_ATTITUDE + 3] = 0.5 * w * rate
-        row[W_SLOPE + S_POSITION] = speed * (w * w - z * z)
-        row[W_SLOPE + S_POSITION + 1] = speed * 2.0 * w * z
-        power += drive_power(row, speed, row[W_SLOPE + S_SPEED])
-    volts, amps = volts_amps(row, W_STATE, power)
-    row[W_SLOPE + S_CHARGE] = amps
-    row[W_SLOPE + S_ENERGY] = volts * amps
+    rate = turn_rate(row, speed, row[W_STATE + S_STEER])
+    w, z = row[W_STATE + S_ATTITUDE], row[W_STATE + S_ATTITUDE + 3]
+    row[W_SLOPE + S_ATTITUDE] = -0.5 * z * rate
+    row[W_SLOPE + S_ATTITUDE + 3] = 0.5 * w * rate
+    row[W_SLOPE + S_POSITION] = speed * (w * w - z * z)
+    row[W_SLOPE + S_POSITION + 1] = speed * 2.0 * w * z
 
 
 @numeric

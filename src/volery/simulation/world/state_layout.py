@@ -70,20 +70,22 @@ MOTORS = "motor 0 to motor 3"
 WORLD_LAYOUT = Layout()
 _add = WORLD_LAYOUT.add
 
-# --- state that RK4 integrates ---
+# --- state that a step advances ---
 S_POSITION = _add("S_POSITION", "m", "about the world's origin", 3, ENU)
 S_VELOCITY = _add("S_VELOCITY", "m/s", "over the ground", 3, ENU)
 S_ATTITUDE = _add("S_ATTITUDE", "1", f"quaternion from body ({FLU}) to world ({ENU})", 4, "w, x, y, z")
 S_RATES = _add("S_RATES", "rad/s", "body rates", 3, FLU)
+MOTION = WORLD_LAYOUT.end
+"""Number of columns that are integrated by their slopes; they are the first of a row."""
 S_ROTORS = _add(
     "S_ROTORS", "rad/s", "rotor speeds; rover: steering angle [rad], wheel speed [m/s], 0, 0", 4, MOTORS
 )
-S_CHARGE = _add("S_CHARGE", "A s", "charge drawn from the battery")
-S_ENERGY = _add("S_ENERGY", "J", "energy drawn at the battery's terminals")
-INTEGRATED = WORLD_LAYOUT.end
-"""Number of columns that the integrator advances; they are the first of a row."""
+ADVANCED = WORLD_LAYOUT.end
+"""Number of columns that describe motion and rotors; they are the first of a row."""
 
 # --- state derived at the end of a step ---
+S_CHARGE = _add("S_CHARGE", "A s", "charge drawn from the battery")
+S_ENERGY = _add("S_ENERGY", "J", "energy drawn at the battery's terminals")
 S_VOLTS = _add("S_VOLTS", "V", "at the battery's terminals")
 S_AMPS = _add("S_AMPS", "A", "drawn from the battery")
 S_ON_GROUND = _add("S_ON_GROUND", "1", "1 while a foot or a wheel touches the ground")
@@ -185,7 +187,7 @@ P_ROTOR_SPIN = _add(
 )
 P_THRUST = _add("P_THRUST", "N s^2", "k_T in thrust = k_T w^2")
 P_TORQUE = _add("P_TORQUE", "N m s^2", "k_Q in torque = k_Q w^2")
-P_ROTOR_LAG = _add("P_ROTOR_LAG", "s", "time constant of rotor speed")
+P_ROTOR_DECAY = _add("P_ROTOR_DECAY", "1", "factor on a rotor's distance from its target over half a step")
 P_MAX_ROTOR_SPEED = _add("P_MAX_ROTOR_SPEED", "rad/s", "at full throttle and full battery")
 P_EFFICIENCY = _add("P_EFFICIENCY", "1", "efficiency of motor and speed controller")
 P_FULL_VOLTS = _add("P_FULL_VOLTS", "V", "open-circuit voltage of the full battery")
@@ -193,9 +195,9 @@ P_FULL_VOLTS = _add("P_FULL_VOLTS", "V", "open-circuit voltage of the full batte
 # --- parameters of rovers ---
 P_WHEELBASE = _add("P_WHEELBASE", "m", "distance between the axles")
 P_MAX_STEERING = _add("P_MAX_STEERING", "rad", "largest steering angle")
-P_STEERING_LAG = _add("P_STEERING_LAG", "s", "time constant of steering")
+P_STEERING_DECAY = _add("P_STEERING_DECAY", "1", "the same factor of the steering angle")
 P_MAX_SPEED = _add("P_MAX_SPEED", "m/s", "at full throttle")
-P_SPEED_LAG = _add("P_SPEED_LAG", "s", "time constant of speed")
+P_SPEED_DECAY = _add("P_SPEED_DECAY", "1", "the same factor of the speed")
 P_ROLLING = _add("P_ROLLING", "1", "rolling resistance coefficient")
 P_DRIVE_EFFICIENCY = _add("P_DRIVE_EFFICIENCY", "1", "efficiency of the drive")
 P_SKID_STEERED = _add("P_SKID_STEERED", "1", "1: turns on the spot; steering commands a turn rate")
@@ -203,9 +205,8 @@ P_MAX_TURN_RATE = _add("P_MAX_TURN_RATE", "rad/s", "skid-steered: turn rate at f
 P_GRIP = _add("P_GRIP", "m/s^2", "largest acceleration that the tyres give")
 
 # --- scratch: not kept from one step to the next ---
-W_STATE = _add("W_STATE", "mixed", "state at which a slope is taken", INTEGRATED, "as the integrated state")
-W_SLOPE = _add("W_SLOPE", "mixed", "rate of change of the state", INTEGRATED, "as the integrated state")
-W_SLOPE_SUM = _add("W_SLOPE_SUM", "mixed", "sum of RK4's slopes", INTEGRATED, "as the integrated state")
+W_STATE = _add("W_STATE", "mixed", "state at which a slope is taken", ADVANCED, "as the first columns")
+W_SLOPE = _add("W_SLOPE", "mixed", "rate of change of the motion", MOTION, "as the first columns")
 W_ROTATION = _add("W_ROTATION", "1", f"matrix from body ({FLU}) to world ({ENU})", 9, "3 x 3 by rows")
 W_FORCE = _add("W_FORCE", "N", "force without gravity", 3, ENU)
 W_TORQUE = _add("W_TORQUE", "N m", "torque", 3, FLU)

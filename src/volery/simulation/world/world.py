@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -52,7 +52,7 @@ from volery.simulation.world.state_layout import (
     Bodies,
 )
 
-STEP: Ns = 2 * MS
+STEP: Final[Ns] = 2 * MS
 """Grid step: 500 Hz."""
 
 

@@ -64,9 +64,13 @@ def test_charge_removed_is_that_of_rotors_and_computer(clock, frame):
         if now is None:  # the first interval still has the inputs of the start
             charge, energy, now = truth.charge_as, truth.energy_j, 0.0
         amps, watts = [], []
-        for state, drawn in ((before, charge), (truth, charge + truth.amps * STEP / S)):
+        start = computer if step > 1 else 0.0  # the current at a step's start is that of the inputs before it
+        for state, drawn, extra in (
+            (before, charge, start),
+            (truth, charge + truth.amps * STEP / S, computer),
+        ):
             shaft = spec.torque_coefficient * sum(speed**3 for speed in state.rotors)
-            power = shaft / spec.efficiency + spec.idle_power + computer
+            power = shaft / spec.efficiency + spec.idle_power + extra
             volts = own_ocv(1.0 - drawn / (0.5 * 3600.0)) * spec.battery.cells
             root = math.sqrt(volts**2 - 4.0 * spec.battery.resistance_ohm * power)
             amps.append((volts - root) / (2.0 * spec.battery.resistance_ohm))
