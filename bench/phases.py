@@ -29,8 +29,9 @@ from volery.trace.reader import Reading
 sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
 from mission import HOME, mission
 
-SENSORS = {"px4": "sih"}
-"""Sensors of the simulator that was recorded, where its noise is larger than that of the default ones."""
+SENSORS = {"px4": "sih", "paparazzi": "rtk"}
+"""The sensors nearest to those of the simulator that was recorded: SIH's noise is larger than that of the
+default ones, the receiver of NPS has none."""
 
 FLIGHTS = {"px4": (1, 2, 3)}
 """Seeds of the flights whose mean is compared; else one flight with seed 1."""

@@ -12,11 +12,10 @@ BENCH = Path(__file__).parents[2] / "bench" / "phases.py"
 NOT_REACHED = {
     "ardupilot": set[str](),
     "px4": {"goal 3 within 1 m to LAND", "overshoot"},
-    "paparazzi": {"leg 1"},
+    "paparazzi": set[str](),
 }
 """PX4's estimate is slower than the aircraft while it brakes, the simulated one is not:
-docs/four-autopilots.md. At goal 1 the real Paparazzi is 4 cm higher than the simulated one, and so within
-0.3 m later: docs/real-firmware.md.
+docs/four-autopilots.md.
 """
 
 

@@ -109,7 +109,7 @@ AUTOPILOT = "environment.vehicles.{}.autopilot={}"
 def test_the_same_parcel_with_another_autopilot(autopilot):
     overrides = [AUTOPILOT.format("drone_1", autopilot)]
     if autopilot == "paparazzi":  # overshoots its velocity, as recorded
-        overrides.append("components.PrecisionLanding.parameters.gain=0.3")
+        overrides.append("components.PrecisionLanding.parameters.gain=0.2")
     run = pocket(overrides=overrides)
     assert run.error is None
     assert states(run) == {"parcel-1": THE_WAY}

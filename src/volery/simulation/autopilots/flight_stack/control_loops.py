@@ -21,9 +21,12 @@ from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_ACCEL,
     C_CONTROL,
+    C_MOTOR,
     C_POSITION,
     C_SPEED,
     C_STEERING,
+    C_STICK,
+    C_STICK_SHARE,
     C_THROTTLE,
     C_VELOCITY,
     C_YAW,
@@ -59,6 +62,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_VELOCITY,
     K_YAW_MISS,
     K_YAW_SPEED,
+    MOTOR,
     OFF,
     STEER,
 )
@@ -213,7 +217,7 @@ def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
 @numeric
 def run_attitude_loops(row: Array, control: int) -> None:
     """Run one grid step of the inner loops, from target attitude and collective to four motor commands."""
-    if control in (OFF, IDLE):
+    if control in (OFF, IDLE, MOTOR):
         idle = _SPIN_ARM if control == IDLE else 0.0
         for i in range(4):
             row[K_MOTORS + i] = min(idle, row[K_MOTORS + i] + STEP_S / _SPOOL_TIME)
@@ -224,6 +228,8 @@ def run_attitude_loops(row: Array, control: int) -> None:
         row[K_YAW_MISS] = 0.0
         row[K_SPOOL] = 0.0
         row[K_AT_LOWER_LIMIT] = 1.0
+        if control == MOTOR:
+            row[K_MOTORS + int(row[C_MOTOR])] = row[C_THROTTLE]
         return
     row[K_SPOOL] = min(1.0, row[K_SPOOL] + STEP_S / _SPOOL_TIME)
     roll_rate, pitch_rate, yaw_rate = _rate_targets(row)
@@ -325,5 +331,8 @@ def guide_rover(row: Array) -> None:
         row[K_TARGET_VELOCITY] = ramp(row[K_TARGET_VELOCITY], speed, row[C_ACCEL] * GUIDE_S)
         target = row[K_TARGET_VELOCITY]
         row[K_MOTORS] = _steer_for(row, rate, target)
+        if row[C_STICK_SHARE] > 0.0:
+            mixed = row[K_MOTORS] * (1.0 - row[C_STICK_SHARE]) + row[C_STICK]
+            row[K_MOTORS] = clip(mixed, -1.0, 1.0)
         row[K_MOTORS + 1] = _throttle_for(row, target)
     row[K_THROTTLE] = row[K_MOTORS + 1]

@@ -245,7 +245,8 @@ def _switch_aiding(row: Array) -> None:
         row[K_GPS_AGE] = 0.0
         for axis in range(3):
             row[K_POSITION + axis] = row[M_GPS + axis]
-            row[K_ORIGIN + axis] = row[M_GPS + axis]
+            if row[C_AIDED] < 1.5:
+                row[K_ORIGIN + axis] = row[M_GPS + axis]
         for axis in range(2):
             row[K_VELOCITY + axis] = row[M_GPS_VELOCITY + axis]
             row[K_ACCEL_BIAS + axis] = 0.0
@@ -365,7 +366,7 @@ def _copy_truth(row: Array) -> None:
     row[K_ATTITUDE + 3] = _HALF_ROOT * (w - z)
     row[K_ALIGNED] = 1.0
     row[K_GPS_AGE] = 0.0
-    if row[C_AIDED] > 0.5 and row[K_AIDED] < 0.5:
+    if 0.5 < row[C_AIDED] < 1.5 and row[K_AIDED] < 0.5:
         for axis in range(3):
             row[K_ORIGIN + axis] = row[K_POSITION + axis]
     row[K_AIDED] = row[C_AIDED]

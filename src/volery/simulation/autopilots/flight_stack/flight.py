@@ -1,7 +1,4 @@
-"""Handle on one vehicle of the world, and the compiled step of its flight stack.
-
-One grid step of a vehicle is: guidance (every fifth step) and attitude loops on the estimate of step k, then
-the body's motion from k to k + 1 with the samples due there, then the estimate of k + 1.
+"""Handle on one vehicle of the world: its estimate and its set-points.
 
 Positions are metres north, east, down about the estimator's origin, along the axes of the world's frame;
 angles are radians. ``Flight.to_ned`` and ``Flight.from_ned`` convert from and to degrees and metres AMSL.
@@ -12,34 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
-from volery.base.numeric_code import NumericCode, numeric
 from volery.base.time import Ns
-from volery.simulation.autopilots.flight_stack.control_loops import (
-    detect_landing,
-    guide_rover,
-    run_attitude_loops,
-)
-from volery.simulation.autopilots.flight_stack.estimator import (
-    estimate_angles,
-    initialise_estimate,
-    update_estimate,
-)
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_AIDED,
     C_CONTROL,
+    C_STICK,
     C_YAW_P,
     FLIGHT,
     HOLD_HEADING,
-    K_HOVER_THROTTLE,
-    K_LANDED,
-    K_MOTORS,
     K_POSITION,
     VISIBLE,
     YAW_ANGLE,
@@ -50,26 +30,16 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     Estimate,
     GpsFix,
 )
-from volery.simulation.autopilots.flight_stack.guidance import GUIDE_EVERY, guide_multirotor
+from volery.simulation.autopilots.flight_stack.flight_step import advance_flights
 from volery.simulation.world.body_specs import BodySpec, Multirotor
-from volery.simulation.world.body_step import (
-    goal_of,
-    is_finite,
-    start_body,
-    step_body,
-    world_sources,
-)
+from volery.simulation.world.dynamics import cell_voltage
 from volery.simulation.world.environment_models import Terrain, Wind
 from volery.simulation.world.sensors import Measurement, Sigma, declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
-    BODIES_ARGUMENTS,
     M_GYRO,
-    MULTIROTOR,
     P_CELLS,
-    P_KIND,
     S_AMPS,
     S_CHARGE,
-    S_STARTED,
     SAMPLES_END,
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
@@ -77,18 +47,12 @@ from volery.simulation.world.state_layout import (
     U_MAG_BLOCKED,
     U_MOTOR_HEALTH,
     U_WIND,
-    W_THROTTLE,
-    Array,
-    Bodies,
 )
 from volery.simulation.world.world import STEP, Truth, World
 
 __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
 _FAR = 1e6  # [m] beyond which a point is placed on an unrolled map
-_FIRST_HOVER = 0.35  # MOT_THST_HOVER's default
-
-
 TURNINGS = {
     (False, False): HOLD_HEADING,
     (True, False): YAW_ANGLE,
@@ -98,65 +62,7 @@ TURNINGS = {
 """How the heading is commanded, by whether there are a yaw and a yaw rate."""
 
 
-@numeric
-def _boot(row: Array) -> None:
-    """Initialise the flight stack of one vehicle before its first step."""
-    row[K_HOVER_THROTTLE] = _FIRST_HOVER
-    row[K_LANDED] = 1.0
-    initialise_estimate(row)
-
-
-@numeric
-def _control(row: Array, k: int) -> None:
-    """Compute the motor commands of step *k* from the estimate at that step."""
-    due = k % GUIDE_EVERY == 0
-    if row[P_KIND] != MULTIROTOR:
-        if due:
-            guide_rover(row)
-        row[W_THROTTLE] = -row[K_MOTORS]
-        row[W_THROTTLE + 1] = row[K_MOTORS + 1]
-        return
-    control = int(row[C_CONTROL])
-    if due:
-        guide_multirotor(row)
-        detect_landing(row, control)
-    run_attitude_loops(row, control)
-    for i in range(4):
-        row[W_THROTTLE + i] = row[K_MOTORS + i]
-
-
-def _compose(digest: str) -> Callable[..., int]:
-    def advance_flights(  # noqa: PLR0917  # the arrays of Bodies
-        rows: Array, keys: NDArray[np.uint64], reached: NDArray[np.int64], heights: Array, grid: Array,
-        read: NDArray[np.int64], span: NDArray[np.int64],
-    ) -> int:  # fmt: skip
-        bodies = Bodies(rows, keys, reached, heights, grid, read, span)
-        finite = True
-        for body in range(span[0], span[1]):
-            row = rows[body]
-            if row[S_STARTED] == 0.0:
-                start_body(bodies, body, row)
-                _boot(row)
-            goal = goal_of(bodies, body)
-            while reached[body] < goal:
-                _control(row, reached[body])
-                step_body(bodies, body, row)
-                k = reached[body]
-                update_estimate(row, k)
-                if k % GUIDE_EVERY == 0 or k == goal:  # for guidance, and for those who read
-                    estimate_angles(row)
-            finite = finite and is_finite(row)
-        return 1 if digest and finite else 0
-
-    return advance_flights
-
-
-_SOURCES = (*world_sources(), *Path(__file__).parent.glob("*.py"))
-advance_flights = NumericCode("advance_flights", _compose, _SOURCES, BODIES_ARGUMENTS)
-"""Advance the bodies of the span under the set-points in their rows."""
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Setpoint:
     """Set-point of the inner loops, in force until the next one.
 
@@ -181,6 +87,7 @@ class Setpoint:
         jerk: Limit of the target's jerk [m/s^3]; the default is ArduPilot's PSC_JERK_XY and PSC_JERK_Z.
         straight: POSITION: whether a point is approached along a straight line; else height and horizontal
             position have their own limits.
+        motor: MOTOR: number of the motor that turns alone, from 0; ``throttle`` is its command.
     """
 
     control: Control
@@ -201,6 +108,7 @@ class Setpoint:
     tilt: float = 0.5235987755982988
     jerk: float = 5.0
     straight: bool = False
+    motor: int = 0
 
     def row(self) -> tuple[float, ...]:
         """Return the values in the order of the command columns, from ``C_CONTROL`` on."""
@@ -225,6 +133,7 @@ class Setpoint:
             self.tilt,
             self.jerk,
             float(self.straight),
+            float(self.motor),
         )
 
 
@@ -292,6 +201,10 @@ class Flight:
         """Stop using satellites, as after a restart of the autopilot."""
         self._world.set_input(self._body, C_AIDED, 0.0)
 
+    def use_gps(self, used: bool) -> None:
+        """Stop using satellites, or use them again with the origin as it was; the receiver works on."""
+        self._world.set_input(self._body, C_AIDED, 2.0 if used else 0.0)
+
     def set_yaw_loop(self, gain: float, integral: float, corner: float) -> None:
         """Filter the error of the yaw rate, as ArduCopter does.
 
@@ -301,6 +214,15 @@ class Flight:
             corner: Corner frequency of the filter [rad/s].
         """
         self._world.set_input(self._body, C_YAW_P, gain, integral, corner)
+
+    def mix_steering(self, steering: float, share: float) -> None:
+        """Add a pilot's steering to that of a rover's controls.
+
+        Args:
+            steering: Steering of the pilot, -1..1, right positive.
+            share: Share by which the controls' own steering is reduced, 0..1; 0: nothing is mixed.
+        """
+        self._world.set_input(self._body, C_STICK, steering, share)
 
     def payload_power(self, watts: float) -> None:
         """Set the power of the on-board computers [W]."""
@@ -328,6 +250,10 @@ class Flight:
     def short_cells(self, cells: int) -> None:
         """Inject or clear a fault: *cells* of the battery give no voltage; at least one always does."""
         self._world.set_input(self._body, P_CELLS, float(max(1, self.spec.battery.cells - cells)))
+
+    def set_full_voltage(self, volts: float) -> None:
+        """Exchange the battery for one of the same charge whose open-circuit voltage, full, is *volts*."""
+        self._world.set_input(self._body, P_CELLS, max(0.0, volts) / cell_voltage(1.0))
 
     def block_barometer(self, blocked: bool = True) -> None:
         """Inject or clear a fault: the barometer gives no new samples."""

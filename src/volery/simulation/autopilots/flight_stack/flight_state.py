@@ -41,7 +41,7 @@ from volery.simulation.world.state_layout import (
 class Control(IntEnum):
     """Quantities that the inner loops control.
 
-    Multirotors take OFF to VELOCITY_HEIGHT; rovers take OFF, IDLE, POSITION, STEER and DRIVE.
+    Multirotors take OFF to VELOCITY_HEIGHT, and MOTOR; rovers take OFF, IDLE, POSITION, STEER and DRIVE.
     """
 
     OFF = 0  # motors stopped: disarmed
@@ -54,9 +54,11 @@ class Control(IntEnum):
     VELOCITY_HEIGHT = 7  # horizontal velocity, and a height
     STEER = 8  # rover: steering and throttle, passed through
     DRIVE = 9  # rover: speed, and heading or turn rate
+    MOTOR = 10  # multirotor on the ground: one motor, the others stopped
 
 
-OFF, IDLE, ATTITUDE, CLIMB, VELOCITY, POSITION, POSITION_CLIMB, VELOCITY_HEIGHT, STEER, DRIVE = range(10)
+OFF, IDLE, ATTITUDE, CLIMB, VELOCITY, POSITION, POSITION_CLIMB, VELOCITY_HEIGHT = range(8)
+STEER, DRIVE, MOTOR = range(8, 11)
 
 HOLD_HEADING, YAW_ANGLE, YAW_RATE, YAW_ANGLE_AND_RATE = range(4)
 """Values of ``C_YAW_MODE``."""
@@ -69,7 +71,7 @@ assert FLIGHT_LAYOUT.start == WORLD
 # --- scratch ---
 W_DCM = _add("W_DCM", "1", f"matrix from body ({FRD}) to {NED}", 9, "3 x 3 by rows")
 
-# --- commands: C_CONTROL to C_STRAIGHT in the order of ``Setpoint.row`` ---
+# --- commands: C_CONTROL to C_MOTOR in the order of ``Setpoint.row`` ---
 C_CONTROL = _add("C_CONTROL", "1", "a Control")
 C_POSITION = _add("C_POSITION", "m", "about the estimator's origin", 3, NED)
 C_VELOCITY = _add("C_VELOCITY", "m/s", "over the ground; rover DRIVE: the first is the forward speed", 3, NED)
@@ -89,10 +91,17 @@ C_ACCEL_Z = _add("C_ACCEL_Z", "m/s^2", "limit of vertical acceleration")
 C_TILT = _add("C_TILT", "rad", "limit of tilt")
 C_JERK = _add("C_JERK", "m/s^3", "limit of the shaped target's jerk")
 C_STRAIGHT = _add("C_STRAIGHT", "1", "1: height and horizontal position are approached along a straight line")
-C_AIDED = _add("C_AIDED", "1", "1: use satellites; the estimator's origin is the position when this became 1")
+C_MOTOR = _add("C_MOTOR", "1", "MOTOR: number of the motor, from 0")
+C_AIDED = _add(
+    "C_AIDED", "1", "1: use satellites; the origin is the position then; 2: with the origin as it is"
+)
 C_YAW_P = _add("C_YAW_P", "s", "gain of the yaw rate loop on a filtered error; 0: another loop, unfiltered")
 C_YAW_I = _add("C_YAW_I", "1", "integral gain of that loop")
 C_YAW_FILTER = _add("C_YAW_FILTER", "rad/s", "corner frequency of its error's filter")
+C_STICK = _add("C_STICK", "1", "rover: steering -1..1 that a pilot adds to that of the autopilot")
+C_STICK_SHARE = _add(
+    "C_STICK_SHARE", "1", "rover: share by which the autopilot's own steering is reduced then"
+)
 
 # --- memory that ``Estimate`` shows ---
 K_POSITION = _add("K_POSITION", "m", "estimated, about the world's origin", 3, NED)
@@ -156,7 +165,7 @@ FLIGHT = FLIGHT_LAYOUT.end - FLIGHT_LAYOUT.start
 """Number of columns that the flight stack adds to a row."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class GpsFix:
     """The receiver's last fix; without one, ``fix_type`` and ``satellites`` are 0 and the rest is outdated.
 
@@ -187,7 +196,7 @@ class GpsFix:
     count: int
 
 
-@dataclass(slots=True)
+@dataclass
 class Airframe:
     """Constants of a vehicle that are needed to read its estimate, and the estimator's last origin."""
 
@@ -202,6 +211,14 @@ class Airframe:
         if self._origin is None or self._origin[0] != ned:
             self._origin = ned, self.frame.from_ned(ned)
         return self._origin[1]
+
+
+def _dilution(fix_type: int) -> float:
+    return 1.21 if fix_type else inf
+
+
+def _satellites(fix_type: int) -> int:
+    return 10 if fix_type else 0
 
 
 def _fix_of(about: Airframe, sensed: Sequence[float]) -> GpsFix:
@@ -219,9 +236,9 @@ def _fix_of(about: Airframe, sensed: Sequence[float]) -> GpsFix:
         h_acc=sqrt(receiver.horizontal.variance) if kind else inf,
         v_acc=sqrt(receiver.vertical.variance) if kind else inf,
         speed_acc=sqrt(receiver.velocity.variance) if kind else inf,
-        eph=1.21 if kind else inf,
+        eph=_dilution(kind),
         epv=2.0 if kind else inf,
-        satellites=10 if kind else 0,
+        satellites=_satellites(kind),
         count=int(sensed[M_GPS_COUNT - M_GYRO]),
     )
 
@@ -379,6 +396,16 @@ class Estimate:
     def fix_type(self) -> int:
         """MAVLink GPS_FIX_TYPE of the receiver's last sample."""
         return int(self._sensed[M_GPS_FIX - M_GYRO])
+
+    @property
+    def satellites(self) -> int:
+        """Number of satellites of the receiver's last sample."""
+        return _satellites(self.fix_type)
+
+    @property
+    def horizontal_dilution(self) -> float:
+        """Horizontal dilution of precision of the receiver's last sample; infinite without a fix."""
+        return _dilution(self.fix_type)
 
     @property
     def gps(self) -> GpsFix:

@@ -60,6 +60,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_VELOCITY_INTEGRAL,
     K_YAW_SPEED,
     K_YAW_TARGET,
+    MOTOR,
     OFF,
     POSITION,
     POSITION_CLIMB,
@@ -471,7 +472,7 @@ def guide_multirotor(row: Array) -> None:
     if control != before:
         _enter_control(row, control, before)
         row[K_CONTROL] = control
-    if control in (OFF, IDLE):
+    if control in (OFF, IDLE, MOTOR):
         _hold_nothing(row)
         return
     _shape_yaw(row)

@@ -225,7 +225,7 @@ class Guided(Manoeuvre):
 
     def go_to(self, point: Vector, turn: Turn = OWN_HEADING) -> None:
         """Go to a point north, east, down about the estimator's origin [m]; the command does not expire."""
-        self.vehicle.commanded.yaw = None
+        self.vehicle.commanded.forget_heading()
         if turn.rate is not None:
             self._begin(TurnAtPoint(self.vehicle, point, turn.rate))
             return
@@ -234,12 +234,12 @@ class Guided(Manoeuvre):
 
     def follow_velocity(self, velocity: Vector, turn: Turn = OWN_HEADING) -> None:
         """Follow a velocity north, east, down [m/s]."""
-        self.vehicle.commanded.yaw = None
+        self.vehicle.commanded.forget_heading()
         self._begin(FollowVelocity(self.vehicle, velocity, turn))
 
     def follow_acceleration(self, acceleration: Vector, turn: Turn = OWN_HEADING) -> None:
         """Follow an acceleration north, east, down [m/s^2], from the present or the commanded velocity."""
-        self.vehicle.commanded.yaw = None
+        self.vehicle.commanded.forget_heading()
         before = self._doing
         start = before.reached() if isinstance(before, FollowVelocity) else self.vehicle.estimate.velocity
         self._begin(FollowVelocity(self.vehicle, start, turn, acceleration))

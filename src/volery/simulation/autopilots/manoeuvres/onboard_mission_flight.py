@@ -83,8 +83,6 @@ class FlyMission(Manoeuvre):
         leaves_ground: Whether the mission may start the motors by itself; ``None``: only a start command may.
     """
 
-    slow_start = True
-
     def __init__(
         self,
         vehicle: Vehicle,
@@ -93,6 +91,7 @@ class FlyMission(Manoeuvre):
         leaves_ground: Callable[[Vehicle], bool] | None = None,
     ) -> None:
         super().__init__(vehicle)
+        self.slow_start = True
         self._make_leg = make_leg
         self._rules = rules
         self._leaves_ground = leaves_ground

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from math import hypot
+from math import cos, hypot, pi, sqrt
 
-from volery.base.frames import Vector
+from volery.base.frames import Vector, wrap
 from volery.base.time import Ns, S, from_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.guided_flight import Turn
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FOREVER, Leg, item_point
+from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.onboard_mission import (
     LOITER_TIME,
     LOITER_UNLIMITED,
@@ -24,6 +25,11 @@ AT_POINT = 1.0
 
 SETTLED: Ns = 4 * S
 """Time at home after which a return counts as done [ns]; 3 s are not enough in a recorded return."""
+
+TURNING_SHARE, BRAKE_SHARE, CLOSE = 0.2, 0.6, 0.3
+"""Least share of the speed while it turns, share of the acceleration for braking, distance of the end [m]:
+as the control loops drive forwards to a point.
+"""
 
 STANDING = Setpoint(Control.STEER)
 
@@ -48,7 +54,7 @@ class Stand(Manoeuvre):
 
 
 class DriveTo(Manoeuvre):
-    """Drive to a point and stop there.
+    """Drive to a point and stop there, backwards where that is commanded.
 
     Args:
         vehicle: The vehicle.
@@ -61,14 +67,21 @@ class DriveTo(Manoeuvre):
 
     def step(self) -> None:
         """Give the set-point."""
-        tuning = self.vehicle.tuning
-        self.vehicle.drive(
-            Setpoint(
-                Control.POSITION,
-                position=self.point,
-                speed=self.vehicle.commanded.speed or tuning.speed,
-                accel=tuning.accel,
-            )
+        vehicle, accel = self.vehicle, self.vehicle.tuning.accel
+        speed = vehicle.commanded.speed or vehicle.tuning.speed
+        if vehicle.commanded.backwards:
+            self._back_up(speed, accel)
+        else:
+            vehicle.drive(Setpoint(Control.POSITION, position=self.point, speed=speed, accel=accel))
+
+    def _back_up(self, speed: float, accel: float) -> None:
+        """Drive backwards with the rear to the point, slower while it turns and before the point."""
+        vehicle, away = self.vehicle, self.distance()
+        heading = wrap(bearing(vehicle.estimate.position, self.point) + pi)
+        straight = max(TURNING_SHARE, cos(heading - vehicle.estimate.attitude[2]))
+        backwards = min(speed, sqrt(2.0 * BRAKE_SHARE * accel * away)) * straight if away > CLOSE else 0.0
+        vehicle.drive(
+            Setpoint(Control.DRIVE, velocity=(-backwards, 0.0, 0.0), yaw=heading, speed=speed, accel=accel)
         )
 
     def arrived(self, passing: bool = False) -> bool:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from math import atan2, dist, hypot, sqrt
 
+from mypy_extensions import mypyc_attr
+
 from volery.base.frames import Vector
 from volery.base.time import Ns
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
@@ -14,6 +16,12 @@ CLOSE = 0.1
 
 SLOW = 0.05
 """Speed below which a vehicle counts as standing still [m/s]."""
+
+BRAKE_ACCEL = 7.5
+"""BRAKE_MODE_DECEL_RATE of ArduCopter [m/s^2]."""
+
+STANDS = 0.3
+"""Speed below which a braking vehicle holds its position [m/s]."""
 
 FACING_SHARE = 0.05
 """Share of the speed limit above which the nose follows the direction of flight."""
@@ -74,6 +82,7 @@ def bearing(start: Vector, end: Vector) -> float:
     return atan2(end[1] - start[1], end[0] - start[0])
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class ToPoint(Manoeuvre):
     """Go to a point with limited speed and hold it.
 
@@ -145,6 +154,7 @@ class ToPoint(Manoeuvre):
         return near and (passing or dist(estimate.target, self.point) < CLOSE)
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class TakeOff(ToPoint):
     """Climb straight up.
 
@@ -153,11 +163,9 @@ class TakeOff(ToPoint):
         height: Height above home [m].
     """
 
-    taking_off = True
-    slow_start = True
-
     def __init__(self, vehicle: Vehicle, height: float) -> None:
         super().__init__(vehicle)
+        self.taking_off = self.slow_start = True
         self.height = height
 
     def enter(self) -> None:
@@ -175,6 +183,7 @@ class TakeOff(ToPoint):
         return self.vehicle.height > self.height - CLOSE
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Land(Manoeuvre):
     """Descend straight down: fast while high, slowly near the ground. Without a position it descends level.
 
@@ -183,10 +192,9 @@ class Land(Manoeuvre):
         point: Point to land below; ``None``: where the vehicle can stop.
     """
 
-    landing = True
-
     def __init__(self, vehicle: Vehicle, point: Vector | None = None) -> None:
         super().__init__(vehicle)
+        self.landing = True
         self.point = point
 
     def enter(self) -> None:
@@ -223,6 +231,7 @@ class Land(Manoeuvre):
         )
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Return(Manoeuvre):
     """Climb, fly home, wait, land: each stage is a manoeuvre of its own."""
 
@@ -284,6 +293,7 @@ class Return(Manoeuvre):
             self._begin("land", Land(self.vehicle, (north, east, down)))
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Brake(Manoeuvre):
     """Stop, and hold the position that is reached.
 
@@ -292,12 +302,7 @@ class Brake(Manoeuvre):
         accel: Deceleration [m/s^2]; by default that of BRAKE.
     """
 
-    ACCEL = 7.5
-    """BRAKE_MODE_DECEL_RATE of ArduCopter [m/s^2]."""
-    STANDS = 0.3
-    """Speed below which it holds its position [m/s]."""
-
-    def __init__(self, vehicle: Vehicle, accel: float = ACCEL) -> None:
+    def __init__(self, vehicle: Vehicle, accel: float = BRAKE_ACCEL) -> None:
         super().__init__(vehicle)
         self._accel = accel
         self._held: Vector | None = None
@@ -306,7 +311,7 @@ class Brake(Manoeuvre):
         """Control to zero velocity, then to the position reached."""
         estimate, tuning = self.vehicle.estimate, self.vehicle.tuning
         north, east, _ = estimate.velocity
-        if self._held is None and hypot(north, east) < self.STANDS:
+        if self._held is None and hypot(north, east) < STANDS:
             self._held = estimate.target
         self.vehicle.drive(
             Setpoint(

@@ -4,7 +4,8 @@ A reference with limited speed and acceleration moves towards the set-point. Pro
 integral terms follow it: in the plane through the lean of the airframe, vertically through its thrust. The
 loops are soft: on a leg of 50 m the aircraft falls behind, reaches 7.4 m/s to catch up with a reference of
 5 m/s, passes the goal at 4 m/s and swings about it. The nominal throttle is 4 per cent above the one that
-hovers, so that a height is first overshot by 0.4 m, until the slow integral has it. Structure and defaults
+hovers, so that a height is first overshot by 0.4 m, until the slow integral has it. The thrust is divided by
+the vertical share of the estimated lean, and acts by that of the true one. Structure and defaults
 are those of version 6.2, gains those of the stock airframe ``ardrone2``, mass, thrust and drag those of its
 flight dynamics in NPS; only the lag of the attitude behind its reference is fitted to a recorded flight. The
 attitude estimate takes an acceleration for gravity in part, so that the aircraft leans further than commanded
@@ -25,8 +26,9 @@ SUBSTEP = 1.0 / 64.0
 
 GRAVITY = 9.81
 """Acceleration of free fall in the original's laws [m/s^2]."""
-RADIANS_PER_UNIT, HOVER_UNITS = 1.0 / 4096.0, 0.655 * 9600.0
-"""Unit of the horizontal command [rad], and the nominal throttle in units of the thrust command."""
+RADIANS_PER_UNIT, HOVER_UNITS = 1.0 / 4096.0, GRAVITY * 2**18 / int(2**18 * GRAVITY / (0.655 * 9600.0))
+"""Unit of the horizontal command [rad], and the nominal throttle in units of the thrust command:
+GUIDANCE_V_NOMINAL_HOVER_THROTTLE 0.655, by way of an acceleration for each unit that is cut to 18 bits."""
 
 REFERENCE_OMEGA, REFERENCE_ZETA, REFERENCE_ACCEL = radians(67.0), 0.85, 5.66
 """Horizontal reference: natural frequency [rad/s], damping, acceleration limit [m/s^2]."""
@@ -95,7 +97,7 @@ class AxisLean:
     def __init__(self) -> None:
         self.angle = 0.0
         self._integral = self._reference = self._rate = 0.0
-        self._estimate = self._estimate_off = self._bias = 0.0
+        self.estimate = self._estimate_off = self._bias = 0.0
 
     def step(self, behind: float, slower: float, drag: float, *, in_flight: bool) -> None:
         """Move by one substep.
@@ -114,10 +116,10 @@ class AxisLean:
         push = LEAN_OMEGA**2 * (command - self._reference) - 2.0 * LEAN_ZETA * LEAN_OMEGA * self._rate
         self._rate += push * SUBSTEP
         self._reference += self._rate * SUBSTEP
-        self._estimate += (self._reference - self._estimate) * SUBSTEP / LEAN_LAG
+        self.estimate += (self._reference - self.estimate) * SUBSTEP / LEAN_LAG
         if in_flight:
-            self._mistake(self._estimate - drag / GRAVITY)
-        self.angle = self._estimate + self._estimate_off
+            self._mistake(self.estimate - drag / GRAVITY)
+        self.angle = self.estimate + self._estimate_off
 
     def _mistake(self, unfelt: float) -> None:
         """Move the error of the estimate; *unfelt* is the lean that the accelerometer does not show [rad]."""
@@ -202,6 +204,11 @@ class PlaneLoop:
         """Share of the thrust that acts upwards."""
         return cos(self.leans[0].angle) * cos(self.leans[1].angle)
 
+    @property
+    def estimated_share(self) -> float:
+        """Share of the thrust that acts upwards by the estimated attitude."""
+        return cos(self.leans[0].estimate) * cos(self.leans[1].estimate)
+
 
 class HeightLoop:
     """Vertical response, metres up."""
@@ -209,7 +216,8 @@ class HeightLoop:
     def __init__(self, height: float, climb: float) -> None:
         self._reference, self._reference_climb = height, climb
         self._integral = 0.0
-        self.height, self.climb = height, climb
+        self.height, self.climb, self._accel = height, climb, 0.0
+        self._limits = (0.0, 0.0)
 
     def step(
         self,
@@ -217,6 +225,7 @@ class HeightLoop:
         up: float,
         down: float,
         share: float,
+        estimated_share: float,
         drag: float,
         *,
         by_climb: bool,
@@ -229,6 +238,7 @@ class HeightLoop:
             up: Limit of the reference's climb rate [m/s]; likewise ``down``.
             down: Limit of its sink rate [m/s].
             share: Share of the thrust that acts upwards.
+            estimated_share: The same by the estimated attitude.
             drag: Deceleration by the air for each unit of velocity [1/s].
             by_climb: Whether ``goal`` is a climb rate.
             in_flight: Whether the aircraft flies; on the ground there is no integral.
@@ -238,14 +248,21 @@ class HeightLoop:
         slower = _bounded(self._reference_climb - self.climb, MOST_BEHIND)
         grown = _bounded(self._integral + HEIGHT_INTEGRAL * behind * SUBSTEP, MOST_INTEGRAL)
         self._integral = grown if in_flight else 0.0
-        nominal = HOVER_UNITS * (1.0 + push / GRAVITY) / max(share, LEAST_VERTICAL_SHARE)
+        nominal = HOVER_UNITS * (1.0 + push / GRAVITY) / max(estimated_share, LEAST_VERTICAL_SHARE)
         command = min(MOST_NOMINAL, max(0.0, nominal))
         command += HEIGHT_GAIN * behind + CLIMB_GAIN * slower + self._integral
         thrust = PUSH_PER_UNIT * min(MOST_THRUST, max(0.0, command))
-        accel = thrust * share - GRAVITY - drag * self.climb
-        self.climb += accel * SUBSTEP
+        self._accel = thrust * share - GRAVITY - drag * self.climb
+        self.climb += self._accel * SUBSTEP
+        self._limits = (up, down)
         self.height += self.climb * SUBSTEP
         return thrust
+
+    def climb_ahead(self, lead: float) -> float:
+        """Return the climb rate in *lead* seconds [m/s], at most that of the reference or the present one."""
+        up, down = self._limits
+        ahead = self.climb + lead * self._accel
+        return min(max(up, self.climb), max(min(-down, self.climb), ahead))
 
     def _move_reference(self, goal: float, up: float, down: float, *, by_climb: bool) -> float:
         climb = self._reference_climb
@@ -298,9 +315,15 @@ class GuidanceLoops:
             in_flight: Whether the aircraft flies.
         """
         drag = DRAG * hypot(*self.plane.velocity, self.height.climb)
-        share = self.plane.vertical_share
         thrust = self.height.step(
-            up, limits.up, limits.down, share, drag, by_climb=up_is_velocity, in_flight=in_flight
+            up,
+            limits.up,
+            limits.down,
+            self.plane.vertical_share,
+            self.plane.estimated_share,
+            drag,
+            by_climb=up_is_velocity,
+            in_flight=in_flight,
         )
         self.plane.step(plane, limits.level, thrust, drag, by_velocity=plane_is_velocity, in_flight=in_flight)
 
@@ -321,11 +344,11 @@ class GuidanceLoops:
         Args:
             position: Where the aircraft is, north, east, down [m].
             gain: Gain on the distance between the two [1/s].
-            lead: Time by which the horizontal velocity is ahead of the response [s].
+            lead: Time by which the velocity is ahead of the response [s].
         """
         (north, east), (an, ae) = self.plane.place, self.plane.accel
         return (
             self.plane.velocity[0] + lead * an + gain * (north - position[0]),
             self.plane.velocity[1] + lead * ae + gain * (east - position[1]),
-            -self.height.climb + gain * (-self.height.height - position[2]),
+            -self.height.climb_ahead(lead) + gain * (-self.height.height - position[2]),
         )

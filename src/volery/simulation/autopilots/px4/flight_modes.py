@@ -85,11 +85,9 @@ class Hold(ToPoint):
 class TakeOff(Hold):
     """Climb vertically to an altitude at MPC_TKO_SPEED with its ramp."""
 
-    taking_off = True
-    slow_start = True
-
     def __init__(self, vehicle: Vehicle, down: float) -> None:
         super().__init__(vehicle)
+        self.taking_off = self.slow_start = True
         self.down = down
 
     def enter(self) -> None:
@@ -280,8 +278,6 @@ class AltitudeControl(AltitudeHold):
 class BlindDescent(Manoeuvre):
     """POSCTL without manual control: hold the horizontal position and sink."""
 
-    landing = False
-
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self._held: Vector = (0.0, 0.0, 0.0)
@@ -310,10 +306,9 @@ class BlindDescent(Manoeuvre):
 class PositionControl(ManualFlight):
     """POSCTL: sticks command an acceleration against drag; centred sticks brake and hold."""
 
-    slow_start = True
-
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
+        self.slow_start = True
         self._velocity = (0.0, 0.0)
         self._last: Ns = 0
         self._held: Vector | None = None

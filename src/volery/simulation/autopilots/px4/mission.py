@@ -158,10 +158,9 @@ class LandAt(Manoeuvre):
 class FlyToItem(Hold):
     """Fly to the point of an item; from the ground, climb vertically to its height first."""
 
-    slow_start = True
-
     def __init__(self, vehicle: Vehicle, point: Vector, yaw: float | None) -> None:
         super().__init__(vehicle, point, yaw)
+        self.slow_start = True
         self._climbing: TakeOff | None = TakeOff(vehicle, point[2]) if vehicle.landed else None
 
     def enter(self) -> None:

@@ -297,10 +297,9 @@ class FollowTarget(Manoeuvre):
 class Offboard(Manoeuvre):
     """Mode OFFBOARD: position and velocity set-points by ``FollowTarget``, attitudes directly."""
 
-    slow_start = True
-
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
+        self.slow_start = True
         self._follower = FollowTarget(vehicle)
         self._attitude: AttitudeTarget | None = None
 

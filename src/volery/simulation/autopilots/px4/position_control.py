@@ -11,7 +11,7 @@ unwind. The flight stack follows the position and velocity of that airframe.
 from __future__ import annotations
 
 from math import dist, hypot, inf, isfinite, sqrt, tan
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from volery.base.frames import Vector
 from volery.base.time import Ns, from_seconds, to_seconds
@@ -19,27 +19,28 @@ from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.flight_stack.guidance import approach, shorten
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
-SUBSTEP = 0.02
+SUBSTEP: Final = 0.02
 """Step of the integration [s]."""
 
-DRAG = 1.0
+DRAG: Final = 1.0
 """Drag of the recorded airframe divided by its mass: SIH_KDV / SIH_MASS [1/s]."""
 
-LEAN_LAG, THRUST_LAG = 0.15, 0.06
+LEAN_LAG: Final = 0.15
+THRUST_LAG: Final = 0.06
 """Lag from commanded to flown acceleration in the plane (attitude loops) and along the thrust [s]."""
 
-HOVER_TIME = 11.0
+HOVER_TIME: Final = 11.0
 """Time constant of the estimated hover thrust (MPC_USE_HTE) [s]."""
 
-GRAVITY = 9.80665
+GRAVITY: Final = 9.80665
 
-ACCEL_GAIN = 20.0
+ACCEL_GAIN: Final = 20.0
 """Gain on a velocity error below which the trajectory's acceleration fades linearly [1/s]."""
 
-CLAMP_EACH = 0.5
+CLAMP_EACH: Final = 0.5
 """Speed below which a limit no longer keeps the direction of the trajectory [m/s], as in PX4's sources."""
 
-BEYOND = 1e6
+BEYOND: Final = 1e6
 """Factor on a distance whose product is beyond any limit of speed [1/s]."""
 
 FOLLOW_GAIN, FOLLOW_LEAD = 0.95, 0.25
@@ -70,6 +71,21 @@ class Cruise(NamedTuple):
     lift: float = inf
 
 
+class Gains:
+    """Limits and gains of the loops, read from a vehicle's parameters once for all substeps of a call."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        p = vehicle.parameters
+        self.jerk, self.push, self.behind = p["MPC_JERK_AUTO"], p["MPC_ACC_HOR"], p["MPC_XY_ERR_MAX"]
+        self.lift, self.sink = p["MPC_ACC_UP_MAX"], p["MPC_ACC_DOWN_MAX"]
+        self.place = p["MPC_XY_P"], p["MPC_XY_P"], p["MPC_Z_P"]
+        self.speed = p["MPC_XY_VEL_P_ACC"], p["MPC_XY_VEL_P_ACC"], p["MPC_Z_VEL_P_ACC"]
+        self.integral = p["MPC_XY_VEL_I_ACC"], p["MPC_XY_VEL_I_ACC"], p["MPC_Z_VEL_I_ACC"]
+        self.slope = p["MPC_XY_VEL_D_ACC"], p["MPC_XY_VEL_D_ACC"], p["MPC_Z_VEL_D_ACC"]
+        self.lean = tan(vehicle.tuning.tilt) * GRAVITY
+        """Largest acceleration in the plane [m/s^2]."""
+
+
 class Trajectory:
     """Position, velocity and acceleration that move towards a point, north, east, down."""
 
@@ -77,21 +93,20 @@ class Trajectory:
         self.position, self.velocity = list(position), list(velocity)
         self.accel = [0.0, 0.0, 0.0]
 
-    def step(self, vehicle: Vehicle, point: Vector, cruise: Cruise, flown: Vector, passed: float) -> None:
+    def step(self, gains: Gains, point: Vector, cruise: Cruise, flown: list[float], passed: float) -> None:
         """Move towards a point.
 
         Args:
-            vehicle: The vehicle, for its parameters.
+            gains: Limits of acceleration and jerk.
             point: North, east, down [m]; down may be infinite: it sinks at ``cruise.down``.
             cruise: Limits of speed.
             flown: Position of the aircraft [m].
             passed: Time [s].
         """
-        p = vehicle.parameters
-        jerk, push = p["MPC_JERK_AUTO"], p["MPC_ACC_HOR"]
-        ahead = [goal - here for goal, here in zip(point, self.position, strict=True)]
+        jerk, push, place, speed = gains.jerk, gains.push, self.position, self.velocity
+        ahead = point[0] - place[0], point[1] - place[1], point[2] - place[2]
         climbs = ahead[2] < 0.0
-        lift = min(cruise.lift, p["MPC_ACC_UP_MAX"]) if climbs else p["MPC_ACC_DOWN_MAX"]
+        lift = min(cruise.lift, gains.lift) if climbs else gains.sink
         level = hypot(ahead[0], ahead[1])
         plane = min(cruise.speed, braking_speed(jerk, push, level))
         if isfinite(ahead[2]):
@@ -100,20 +115,25 @@ class Trajectory:
         else:
             north, east = shorten(BEYOND * ahead[0], BEYOND * ahead[1], plane)
             wished = north, east, cruise.down
-        passed *= self._stretch(flown, p["MPC_XY_ERR_MAX"])
-        dn, de, dd = (speed - v for speed, v in zip(wished, self.velocity, strict=True))
+        passed *= self._stretch(flown, gains.behind)
+        dn, de, dd = wished[0] - speed[0], wished[1] - speed[1], wished[2] - speed[2]
         gap = hypot(dn, de)
         wanted = min(push, approach(gap, ACCEL_GAIN, jerk)) / gap if gap > 1e-9 else 0.0
         change_n, change_e = shorten(dn * wanted - self.accel[0], de * wanted - self.accel[1], jerk * passed)
         down = max(-lift, min(lift, approach(dd, ACCEL_GAIN, jerk)))
         change_d = max(-jerk * passed, min(jerk * passed, down - self.accel[2]))
-        for axis, change in enumerate((change_n, change_e, change_d)):
-            self.accel[axis] += change
-            before = self.velocity[axis]
-            self.velocity[axis] += self.accel[axis] * passed
-            self.position[axis] += 0.5 * (before + self.velocity[axis]) * passed
+        self._move(0, change_n, passed)
+        self._move(1, change_e, passed)
+        self._move(2, change_d, passed)
 
-    def _stretch(self, flown: Vector, most: float) -> float:
+    def _move(self, axis: int, change: float, passed: float) -> None:
+        """Advance one axis by a change of its acceleration."""
+        accel, before = self.accel[axis] + change, self.velocity[axis]
+        speed = before + accel * passed
+        self.accel[axis], self.velocity[axis] = accel, speed
+        self.position[axis] += 0.5 * (before + speed) * passed
+
+    def _stretch(self, flown: list[float], most: float) -> float:
         """Return the pace of the trajectory, 0 to 1: slower the farther the vehicle is behind it."""
         north, east = self.position[0] - flown[0], self.position[1] - flown[1]
         if most <= 0.0 or north * self.velocity[0] + east * self.velocity[1] < 0.0:
@@ -121,7 +141,7 @@ class Trajectory:
         return 1.0 - min(1.0, hypot(north, east) / most)
 
 
-def _straight(ahead: list[float], plane: float, along: float) -> Vector:
+def _straight(ahead: Vector, plane: float, along: float) -> Vector:
     """Return the velocity along a straight line that exceeds neither the plane's nor the height's limit.
 
     Below ``CLAMP_EACH`` a limit shortens its own components alone: a slow end of the height does not slow the
@@ -170,52 +190,53 @@ class AirframeLoops:
             self.velocity[axis] = self.accel[axis] = self._thrust[axis] = self._integral[axis] = 0.0
         self._hover = 1.0
 
-    def step(self, vehicle: Vehicle, wanted: Wanted, limits: Cruise) -> None:
+    def step(self, gains: Gains, wanted: Wanted, limits: Cruise) -> None:
         """Fly one substep."""
-        p, speeds, push = vehicle.parameters, [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-        free = [False, False, False]
-        for axis, gain in enumerate((p["MPC_XY_P"], p["MPC_XY_P"], p["MPC_Z_P"])):
+        speeds, push, free = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [False, False, False]
+        for axis in range(3):
             place, speed, accel = wanted.position[axis], wanted.velocity[axis], wanted.accel[axis]
             free[axis] = isfinite(accel) and not isfinite(place) and not isfinite(speed)
             push[axis] = accel if isfinite(accel) else 0.0
             speeds[axis] = speed if isfinite(speed) else 0.0
             if isfinite(place):
-                speeds[axis] += gain * (place - self.position[axis])
+                speeds[axis] += gains.place[axis] * (place - self.position[axis])
         north, east = shorten(speeds[0], speeds[1], limits.speed)
         down = max(-limits.up, min(limits.down, speeds[2]))
-        self._fly(vehicle, (north, east, down), push, free)
+        self._fly(gains, (north, east, down), push, free)
 
-    def _fly(self, vehicle: Vehicle, speeds: Vector, push: list[float], free: list[bool]) -> None:
+    def _fly(self, gains: Gains, speeds: Vector, push: list[float], free: list[bool]) -> None:
         """Fly velocities with accelerations fed forward; a free axis has no velocity loop."""
-        p = vehicle.parameters
-        plane = p["MPC_XY_VEL_P_ACC"], p["MPC_XY_VEL_I_ACC"], p["MPC_XY_VEL_D_ACC"]
-        along = p["MPC_Z_VEL_P_ACC"], p["MPC_Z_VEL_I_ACC"], p["MPC_Z_VEL_D_ACC"]
-        miss = [0.0, 0.0, 0.0]
-        for axis, (gain, _, slope) in enumerate((plane, plane, along)):
+        miss, integral = [0.0, 0.0, 0.0], self._integral
+        for axis in range(3):
             if not free[axis]:
-                miss[axis] = speeds[axis] - self.velocity[axis]
-                push[axis] += gain * miss[axis] + self._integral[axis] - slope * self.accel[axis]
+                miss[axis] = off = speeds[axis] - self.velocity[axis]
+                push[axis] += gains.speed[axis] * off + integral[axis] - gains.slope[axis] * self.accel[axis]
         push[2] = max(-GRAVITY, min(GRAVITY, push[2]))
-        most = tan(vehicle.tuning.tilt) * GRAVITY
-        north, east = shorten(push[0], push[1], most)
+        north, east = shorten(push[0], push[1], gains.lean)
         supposed = 1.0 - push[2] / GRAVITY
         if supposed * hypot(north, east) < hypot(push[0], push[1]):
-            unwind = 2.0 / max(0.1, plane[0])
+            unwind = 2.0 / max(0.1, gains.speed[0])
             miss[0] -= unwind * (push[0] - supposed * north)
             miss[1] -= unwind * (push[1] - supposed * east)
         given = supposed * self._hover
         north, east, down = north * given, east * given, GRAVITY * (1.0 - given)
-        for axis, (_, integral, _) in enumerate((plane, plane, along)):
+        for axis in range(3):
             if not free[axis]:
-                self._integral[axis] += integral * miss[axis] * SUBSTEP
-        self._integral[2] = max(-GRAVITY, min(GRAVITY, self._integral[2]))
-        for axis, (wanted, lag) in enumerate(((north, LEAN_LAG), (east, LEAN_LAG), (down, THRUST_LAG))):
-            self._thrust[axis] += SUBSTEP / lag * (wanted - self._thrust[axis])
-            self.accel[axis] = self._thrust[axis] - DRAG * self.velocity[axis]
-            before = self.velocity[axis]
-            self.velocity[axis] += self.accel[axis] * SUBSTEP
-            self.position[axis] += 0.5 * (before + self.velocity[axis]) * SUBSTEP
+                integral[axis] += gains.integral[axis] * miss[axis] * SUBSTEP
+        integral[2] = max(-GRAVITY, min(GRAVITY, integral[2]))
+        self._move(0, north, LEAN_LAG)
+        self._move(1, east, LEAN_LAG)
+        self._move(2, down, THRUST_LAG)
         self._estimate_hover(given, push[2])
+
+    def _move(self, axis: int, wanted: float, lag: float) -> None:
+        """Advance one axis by a substep under a commanded acceleration, which it follows with a lag [s]."""
+        before = self.velocity[axis]
+        thrust = self._thrust[axis] + SUBSTEP / lag * (wanted - self._thrust[axis])
+        accel = thrust - DRAG * before
+        speed = before + accel * SUBSTEP
+        self._thrust[axis], self.accel[axis], self.velocity[axis] = thrust, accel, speed
+        self.position[axis] += 0.5 * (before + speed) * SUBSTEP
 
     def _estimate_hover(self, given: float, push: float) -> None:
         """Estimate the thrust that hovers from thrust and acceleration; the integral keeps the thrust.
@@ -252,11 +273,11 @@ class PositionLoops:
             climb = 0.0 if trajectory is None else trajectory.velocity[2]
             velocity = (0.0, 0.0, climb) if self._vehicle.landed else _vector(loops.velocity)
             trajectory = self._trajectory = Trajectory(_vector(loops.position), velocity)
-        limits = self._limits()
+        limits, gains = self._limits(), Gains(self._vehicle)
         for _ in range(steps):
-            trajectory.step(self._vehicle, point, cruise, _vector(loops.position), SUBSTEP)
+            trajectory.step(gains, point, cruise, loops.position, SUBSTEP)
             loops.step(
-                self._vehicle,
+                gains,
                 Wanted(_vector(trajectory.position), _vector(trajectory.velocity), _vector(trajectory.accel)),
                 limits,
             )
@@ -273,9 +294,9 @@ class PositionLoops:
         """
         loops, steps = self._advanced()
         self._trajectory = None
-        limits = self._limits()._replace(up=up)
+        limits, gains = self._limits()._replace(up=up), Gains(self._vehicle)
         for _ in range(steps):
-            loops.step(self._vehicle, wanted, limits)
+            loops.step(gains, wanted, limits)
         self._follow(loops, yaw, yaw_rate)
 
     def _limits(self) -> Cruise:

@@ -229,15 +229,22 @@ def test_it_turns_as_fast_as_recorded(degrees_of_turn: float, recorded: float, c
 
 def test_it_climbs_and_sinks_at_3_m_s_and_ends_high(craft: Any) -> None:
     """Observed: up at most 3.5 m/s, down 3.1 m/s; 0.4 to 0.65 m too high, fading at about 1 cm/s."""
-    craft.guided()
-    craft.guide(0x00, 0.0, 0.0, -32.0)
+    craft.set("mode", 19)
+    craft.set("kill_throttle", 0.0)
+    craft.run(2.0)
+    craft.guide(0x00, 0.0, 0.0, -10.0)
+    craft.run(5.5)
+    assert 0.4 < craft.up - 10.0 < 0.65
+    craft.guide(0x00, 38.0, 33.0, -40.0)
     climbed = []
-    for _ in range(130):
+    for _ in range(165):
         craft.run(0.1)
         climbed.append(-velocity(craft)[2])
     assert max(climbed) == pytest.approx(3.5, rel=0.1)
-    assert 0.3 < craft.up - 32.0 < 0.65
-    craft.guide(0x00, 0.0, 0.0, -10.0)
+    assert 0.4 < craft.up - 40.0 < 0.65
+    craft.run(8.0)
+    assert 0.2 < craft.up - 40.0 < 0.4
+    craft.guide(0x00, 38.0, 33.0, -10.0)
     sunk = []
     for _ in range(100):
         craft.run(0.1)

@@ -10,11 +10,17 @@ from volery.simulation.autopilots.px4.position_control import (
     SUBSTEP,
     AirframeLoops,
     Cruise,
+    Gains,
     Wanted,
     _straight,
 )
 
-GAINS = {
+PARAMETERS = {
+    "MPC_JERK_AUTO": 4.0,
+    "MPC_ACC_HOR": 3.0,
+    "MPC_XY_ERR_MAX": 2.0,
+    "MPC_ACC_UP_MAX": 4.0,
+    "MPC_ACC_DOWN_MAX": 3.0,
     "MPC_XY_P": 0.95,
     "MPC_Z_P": 1.0,
     "MPC_XY_VEL_P_ACC": 1.8,
@@ -27,32 +33,33 @@ GAINS = {
 LIMITS = Cruise(12.0, 3.0, 1.5)
 
 
-def vehicle() -> Any:
-    return SimpleNamespace(parameters=GAINS, tuning=SimpleNamespace(tilt=0.785))
+def gains() -> Gains:
+    vehicle: Any = SimpleNamespace(parameters=PARAMETERS, tuning=SimpleNamespace(tilt=0.785))
+    return Gains(vehicle)
 
 
 def flown(velocity: tuple[float, float, float], seconds: float) -> AirframeLoops:
     nothing = float("nan")
     loops, wanted = AirframeLoops((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), Wanted(*[(nothing,) * 3] * 3)
     for _ in range(round(seconds / SUBSTEP)):
-        loops.step(vehicle(), wanted._replace(velocity=velocity), LIMITS)
+        loops.step(gains(), wanted._replace(velocity=velocity), LIMITS)
     return loops
 
 
 def test_a_fast_limit_keeps_the_direction() -> None:
-    north, east, down = _straight([80.0, 0.0, 60.0], 5.0, 1.5)
+    north, east, down = _straight((80.0, 0.0, 60.0), 5.0, 1.5)
     assert (north, east, down) == pytest.approx((2.0, 0.0, 1.5))
 
 
 def test_a_slow_end_of_the_height_does_not_slow_the_plane() -> None:
     """clampToZNorm scales the height alone where both its speed and its limit are below 0.5 m/s."""
-    north, east, down = _straight([9.0, 0.0, 1.0], 3.0, 0.3)
+    north, east, down = _straight((9.0, 0.0, 1.0), 3.0, 0.3)
     assert hypot(north, east) == pytest.approx(3.0 * 9.0 / hypot(9.0, 1.0), rel=0.03)
     assert down == pytest.approx(0.3)
 
 
 def test_at_the_point_nothing_moves() -> None:
-    assert _straight([0.0, 0.0, 0.0], 5.0, 1.0) == (0.0, 0.0, 0.0)
+    assert _straight((0.0, 0.0, 0.0), 5.0, 1.0) == (0.0, 0.0, 0.0)
 
 
 def test_the_integral_holds_the_whole_drag_at_the_end_of_a_long_descent() -> None:
