@@ -1,15 +1,18 @@
 """Measurement of the times of library calls: the points of ``cost/libraries.json``.
 
 Each call is timed alone in a loop, at several sizes, in CPU time of the thread; the least of several batches
-counts, because other programs only add to it. Within a program the data and the code of numpy's calls are
-colder: the points contain the factor between small programs and the sum of their calls in loops. Programs by
-which the table is judged take no part in it.
+counts, because other programs only add to it. What a call of Python takes by itself is subtracted: the
+counted code has it already. Features are measured after the points, each as what a call with it takes beyond
+its price so far. Within a program the code of numpy's calls is colder: the time that does not grow with the
+size contains the factor between small programs and the sum of their calls in loops. Programs by which the
+table is judged take no part in it.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import operator
 import pickle
 import re
 import struct
@@ -28,17 +31,26 @@ from volery.calibration.timed_code import (
     timed_program,
     timed_programs,
 )
-from volery.cost import LibraryCall, LibraryTable, call_size, operation_table
+from volery.cost import WRAPPED, LibraryCall, LibraryTable, call_feature, call_size, operation_table
 
 BATCH_NS = 4_000_000
 BATCHES = 7
-SIDES = (1, 4, 16, 64, 256, 1024)
+TIMED_CALLS = 1016
+"""Calls of ``snippets`` and ``features`` together."""
+COLD_NS, WARM = 1000.0, 0.15
+"""Beginning of a call whose code is cold in a program, and the share of the rest."""
+SIDES = (1, 4, 16, 32, 64, 100, 181, 256, 512, 1024)
 """Square roots of the elements of the arrays that are timed."""
 SMALL_SIDES = (2, 4, 8, 16, 64, 128)
 """Sides of the matrices of linear algebra."""
 LENGTHS = (16, 256, 4096, 65536)
+METHODS = (
+    "sum", "mean", "max", "min", "std", "var", "any", "all", "argmax", "argmin", "cumsum", "copy", "ravel",
+)  # fmt: skip
+"""Methods of arrays that are functions of numpy as well."""
+REDUCTIONS = ("sum", "mean", "max", "min", "std", "var", "any", "all", "argmax", "argmin")
 BY_ITEMS = frozenset((
-    "sum", "mean", "std", "var", "cumsum", "array", "tolist", "nonzero", "take", "exp", "sin", "cos",
+    "std", "var", "cumsum", "array", "tolist", "nonzero", "take", "exp", "sin", "cos",
     "interp", "polyfit", "polyval", "median", "argsort", "random", "normal", "uniform", "integers", "hypot",
     "arctan2", "power", "diff", "unique",
 ))  # fmt: skip
@@ -46,7 +58,14 @@ BY_ITEMS = frozenset((
 
 
 class Snippet(NamedTuple):
-    """A call to be timed: entry of the table, meaning of its size, function and arguments."""
+    """A call to be timed.
+
+    Attributes:
+        name: Its entry of the table.
+        size: Meaning of its size, or the feature that it is to price.
+        function: The function.
+        arguments: The arguments.
+    """
 
     name: str
     size: str
@@ -54,17 +73,29 @@ class Snippet(NamedTuple):
     arguments: tuple[object, ...]
 
     def nanoseconds(self) -> float:
-        """Return the time of one call on this machine."""
-        function, arguments = self.function, self.arguments
-        times, most = 1, 0
-        while most < BATCH_NS // 4:
-            times *= 4
-            most = _batch(function, arguments, times)
-        return min(_batch(function, arguments, times) for _ in range(BATCHES)) / times
+        """Return the time of one call on this machine, without what any call of Python takes."""
+        own = _least(self.function, self.arguments)
+        if getattr(self.function, "__name__", "") == "<lambda>":
+            return max(own - _least(_NOTHING[len(self.arguments)], self.arguments), 1.0)
+        return max(own - _least(bool, ((),)), 1.0)
 
     def measured_size(self) -> int:
         """Return the size of the call."""
         return max(1, round(call_size(self.size, self.arguments, self.function(*self.arguments))))
+
+
+_NOTHING: Sequence[Callable[..., object]] = (
+    lambda: None, lambda a: None, lambda a, b: None, lambda a, b, c: None,
+)  # fmt: skip
+"""Functions that take what any call of a function in Python takes, by their number of arguments."""
+
+
+def _least(function: Callable[..., object], arguments: tuple[object, ...]) -> float:
+    times, most = 1, 0
+    while most < BATCH_NS // 4:
+        times *= 4
+        most = _batch(function, arguments, times)
+    return min(_batch(function, arguments, times) for _ in range(BATCHES)) / times
 
 
 def _batch(function: Callable[..., object], arguments: tuple[object, ...], times: int) -> int:
@@ -83,12 +114,12 @@ def _of_shape(draw: Callable[..., object], shape: tuple[int, ...]) -> Callable[.
 
 
 _UNARY = (
-    "sqrt", "exp", "sin", "cos", "abs", "floor", "isnan", "isfinite", "mean", "max", "min", "std",
-    "var", "argmax", "argmin", "any", "all", "cumsum", "copy", "asarray",
-    "diff", "count_nonzero", "zeros_like", "ravel",
+    "sqrt", "exp", "sin", "cos", "abs", "floor", "isnan", "isfinite", "asarray", "diff", "count_nonzero",
+    "zeros_like",
 )  # fmt: skip
+ELEMENTWISE = ("sqrt", "exp", "sin", "cos", "abs", "floor", "isnan", "isfinite")
 _BINARY = ("add", "subtract", "multiply", "divide", "maximum", "minimum", "hypot", "arctan2", "power")
-_LINEAR = ("inv", "solve", "det", "norm", "eig", "svd")
+_LINEAR = ("inv", "solve", "det", "eig", "svd")
 
 
 def snippets() -> Iterator[Snippet]:
@@ -98,6 +129,78 @@ def snippets() -> Iterator[Snippet]:
         yield one._replace(size="items") if one.name.removeprefix("numpy.") in BY_ITEMS else one
     yield from _linear_algebra(generator)
     yield from _texts()
+
+
+def features() -> Iterator[Snippet]:
+    """Yield the calls that price features, after ``snippets``."""
+    generator = np.random.default_rng(2)
+    array = generator.random((400, 30)) + 0.5
+    other = generator.random((400, 30)) + 0.5
+    pairs, wide = generator.random((4000, 2)), generator.random((4000, 4))
+    mask, row = generator.random(12_000) > 0.5, generator.random(12_000)
+    for name in METHODS:
+        yield Snippet(f"numpy.{name}", "wrapped", getattr(np, name), (np.ones(1),))
+    for name in REDUCTIONS:
+        yield Snippet(f"numpy.{name}", "loops", lambda a, name=name: getattr(a, name)(axis=1), (pairs,))
+    for name in ("sum", "max", "min", "mean", "argmax", "argmin"):
+        yield Snippet(f"numpy.{name}", "strided", lambda a, name=name: getattr(a, name)(), (array[:, 3],))
+    for name in (*ELEMENTWISE, "copy"):
+        function = getattr(np, name)
+        yield Snippet(_key(function), "loops", function, (wide[:, :2],))
+        yield Snippet(_key(function), "strided", function, (array[:, 3],))
+    functions = {_key(getattr(np, name)): getattr(np, name) for name in _BINARY}
+    functions["numpy.operator"] = lambda a, b: a * b
+    functions["numpy.less"] = lambda a, b: a < b
+    functions["numpy.where"] = lambda a, b: np.where(a > 0.7, a, b)
+    for key, binary in functions.items():
+        if key != "numpy.where":
+            yield Snippet(key, "loops", binary, (pairs, pairs[0]))
+            yield Snippet(key, "strided", binary, (array[:, 3], other[:, 3]))
+            yield Snippet(key, "cast", binary, (array, (other * 9).astype(np.int32)))
+    yield Snippet("numpy.mask", "selected", lambda a, b: a[b], (array.ravel(), mask))
+    yield Snippet("numpy.putmask", "selected", lambda b, a, v: a.__setitem__(b, v), (mask, row, row[mask]))
+    yield Snippet("numpy.nonzero", "selected", lambda a: a.nonzero(), (mask,))
+    yield Snippet("numpy.nonzero", "coordinates", lambda a: a.nonzero(), (mask.reshape(-1, 40),))
+    yield Snippet("numpy.take", "rows", lambda a, b: a[b], (pairs, generator.integers(0, 4000, 4000)))
+    yield Snippet("numpy.mask", "rows", lambda a, b: a[b], (pairs, mask[:4000]))
+    for name in ("matmul", "dot"):
+        yield Snippet(f"numpy.{name}", "outputs", getattr(np, name), (generator.random((1000, 3)), np.eye(3)))
+    yield from _features_of_texts()
+
+
+def _features_of_texts() -> Iterator[Snippet]:
+    short, long = [k + 0.5 for k in range(400)], [k / 7.0 for k in range(400)]
+    rows = [{"id": k, "name": "drone", "ready": k > 9, "at": [k, -k]} for k in range(100)]
+    for feature, document in (("values", rows), ("floats", short), ("decimals", long)):
+        yield Snippet("json.dumps", feature, json.dumps, (document,))
+        yield Snippet("json.loads", feature, json.loads, (json.dumps(document),))
+    yield Snippet("json.dumps", "lines", lambda rows: json.dumps(rows, indent=2), (rows,))
+    line = "2026-11-23 12:00:01.250 INFO drone_3 battery=15.82 alt=101.5 msg='hold position'"
+    lines = "\n".join([line] * 40)
+    for name in ("findall", "split", "sub", "search"):
+        yield Snippet(f"re.{name}", "scanned", *_of_pattern(name, r"\s*#.*$", lines))
+    for name in ("findall", "split"):
+        yield Snippet(f"re.{name}", "found", *_of_pattern(name, r"battery=(\d+\.\d+)", lines))
+    yield Snippet("re.sub", "removed", *_of_pattern("sub", r"battery=", lines))
+    for name in ("match", "fullmatch", "search"):
+        yield Snippet(
+            f"re.{name}", "matched", *_of_pattern(name, r"(?P<day>[\d-]+) ([\d:.]+) ([A-Z]+) (\w+).*", line)
+        )
+    random = np.random.default_rng(3)
+    records = b"".join(
+        struct.pack("<Qddfff", 1000 * k, 43 + k * 1e-6, -3.8, k % 37, k / 7, 0.0) for k in range(250)
+    )
+    readings = "\n".join(f"{k / 50:.2f},{random.normal():.4f},{k % 9}" for k in range(500)).encode()
+    for data in (records, readings):
+        yield Snippet("zlib.compress", "part packed", zlib.compress, (data,))
+        yield Snippet("zlib.decompress", "part packed", zlib.decompress, (zlib.compress(data),))
+
+
+def _of_pattern(name: str, pattern: str, text: str) -> tuple[Callable[..., object], tuple[object, ...]]:
+    """Return a function of a pattern, called with it first as it is priced, and its arguments."""
+    compiled = re.compile(pattern)
+    given = ("-", text) if name == "sub" else (text,)
+    return (lambda own, *rest: getattr(own, name)(*rest)), (compiled, *given)
 
 
 def _arrays(generator: np.random.Generator) -> Iterator[Snippet]:
@@ -113,24 +216,30 @@ def _arrays(generator: np.random.Generator) -> Iterator[Snippet]:
             yield Snippet(f"numpy.{name}", "elements", getattr(np, name), ([row, row],))
         for name in ("sort", "argsort", "median"):
             yield Snippet(f"numpy.{name}", "elements", getattr(np, name), (row,))
-        yield Snippet("numpy.nonzero", "elements", np.nonzero, (row > 0.99,))
+        yield Snippet("numpy.histogram", "items", np.histogram, (row,))
+        yield Snippet("numpy.percentile", "items", np.percentile, (row, 90.0))
+        yield Snippet("numpy.nonzero", "elements", lambda a: a.nonzero(), (row > 2.0,))
         numbers = generator.integers(0, 20 * row.size, row.size)
         yield Snippet("numpy.unique", "elements", lambda a: np.unique(a, return_index=True), (numbers,))
-        triples = generator.random((side * side // 3 + 1, 3))
-        yield Snippet("numpy.sum", "elements", lambda a: a.sum(axis=1), (triples,))
         array = generator.random((side, side)) + 0.5
         other = generator.random((side, side)) + 0.5
         for name in _UNARY:
             yield Snippet(_key(getattr(np, name)), "elements", getattr(np, name), (array,))
+        for name in METHODS:
+            yield Snippet(f"numpy.{name}", "elements", getattr(np.ndarray, name), (array,))
         for name in _BINARY:
             yield Snippet(_key(getattr(np, name)), "elements", getattr(np, name), (array, other))
         yield Snippet("numpy.operator", "elements", lambda a, b: a * b, (array, other))
+        yield Snippet("numpy.less", "elements", lambda a, b: a < b, (array, other))
+        yield Snippet("numpy.mask", "elements", lambda a, b: a[b], (array, array > 2.0))
         yield Snippet("numpy.remainder", "elements", lambda a, b: a % b, (array, other))
         yield Snippet("numpy.where", "elements", np.where, (array > 1.0, array, other))
         yield Snippet("numpy.clip", "elements", np.clip, (array, 0.2, 0.8))
         yield Snippet("numpy.concatenate", "elements", lambda a: np.concatenate((a, a)), (array,))
         yield Snippet("numpy.zeros", "elements", np.zeros, (array.shape,))
         yield Snippet("numpy.ones", "elements", np.ones, (array.shape,))
+        yield Snippet("numpy.linspace", "elements", np.linspace, (0.0, 1.0, row.size))
+        yield Snippet("numpy.meshgrid", "elements", np.meshgrid, (row[:side], row[:side]))
         yield Snippet("numpy.subscript", "elements", lambda a: a[a.shape[0] // 2 :, :], (array,))
         yield Snippet("numpy.roll", "elements", lambda a: np.roll(a, 1, 0), (array,))
         yield Snippet("numpy.astype", "elements", lambda a: a.astype(np.uint8), (array,))
@@ -142,7 +251,9 @@ def _arrays(generator: np.random.Generator) -> Iterator[Snippet]:
             given = {"random": (), "normal": (0.0, 1.0), "uniform": (0.0, 1.0), "integers": (0, 9)}[name]
             draw = getattr(generator, name)
             yield Snippet(f"numpy.{name}", "elements", _of_shape(draw, array.shape), given)
-        yield Snippet("numpy.take", "elements", lambda a, b: a[b], (array, array > 1.0))
+        yield Snippet("numpy.putmask", "elements", operator.setitem, (array.copy(), array > 2.0, 1.0))
+        yield Snippet("numpy.put", "elements", operator.setitem, (row.copy(), numbers // 20, 1.0))
+        yield Snippet("numpy.take", "elements", lambda a, b: a[b], (row, numbers // 20))
         yield Snippet("numpy.*", "elements", np.clip, (array, 0.2, 0.8))
     for side in (1, 8, 64):
         vectors = generator.random((side * side, 3))
@@ -163,34 +274,38 @@ def _linear_algebra(generator: np.random.Generator) -> Iterator[Snippet]:
             given = (matrix, matrix[0]) if name == "solve" else (matrix,)
             yield Snippet(f"numpy.{name}", "cube", function, given)
         tall = generator.random((8 * side, side))
-        yield Snippet("numpy.lstsq", "elements", np.linalg.lstsq, (tall, tall[:, 0]))
+        yield Snippet("numpy.norm", "elements", np.linalg.norm, (matrix,))
+        yield Snippet("numpy.lstsq", "squares", np.linalg.lstsq, (tall, tall[:, 0]))
         yield Snippet("numpy.eye", "elements", np.eye, (side,))
         yield Snippet("numpy.outer", "elements", np.outer, (matrix[0], matrix[0]))
 
 
 def _texts() -> Iterator[Snippet]:
+    random = np.random.default_rng(4)
     for length in LENGTHS:
         rows = [
             {"id": number, "x": number * 1.5, "name": f"drone_{number}"} for number in range(length // 44 + 1)
         ]
-        text = json.dumps(rows)
+        text = "".join(map(chr, random.integers(97, 123, length)))
         words = ("alpha 12.5 beta; " * (length // 17 + 1))[:length]
         data = words.encode()
-        yield Snippet("json.dumps", "text", json.dumps, (rows,))
-        yield Snippet("json.loads", "text", json.loads, (text,))
+        yield Snippet("json.dumps", "text", json.dumps, (text,))
+        yield Snippet("json.loads", "text", json.loads, (json.dumps(text),))
         for name in ("findall", "sub", "split", "match", "search", "fullmatch"):
-            pattern = re.compile(r"(\w+) ([0-9.]+)")
-            texts = ("-", words) if name == "sub" else (words,)
-            yield Snippet(f"re.{name}", "text", getattr(pattern, name), texts)
+            function, given = _of_pattern(name, r"gamma=(\w+) ([0-9.]+)", words)
+            yield Snippet(f"re.{name}", "text", function, given)
+        pattern = re.compile(r"(\w+) ([0-9.]+)")
         hit = pattern.match("alpha 12.5")
         assert hit is not None
         yield Snippet("re.groups", "text", hit.groups, ())
         yield Snippet("re.group", "text", hit.group, (1,))
-        packed = zlib.compress(text.encode())
-        yield Snippet("zlib.compress", "packed", zlib.compress, (text.encode(),))
-        yield Snippet("zlib.decompress", "packed", zlib.decompress, (packed,))
+        noise = random.integers(0, 150, length, dtype=np.uint8).tobytes()
+        yield Snippet("zlib.compress", "text", zlib.compress, (noise,))
+        yield Snippet("zlib.decompress", "text", zlib.decompress, (zlib.compress(noise),))
         yield Snippet("zlib.crc32", "text", zlib.crc32, (data,))
         yield Snippet("hashlib.*", "text", lambda d: hashlib.sha256(d).digest(), (data,))
+        yield Snippet("hashlib.digest", "text", hashlib.sha256(data).digest, ())
+        yield Snippet("hashlib.hexdigest", "text", hashlib.sha256(data).hexdigest, ())
         yield Snippet("pickle.dumps", "text", pickle.dumps, (rows,))
         yield Snippet("pickle.loads", "text", pickle.loads, (pickle.dumps(rows),))
     for fields in (1, 4, 16, 64):
@@ -254,48 +369,181 @@ def run(given):
         total = total + np.clip(found, -1.0, 1.0) * weight.mean()
     return total
 """,
+    "occupied cells": """
+import numpy as np
+def prepare(seed):
+    return np.random.default_rng(seed).random((260, 300)), np.arange(8)
+def run(given):
+    cells, shifts = given
+    hits = np.zeros(cells.shape, dtype=np.int32)
+    for shift in shifts:
+        moved = np.roll(cells, shift, axis=1)
+        near = np.abs(moved - cells) < 0.3
+        hits[near] += 1
+        hits[5:-5, 5:-5] += near[4:-6, 4:-6]
+    rows, columns = np.nonzero(hits > 5)
+    return rows.sum() + columns.max() + hits[rows, columns].mean() + cells[hits > 6].std()
+""",
+    "pairs of a fleet": """
+import numpy as np
+def prepare(seed):
+    return np.random.default_rng(seed).random((70, 3)) * 50.0
+def run(places):
+    total = 0.0
+    for _ in range(4):
+        apart = places[:, None, :] - places[None, :, :]
+        far = np.sqrt((apart * apart).sum(axis=2)) + 1e-6
+        push = (apart / (far ** 3)[:, :, None]).sum(axis=1)
+        places = places + np.clip(push, -0.1, 0.1)
+        total += far.max() + far.mean(axis=0).min()
+    return total
+""",
 }
-"""Programs of numpy that the factor of the context is fitted to."""
+"""Programs of numpy that the factors of the context are fitted to."""
+
+TEXT_PROGRAMS = {
+    "reports": """
+import json
+import re
+LINE = re.compile(r"unit=(\\w+) t=([0-9.]+) volt=([0-9.]+)")
+def prepare(seed):
+    return [f"INFO unit=uav{n % 7} t={n * 0.25 + seed:.2f} volt={15.0 + n % 9 / 10}" for n in range(150)]
+def run(lines):
+    units = {}
+    for line in lines:
+        found = LINE.search(line)
+        if found:
+            unit, time, volt = found.groups()
+            units.setdefault(unit, []).append({"t": float(time), "v": float(volt), "ok": True})
+    text = json.dumps(units)
+    return sum(len(rows) for rows in json.loads(text).values()) + len(text)
+""",
+    "parameter files": """
+import json
+import struct
+def prepare(seed):
+    return {f"PARAM_{n}": {"value": n * 0.5 + seed, "type": n % 9, "text": "a setting"} for n in range(90)}
+def run(parameters):
+    text = json.dumps(parameters, indent=1)
+    total = 0.0
+    for name, one in json.loads(text).items():
+        packed = struct.pack("<fB16s", one["value"], one["type"], name.encode())
+        value, kind, _ = struct.unpack("<fB16s", packed)
+        total += value + kind
+    return total
+""",
+}
+"""Programs that the factor of the other libraries is fitted to."""
 
 
 def measure_calls(show: Callable[[str, int], object]) -> dict[str, LibraryCall]:
-    """Time all calls on this machine; *show* is called with the name of each and its number."""
+    """Time all calls on this machine: first the points, then the features of their entries.
+
+    Args:
+        show: Called with the name of each call and its number.
+
+    Returns:
+        Entries by ``library.function``, ns of this machine, as in loops.
+    """
     points: dict[str, dict[int, float]] = {}
     sizes: dict[str, str] = {}
+    number = 0
     for number, one in enumerate(snippets()):
         show(one.name, number)
         sizes[one.name] = one.size
         points.setdefault(one.name, {})[one.measured_size()] = one.nanoseconds()
-    return {
-        name: LibraryCall(size=sizes[name], points=dict(sorted(found.items())))
-        for name, found in sorted(points.items())
+    found = {
+        name: LibraryCall(size=sizes[name], points=dict(sorted(measured.items())))
+        for name, measured in sorted(points.items())
     }
+    beyond: dict[tuple[str, str], list[float]] = {}
+    for place, one in enumerate(features(), number + 1):
+        show(one.name, place)
+        beyond.setdefault((one.name, one.size), []).append(_of_feature(one, found[one.name]))
+        each = {**found[one.name].each, one.size: round(max(0.0, median(beyond[one.name, one.size])), 3)}
+        found[one.name] = found[one.name].model_copy(update={"each": each})
+    return found
+
+
+def _of_feature(one: Snippet, law: LibraryCall) -> float:
+    """Return the time of a feature, ns: what the call takes beyond its price without it, over its count."""
+    result = one.function(*one.arguments)
+    rest = law.model_copy(
+        update={"each": {name: each for name, each in law.each.items() if name != one.size}}
+    )
+    beyond = one.nanoseconds() - rest.of_call(one.arguments, result)
+    return beyond if one.size == WRAPPED else beyond / call_feature(one.size, one.arguments, result)
 
 
 def scaled(calls: Mapping[str, LibraryCall], factor: float, library: str = "") -> dict[str, LibraryCall]:
-    """Return entries with their times multiplied, of one library or of all."""
+    """Return entries with their times multiplied.
+
+    Args:
+        calls: Entries by ``library.function``.
+        factor: The factor.
+        library: Beginning of the names of the entries that are changed; by default all.
+    """
     found = dict(calls)
     for name, one in calls.items():
         if name.startswith(library):
             points = {size: round(value * factor, 1) for size, value in one.points.items()}
-            found[name] = LibraryCall(size=one.size, points=points)
+            each = {feature: round(value * factor, 3) for feature, value in one.each.items()}
+            found[name] = LibraryCall(size=one.size, points=points, each=each)
     return found
 
 
-def context_factor(programs: Sequence[TimedCode], table: LibraryTable, slowdown: float) -> float:
-    """Return the time of numpy's calls in programs over that in loops.
+def in_context(
+    calls: Mapping[str, LibraryCall], constant: float, growth: float, library: str = ""
+) -> dict[str, LibraryCall]:
+    """Return entries as in programs.
+
+    Args:
+        calls: Entries as in loops.
+        constant: Factor of the part of a time that does not grow with the size, whose code is cold. A call
+            that takes longer than ``COLD_NS`` is written in Python, or repeats itself: its code is warm.
+        growth: Factor of the rest, whose data are cold.
+        library: Beginning of the names of the entries that are changed.
+    """
+    found = dict(calls)
+    for name, one in calls.items():
+        if name.startswith(library):
+            least = min(one.points.values())
+            first = least + (constant - 1.0) * (min(least, COLD_NS) + WARM * max(0.0, least - COLD_NS))
+            points = {size: round(first + growth * (value - least), 1) for size, value in one.points.items()}
+            each = {
+                feature: round(value * (constant if feature == WRAPPED else growth), 3)
+                for feature, value in one.each.items()
+            }
+            found[name] = LibraryCall(size=one.size, points=points, each=each)
+    return found
+
+
+def context_factors(
+    programs: Sequence[TimedCode], table: LibraryTable, slowdown: float, library: str
+) -> tuple[float, float, float]:
+    """Return the factors of ``in_context`` and the time of a page, ns, with the least relative errors.
 
     Args:
         programs: The programs, timed.
         table: Times of calls in loops, on the machine of ``operation_table``.
         slowdown: Time on this machine over the time on that machine.
+        library: Beginning of the names of the entries.
     """
-    factors = []
+    operations = operation_table().nanoseconds
+
+    def estimate(one: TimedCode, constant: float, growth: float, page: float) -> float:
+        calls = in_context(table.calls, constant, growth, library)
+        return one.counted_ns(operations, table.model_copy(update={"calls": calls, "page": page}))
+
+    rows, rest = [], []
     for one in programs:
-        own = one.counted_ns(operation_table().nanoseconds, None)
-        calls = one.counted_ns(operation_table().nanoseconds, table) - own
-        factors.append((one.median / slowdown - own) / calls)
-    return median(factors)
+        took = one.median / slowdown
+        whole = estimate(one, 1.0, 1.0, 0.0)
+        steps = ((2.0, 1.0, 0.0), (1.0, 2.0, 0.0), (1.0, 1.0, 1000.0))
+        rows.append([(estimate(one, *each) - whole) / took for each in steps])
+        rest.append((took - whole) / took)
+    constant, growth, page = np.linalg.lstsq(np.array(rows), np.array(rest), rcond=None)[0]
+    return 1.0 + max(0.0, float(constant)), 1.0 + max(0.0, float(growth)), max(0.0, float(page)) * 1000.0
 
 
 def measure_table(
@@ -311,10 +559,12 @@ def measure_table(
         show: See ``measure_calls``.
     """
     own = timed_programs()
-    mine = [timed_program(name, text) for name, text in CONTEXT_PROGRAMS.items()]
-    measure([*own, *mine], rounds)
+    with_numpy, with_text = (
+        [timed_program(name, text) for name, text in programs.items()]
+        for programs in (CONTEXT_PROGRAMS, TEXT_PROGRAMS)
+    )
+    measure([*own, *with_numpy, *with_text], rounds)
     slowdown = median(one.median / one.counted_ns(operation_table().nanoseconds) for one in own)
-    calls = scaled(measure_calls(show), 1.0 / slowdown)
     table = LibraryTable(
         provenance="measured",
         source=f"volery calibrate libraries: least CPU time of {BATCHES} batches of each call",
@@ -323,7 +573,14 @@ def measure_table(
         programs=0,
         mean_error=0.0,
         worst_error=0.0,
-        calls=calls,
+        calls=scaled(measure_calls(show), 1.0 / slowdown),
     )
-    factor = context_factor(mine, table, slowdown)
-    return table.model_copy(update={"calls": scaled(calls, factor, "numpy"), "in_context": round(factor, 3)})
+    cold, data, page = context_factors(with_numpy, table, slowdown, "numpy")
+    of_text = context_factors(with_text, table, slowdown, "")[:2]
+    of_numpy = in_context(table.calls, cold, data)
+    calls = {
+        **in_context(table.calls, *of_text),
+        **{name: of_numpy[name] for name in of_numpy if name.startswith("numpy")},
+    }
+    fitted = {"in_context": round(cold, 3), "data_in_context": round(data, 3), "page": round(page, 1)}
+    return table.model_copy(update={"calls": calls, **fitted})

@@ -147,7 +147,13 @@ def node_estimates(record: RunRecord, nodes: Sequence[str]) -> dict[str, NodeEst
 def compare_nodes(
     languages: Mapping[str, str], estimated: Mapping[str, NodeEstimate], runs: Sequence[Mapping[str, Ns]]
 ) -> list[NodeComparison]:
-    """Return a comparison for each node that the runs have measured."""
+    """Return a comparison for each node that the runs have measured.
+
+    Args:
+        languages: Client library by node.
+        estimated: Estimate by node.
+        runs: CPU time by node of each run, ns; at least one run.
+    """
     return [
         NodeComparison(node, languages[node], estimated[node], tuple(run[node] / S for run in runs))
         for node in runs[0]
@@ -177,6 +183,12 @@ def measure_runs(
     nodes: Sequence[NodeProgram], count: int, duration: Ns, show: ShowRun = lambda done: None
 ) -> tuple[list[MeasuredRun], bool]:
     """Measure ``count`` runs on a ROS master of their own.
+
+    Args:
+        nodes: The nodes, from ``prepare_nodes``.
+        count: Number of runs.
+        duration: Duration of a run after the nodes' start, ns.
+        show: Called before each run.
 
     Returns:
         The runs, and False if Ctrl-C has ended the measurement early.
@@ -208,7 +220,16 @@ def estimate_nodes(system: System, fidelity: str = "code") -> dict[str, NodeEsti
 def compare(
     system: System, estimate: Mapping[str, NodeEstimate], runs: Sequence[MeasuredRun]
 ) -> tuple[NodeComparison, ...]:
-    """Compare each node's estimate with the measured runs; raise ``UsageError`` without a run."""
+    """Compare each node's estimate with the measured runs.
+
+    Args:
+        system: The system whose nodes were measured.
+        estimate: Estimate by node, from ``estimate_nodes``.
+        runs: Runs from ``measure_runs``.
+
+    Raises:
+        UsageError: There is no run.
+    """
     if not runs:
         raise UsageError("no run was measured to its end")
     languages = {one.name: one.component.language for one in system.instances}

@@ -169,7 +169,13 @@ def calibrate(
 
 
 def evaluate(statements: Sequence[TimedCode], whole: Sequence[TimedCode], rounds: Rounds) -> Calibration:
-    """Fit the costs to pieces that have been timed; the first statement is the empty one."""
+    """Fit the costs to pieces that have been timed.
+
+    Args:
+        statements: Timed statements; the first is the empty one, whose time the others contain.
+        whole: Timed programs: they give the factor between programs and loops, and the error.
+        rounds: The precision by which pieces count as uncertain.
+    """
     empty, counts = statements[0], np.array([one.counts() for one in statements])
     counts = counts[1:] - counts[0]
     times = np.array([one.median for one in statements[1:]]) - empty.median

@@ -226,7 +226,8 @@ class TimedCode:
         return self.load(None)
 
     def warm_up(self) -> None:
-        """Double the executions of a measurement until it is long enough."""
+        """Execute once, then double the executions of a measurement until it is long enough."""
+        self._cpu()
         while self._cpu() < _WORTH_TIMING:
             self.times *= 2
 
@@ -310,7 +311,13 @@ def timed_programs() -> list[TimedCode]:
 
 
 def timed_program(name: str, text: str, seed: int = 1) -> TimedCode:
-    """Return a program whose ``run(state)`` is timed and whose ``prepare(seed)`` is not."""
+    """Return a program whose ``run(state)`` is timed and whose ``prepare(seed)`` is not.
+
+    Args:
+        name: Name of the program.
+        text: Its source: a module with both functions.
+        seed: Argument of ``prepare``, which gives the state.
+    """
 
     def load(steps: StepCounter | None) -> Callable[[int], object]:
         module = _module(name, text, steps)

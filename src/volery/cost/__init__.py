@@ -34,7 +34,8 @@ from volery.cost.figures import (
     scale_time,
 )
 from volery.cost.instrumentation import UNIFORM_COSTS, StepCounter
-from volery.cost.library_calls import LibraryCall, LibraryTable, call_size, library_table
+from volery.cost.library_calls import WRAPPED, LibraryCall, LibraryTable, library_table
+from volery.cost.library_sizes import call_feature, call_size
 from volery.cost.pricing import (
     FREE,
     Basis,
@@ -54,6 +55,7 @@ __all__ = [
     "OPERATIONS",
     "STEPS_PER_NS",
     "UNIFORM_COSTS",
+    "WRAPPED",
     "Basis",
     "Cache",
     "CallFigures",
@@ -83,6 +85,7 @@ __all__ = [
     "StepCounter",
     "Tariff",
     "WithProvenance",
+    "call_feature",
     "call_size",
     "library_table",
     "line_through",

@@ -319,23 +319,25 @@ class _CounterInserter(ast.NodeTransformer):
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST:
         """Price an assignment into an array (``array[..] = value``) with its value."""
+        target = copy.deepcopy(node.targets[0]) if len(node.targets) == 1 else None
         self.generic_visit(node)
-        return self._stored(node, node.targets[0] if len(node.targets) == 1 else None)
+        return self._stored(node, target)
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST:
         """Price ``array += value`` and ``array[..] += value`` with the value."""
+        target = copy.deepcopy(node.target)
         self.generic_visit(node)
-        return self._stored(node, node.target)
+        return self._stored(node, target)
 
-    def _stored(self, node: Any, target: ast.expr | None) -> ast.AST:
+    def _stored(self, node: Any, read: ast.expr | None) -> ast.AST:
         """Let the value pass through ``LibraryCalls`` with its target, which is read again.
 
-        That is done only where a second reading changes nothing: a target of names, attributes and items.
+        ``read`` is a copy without counters. That is done only where a second reading changes nothing: a
+        target of names, attributes and items.
         """
-        item = isinstance(target, ast.Subscript)
-        if not self._libraries or target is None or not (item or isinstance(node, ast.AugAssign)):
+        item = isinstance(read, ast.Subscript)
+        if not self._libraries or read is None or not (item or isinstance(node, ast.AugAssign)):
             return node  # type: ignore[no-any-return] # it is one of two kinds of node
-        read = copy.deepcopy(target)
         read.ctx = ast.Load()  # type: ignore[attr-defined] # what can be assigned to has a context
         if not all(isinstance(one, _READ_TWICE) for one in ast.walk(read)):
             return node  # type: ignore[no-any-return]

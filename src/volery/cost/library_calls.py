@@ -1,9 +1,9 @@
 """Times of calls of compiled libraries (numpy, json, re, ...) in counted Python code.
 
-Law: time of a call = a function of its size, interpolated between measured points on logarithmic axes; each
-entry states what its size is. It depends on nothing else, so that the same run has the same times. Left out
-are strides and whether the data lie in a cache; that is its error. A function without points of its own is
-priced by one that computes alike. The points in ``libraries.json``
+Law: time of a call = a function of its size, interpolated between measured points on logarithmic axes, + the
+sum of its features (``library_sizes``), each at its measured time. It depends on nothing else, so that the
+same run has the same times. Left out are the values of the data and caches; that is its error.
+A function without points of its own is priced by one that computes alike. The figures in ``libraries.json``
 are in nanoseconds of the machine of ``operation_table``; ``CodeLaw`` scales them to other processors.
 
 Calls are found when they happen: in a file that imports one of the libraries every call, operator and
@@ -19,12 +19,13 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
-from math import exp, log, sqrt
+from math import exp, log
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from volery.cost.figures import WithProvenance
+from volery.cost.library_sizes import FEATURES, SIZES, call_feature, call_size, new_pages
 from volery.cost.python_operations import STEPS_PER_NS
 
 OPERATORS: Mapping[str, Callable[..., Any]] = {
@@ -39,28 +40,26 @@ OPERATORS: Mapping[str, Callable[..., Any]] = {
 
 UNARY = ("USub", "Invert")
 
+WRAPPED = "wrapped"
+"""Feature of a function around a method."""
+
 ENTRIES: Mapping[str, str] = {
     "MatMult": "numpy.matmul", "Subscript": "numpy.subscript", "Pow": "numpy.power", "Mod": "numpy.remainder",
+    **dict.fromkeys(("Eq", "NotEq", "Lt", "LtE", "Gt", "GtE"), "numpy.less"),
 }  # fmt: skip
 """Entries of operators on arrays that differ from that of all others."""
-
-SIZES = ("elements", "items", "bytes", "products", "cube", "text", "packed", "fields")
-"""Meanings of a size: elements of the largest array among arguments and result, in units of 8 bytes, because
-what takes the time are vectors of so many bytes; elements whatever their type (``items``); bytes;
-multiplications of a matrix product; elements of a matrix to the power of 1.5; length of the argument or
-result as text; mean of the logarithms of their lengths (``packed``: the search of a packer takes the time by
-what it reads, the coding by what it writes); values of a record."""
 
 ALIKE: Mapping[str, str] = {
     name: f"numpy.{entry}"
     for entry, names in {
         "exp": "log log2 log10 log1p expm1 exp2 tan arcsin arccos arctan sinh cosh tanh cbrt logaddexp",
         "add": "negative square conjugate sign floor_divide logical_and logical_or logical_not logical_xor "
-        "bitwise_and bitwise_or bitwise_xor invert left_shift right_shift isinf greater less equal not_equal "
-        "greater_equal less_equal fmax fmin rint ceil trunc reciprocal deg2rad rad2deg radians degrees",
+        "bitwise_and bitwise_or bitwise_xor invert left_shift right_shift "
+        "fmax fmin rint ceil trunc reciprocal deg2rad rad2deg radians degrees",
+        "less": "greater equal not_equal greater_equal less_equal isinf",
         "copy": "full arange tile repeat flip empty_like full_like ones_like flatten fill compress "
         "ascontiguousarray tobytes frombuffer triu tril diag pad",
-        "argsort": "lexsort partition argpartition searchsorted digitize histogram",
+        "argsort": "lexsort partition argpartition searchsorted digitize",
         "median": "percentile quantile nanmedian nanpercentile nanquantile",
         "mean": "bincount nanmean nansum nanmax nanmin nanstd average prod ptp trace cov",
         "ravel": "reshape transpose squeeze view swapaxes expand_dims moveaxis real imag item",
@@ -77,12 +76,13 @@ ALIKE: Mapping[str, str] = {
 
 
 class LibraryCall(BaseModel):
-    """Time of one function: ``points`` in ns by size."""
+    """Time of one function: ``points`` in ns by size, and ``each`` in ns by feature."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     size: str
     points: Mapping[int, float] = Field(min_length=1)
+    each: Mapping[str, float] = {}
 
     @field_validator("size")
     @classmethod
@@ -90,6 +90,27 @@ class LibraryCall(BaseModel):
         if size not in SIZES:
             raise ValueError(f"size {size!r}; there is {', '.join(SIZES)}")
         return size
+
+    @field_validator("each")
+    @classmethod
+    def _of_features(cls, each: Mapping[str, float]) -> Mapping[str, float]:
+        unknown = sorted(set(each) - set(FEATURES) - {WRAPPED})
+        if unknown:
+            raise ValueError(f"feature {unknown[0]!r}; there is {', '.join((*FEATURES, WRAPPED))}")
+        return each
+
+    def of_call(self, arguments: tuple[Any, ...], result: Any, wrapped: bool = False) -> float:
+        """Return the time of a call with these arguments and this result, ns.
+
+        Args:
+            arguments: Arguments; first the object if a method was called.
+            result: Result of the call.
+            wrapped: A function of the module was called, not a method.
+        """
+        time = self.nanoseconds(call_size(self.size, arguments, result))
+        for name, each in self.each.items():
+            time += each * (float(wrapped) if name == WRAPPED else call_feature(name, arguments, result))
+        return time
 
     def nanoseconds(self, size: float) -> float:
         """Return the time; beyond the last of several points it is proportional to the size."""
@@ -107,12 +128,16 @@ class LibraryCall(BaseModel):
 class LibraryTable(WithProvenance):
     """Times of calls by ``library.function``, ns, and the errors over programs that they were not fitted to.
 
-    ``numpy.*`` and its like is the entry of functions of the library that have none. ``in_context`` is the
-    factor between calls in programs and in loops, which is part of numpy's times.
+    ``numpy.*`` and its like is the entry of functions of the library that have none. ``in_context`` and
+    ``data_in_context`` are the factors between calls in programs and in loops, of the part that does not grow
+    with the size and of the rest; numpy's times contain them. ``page`` is the time of a page of memory that
+    is new to the program, ns.
     """
 
     machine: str
     in_context: float = 1.0
+    data_in_context: float = 1.0
+    page: float = 0.0
     programs: int
     mean_error: float
     worst_error: float
@@ -138,70 +163,6 @@ def library_table() -> LibraryTable:
     return LibraryTable.model_validate_json(text)
 
 
-def _array_elements(value: Any) -> int:
-    size = getattr(value, "size", None)
-    return size if isinstance(size, int) else 0
-
-
-def _words(value: Any) -> int:
-    """Return the elements of an array in units of 8 bytes, or of a list."""
-    size = getattr(value, "itemsize", 8)
-    return _elements(value) * (size if isinstance(size, int) else 8) // 8 or 1
-
-
-def _elements(value: Any) -> int:
-    """Return the elements of an array, or of a list of lists as their product."""
-    if isinstance(value, (list, tuple)) and value:
-        inner = value[0]
-        return len(value) * (len(inner) if isinstance(inner, (list, tuple)) else 1)
-    return max(_array_elements(value), 1)
-
-
-def _products(values: tuple[Any, ...]) -> float:
-    """Return the multiplications of a product of two arrays."""
-    if len(values) < 2:
-        return 1.0
-    shape = tuple(getattr(values[1], "shape", ()))
-    columns = float(shape[-1]) if len(shape) > 1 else 1.0
-    return max(_array_elements(values[0]) * columns, 1.0)
-
-
-def _text(values: tuple[Any, ...], result: Any) -> int:
-    return max(_lengths(values, result), default=1)
-
-
-def _lengths(values: tuple[Any, ...], result: Any) -> list[int]:
-    return [len(one) for one in (*values, result) if isinstance(one, (str, bytes, bytearray))]
-
-
-def _packed(values: tuple[Any, ...], result: Any) -> float:
-    lengths = _lengths(values, result) or [1]
-    return max(1.0, sqrt(max(lengths) * min(lengths)))
-
-
-def _fields(values: tuple[Any, ...], result: Any) -> int:
-    """Return the values of a record that is packed or unpacked."""
-    return max(len(values), len(result) if isinstance(result, tuple) else 1)
-
-
-def call_size(kind: str, arguments: tuple[Any, ...], result: Any) -> float:
-    """Return the size of a call. See ``SIZES``."""
-    values = (*arguments, result)
-    if kind in ("elements", "items"):
-        return float(max(map(_elements if kind == "items" else _words, values)))
-    return float(_SIZES[kind](arguments, result))
-
-
-_SIZES: Mapping[str, Callable[[tuple[Any, ...], Any], float]] = {
-    "products": lambda arguments, result: _products(arguments),
-    "cube": lambda arguments, result: max(map(_elements, arguments), default=1) ** 1.5,
-    "text": _text,
-    "packed": _packed,
-    "fields": _fields,
-    "bytes": lambda arguments, result: max(getattr(one, "nbytes", 0) for one in (*arguments, result)) or 1,
-}
-
-
 class LibraryCalls:
     """Adds the times of library calls to a cell of steps.
 
@@ -220,6 +181,7 @@ class LibraryCalls:
         self.unpriced: dict[str, int] = {}
         self._cell = cell
         self._calls = table.calls
+        self._page = table.page
         self.libraries = table.libraries
 
     def call(self, function: Any, /, *arguments: Any, **named: Any) -> Any:
@@ -231,8 +193,9 @@ class LibraryCalls:
         result = function(*arguments, **named)
         of_callbacks = self._cell[0] - before
         own = getattr(function, "__self__", None)
-        given = (own, *arguments) if own is not None and not isinstance(own, type(sys)) else arguments
-        self._add(name, given, result, of_callbacks)
+        method = own is not None and not isinstance(own, type(sys))
+        given = (own, *arguments) if method else arguments
+        self._add(name, given, result, of_callbacks, not method)
         return result
 
     def _name(self, function: Any) -> str:
@@ -248,7 +211,9 @@ class LibraryCalls:
             return ""
         return f"{top}.{getattr(function, '__name__', type(function).__name__)}"
 
-    def _add(self, name: str, arguments: tuple[Any, ...], result: Any, already: int = 0) -> None:
+    def _add(
+        self, name: str, arguments: tuple[Any, ...], result: Any, already: int = 0, wrapped: bool = False
+    ) -> None:
         library = name.partition(".")[0]
         entry = self._calls.get(name)
         if entry is None:
@@ -257,8 +222,8 @@ class LibraryCalls:
             entry = self._calls.get(like) or self._calls.get(f"{library}.*")
             if entry is None:
                 return
-        size = call_size(entry.size, arguments, result)
-        steps = max(0, round(STEPS_PER_NS * entry.nanoseconds(size)) - already)
+        time = entry.of_call(arguments, result, wrapped) + self._page * new_pages(result)
+        steps = max(0, round(STEPS_PER_NS * time) - already)
         self._cell[0] += steps
         self.steps[library] = self.steps.get(library, 0) + steps
 
@@ -280,7 +245,7 @@ class LibraryCalls:
                 self._add(_entry(_operator_entry(kind, value), target), (target, value), None)
         elif _is_numpy(target):
             if getattr(index, "shape", ()):
-                self._add("numpy.take", (index, value), None)
+                self._add(_picking(index, "putmask", "put"), (index, value), None)
             elif isinstance(index, slice) or (isinstance(index, tuple) and slice in map(type, index)):
                 self._add("numpy.copy", (target[index],), None)
             else:
@@ -303,13 +268,22 @@ class LibraryCalls:
             result = function(left, right)
             if _is_numpy(left) or _is_numpy(right):
                 if name == "Subscript":
-                    index = right if getattr(right, "shape", ()) else result
-                    self._add(_entry(key, result), (index,), result)
+                    picked = getattr(right, "shape", ())
+                    self._add(
+                        _picking(right) if picked else _entry(key, result),
+                        (right if picked else result,),
+                        result,
+                    )
                 else:
                     self._add(_entry(_operator_entry(name, right), result), (left, right), result)
             return result
 
         return operate
+
+
+def _picking(index: Any, of_mask: str = "mask", of_indices: str = "take") -> str:
+    """Return the entry of a subscript with an array: a mask, or indices."""
+    return f"numpy.{of_mask if index.dtype.kind == 'b' else of_indices}"
 
 
 def _operator_entry(name: str, right: Any) -> str:

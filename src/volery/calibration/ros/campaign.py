@@ -111,7 +111,17 @@ def _whole(lines: list[str]) -> Iterator[str]:
 def run_campaign(
     stage: ProbeSetup, plan: Plan, notebook: CampaignLog, show: Show = lambda progress: None
 ) -> None:
-    """Measure rounds until all figures are precise or the plan's greatest number is reached."""
+    """Measure rounds until all figures are precise or the plan's greatest number is reached.
+
+    Args:
+        stage: The graph with the peers of the probe.
+        plan: Numbers of rounds, precision and paces.
+        notebook: Where each round is kept; a campaign goes on after the rounds in it.
+        show: Called before each round.
+
+    Raises:
+        LinkError: A probe fails or does not end.
+    """
     while True:
         done = len(notebook.rounds)
         loose = uncertain_costs(notebook.rounds, plan.within) if done >= plan.least else ()

@@ -266,13 +266,13 @@ def libraries(
     Python's operations.
     """
     from volery.calibration.host_machine import this_machine
-    from volery.calibration.library_times import measure_table
+    from volery.calibration.library_times import TIMED_CALLS, measure_table
     from volery.calibration.timed_code import DEFAULT_ROUNDS
 
     machine = this_machine("")
     with _progress_bar(output, "calibrating libraries", "timing programs") as update:
         table = measure_table(
-            machine.description, DEFAULT_ROUNDS, lambda name, number: update(number, 800, name)
+            machine.description, DEFAULT_ROUNDS, lambda name, number: update(number, TIMED_CALLS, name)
         )
     try:
         file.write_text(table.as_text(), encoding="utf-8")

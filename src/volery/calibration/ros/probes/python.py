@@ -40,20 +40,41 @@ class Ends(NamedTuple):
 
 
 class Client(Protocol):
-    """Calls into a client library. ``spin_once`` is None where the library has none."""
+    """Calls into a client library that are measured."""
 
     @property
-    def spin_once(self) -> Callable[[], Any] | None: ...  # noqa: D102 - each is the library's own
-    def init(self) -> None: ...  # noqa: D102
-    def node_handle(self) -> None: ...  # noqa: D102
-    def advertise(self, topic: str) -> Ends: ...  # noqa: D102
-    def subscribe(self, topic: str) -> Ends: ...  # noqa: D102
-    def service_client(self) -> object: ...  # noqa: D102
-    def advertise_service(self) -> object: ...  # noqa: D102
-    def caller(self) -> Callable[[], Any]: ...  # noqa: D102
-    def serve(self) -> Callable[[], Any]: ...  # noqa: D102
-    def sleeper(self, seconds: float) -> Callable[[], Any]: ...  # noqa: D102
-    def wait(self, seconds: float) -> None: ...  # noqa: D102
+    def spin_once(self) -> Callable[[], Any] | None:
+        """Return the call that executes one callback, or None where the library has none."""
+
+    def init(self) -> None:
+        """Register with the library, as a program does at its start."""
+
+    def node_handle(self) -> None:
+        """Create the node, where that is a step of its own."""
+
+    def advertise(self, topic: str) -> Ends:
+        """Create a publisher of a short array of numbers."""
+
+    def subscribe(self, topic: str) -> Ends:
+        """Create a subscription whose callback counts messages."""
+
+    def service_client(self) -> object:
+        """Create a client of a service that does not exist."""
+
+    def advertise_service(self) -> object:
+        """Create a service that is not called."""
+
+    def caller(self) -> Callable[[], Any]:
+        """Return a function that calls the peers' service and waits for the response."""
+
+    def serve(self) -> Callable[[], Any]:
+        """Serve the peers' requests; return the function that ends it."""
+
+    def sleeper(self, seconds: float) -> Callable[[], Any]:
+        """Return a function that sleeps to the end of a period of so many seconds."""
+
+    def wait(self, seconds: float) -> None:
+        """Wait in the library's spin for so many seconds."""
 
 
 class Rospy:
