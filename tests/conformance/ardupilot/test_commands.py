@@ -173,7 +173,7 @@ def test_modes_show_the_recorded_bits(kind: str, bench: Any, facts: Any) -> None
     assert recorded <= seen
 
 
-OTHER_MODES = {"copter": (8, 10, 12, 13, 26, 27), "rover": (2, 6, 8, 9)}
+OTHER_MODES = {"copter": (8, 10, 12, 13, 26), "rover": (2, 6, 8, 9)}
 
 
 @pytest.mark.parametrize(

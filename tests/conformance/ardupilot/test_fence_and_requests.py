@@ -293,12 +293,13 @@ ON_THE_GROUND: list[tuple[str, tuple[float, ...], int]] = [
     ("a relay again and again", (182, 0, 3, 1), ACCEPTED),
     ("a servo again and again", (184, 9, 1700, 3, 1), ACCEPTED),
     ("a servo that is a motor", (184, 1, 1700, 3, 1), FAILED),
-    ("a motor test", (209, 1, 0, 5, 1), ACCEPTED),
-    ("a motor that is not there", (209, 9, 0, 5, 1), FAILED),
     ("calibration of the compass", (42424, 0, 1, 1), ACCEPTED),
     ("its end", (42426,), ACCEPTED),
     ("a place to look at", (201, 0, 0, 0, 0, LATITUDE, LONGITUDE, 0), ACCEPTED),
     ("no place on the globe", (201, 0, 0, 0, 0, 91.0, LONGITUDE, 0), FAILED),
+    ("a motor test", (209, 1, 0, 5, 1), ACCEPTED),
+    ("a motor that is not there: none turns", (209, 9, 0, 5, 1), ACCEPTED),
+    ("calibration while a motor is tested, which arms", (42424, 0, 1, 1), FAILED),
 ]
 
 
@@ -320,13 +321,17 @@ def test_nothing_is_tested_or_calibrated_in_the_air(bench: Any) -> None:
     assert rig.command(42424, 0, 1, 1) == FAILED
 
 
-def test_the_nose_follows_a_region_of_interest_until_it_is_cleared(bench: Any) -> None:
+def test_the_nose_follows_a_region_of_interest_until_another_target_or_its_end(bench: Any) -> None:
+    """As in the original, where each target returns to the usual heading, here that of the flight."""
     rig = bench()
     rig.airborne()
     assert rig.command(195, 0, 0, 0, 0, LATITUDE, LONGITUDE + 0.001, 0) == ACCEPTED
     rig.run(6.0)
     assert rig.vehicle.estimate.attitude[2] == pytest.approx(pi / 2, abs=0.05)
     rig.send("SET_POSITION_TARGET_LOCAL_NED", **TARGET, coordinate_frame=1, type_mask=3576, x=90.8, z=-10.0)
+    rig.run(6.0)
+    assert rig.vehicle.estimate.attitude[2] == pytest.approx(0.0, abs=0.05)
+    assert rig.command(195, 0, 0, 0, 0, LATITUDE, LONGITUDE + 0.001, 0) == ACCEPTED
     rig.run(25.0)
     assert rig.vehicle.estimate.attitude[2] == pytest.approx(3 * pi / 4, abs=0.1)
     assert rig.command(197) == ACCEPTED

@@ -165,6 +165,14 @@ def test_supported_parameters_exist_and_are_read_and_no_others_are() -> None:
     read |= {f"{modes}{position}" for modes in ("FLTMODE", "MODE") for position in range(1, 7)}
     read |= {*SOURCE_PARAMETERS, *COPTER_PARAMETERS, WHEEL_ENCODER}
     read |= {f"BTN_{part}{number}" for part in ("PIN", "FUNC", "OPTIONS") for number in range(1, 5)}
+    read |= {
+        f"SERVO{channel}_{part}"
+        for channel in range(1, 17)
+        for part in ("FUNCTION", "MIN", "TRIM", "MAX", "REVERSED")
+    }
+    read |= {f"RELAY{number}_{part}" for number in range(1, 7) for part in ("FUNCTION", "PIN", "DEFAULT")}
+    read |= {f"MNT1_{axis}_{end}" for axis in ("ROLL", "PITCH", "YAW") for end in ("MIN", "MAX")}
+    read |= {f"MNT1_{place}_{axis}" for place in ("RETRACT", "NEUTRAL") for axis in "XYZ"}
     stated = set(FIRMWARE.kinds["multirotor"].rules.parameters.supported) | set(
         FIRMWARE.kinds["rover"].rules.parameters.supported
     )

@@ -6,8 +6,6 @@ so that a flight whose log is never read costs next to nothing. Logs persist ove
 
 from __future__ import annotations
 
-from math import isfinite
-
 from volery.base.time import US
 from volery.simulation.autopilots.onboard_log import FlightLog, LogSample
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -67,8 +65,8 @@ class FlightRecorder:
             estimate.battery_amps,
             estimate.battery_used_mah,
             estimate.battery_left,
-            estimate.gps.fix_type,
-            estimate.gps.satellites,
-            estimate.gps.eph if isfinite(estimate.gps.eph) else 99.99,
+            estimate.fix_type,
+            estimate.satellites,
+            min(estimate.horizontal_dilution, 99.99),
             *estimate.geodetic,
         )

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from volery.base.frames import Vector
 from volery.base.time import Ns
@@ -116,8 +116,112 @@ class SwitchState:
     """Since when one of the two has kept the motors from turning."""
     overrides_denied: bool = False
     """Whether a switch denies the sticks of a ground station."""
+    satellites_ignored: bool = False
+    """Whether the chosen set of sources of the estimator has no satellites."""
+    mixed_steering: tuple[float, float] = (0.0, 0.0)
+    """Steering that the pilot adds to that of the controls, and the share that these lose, as last given."""
     read_from: tuple[list[int], int] | None = None
     """Pulse widths of all channels, and changes of parameters, that all of them were last read from."""
+
+
+@dataclass
+class SprayerState:
+    """Crop sprayer."""
+
+    running: bool = False
+    """Whether it may spray."""
+    tested: bool = False
+    """Whether the pump turns at rest."""
+    spraying: bool = False
+    changes_since: Ns = NEVER
+    """Since when the speed has been where it starts or stops to spray."""
+
+
+@dataclass
+class WinchState:
+    """Winch."""
+
+    action: int = 0
+    """WINCH_ACTIONS."""
+    started: bool = False
+    """Whether the first action has been taken."""
+    rate: float = 0.0
+    """Rate that is wanted [m/s], positive out, and the same with limited acceleration."""
+    limited_rate: float = 0.0
+    length: float = 0.0
+    """Line that is out [m], and the length that is wanted."""
+    target: float = 0.0
+    by_pilot: bool = False
+    pilot_pulse: int | None = None
+    """Pulse width [us] of the pilot's channel when it last counted."""
+
+
+@dataclass
+class MountState:
+    """Camera mount. Angles are roll, pitch and yaw [rad]; places are north, east, down [m]."""
+
+    present: bool | None = None
+    """Whether the vehicle has booted with a mount; ``None``: not known yet."""
+    mode: int = 0
+    """MAV_MOUNT_MODE."""
+    angles: Vector = (0.0, 0.0, 0.0)
+    """Target: roll and pitch about the horizon, yaw from the nose or from north."""
+    from_north: bool = False
+    rates: Vector | None = None
+    """Rates at which the target turns; ``None``: it has angles only."""
+    rates_from_north: bool = False
+    place: Vector | None = None
+    """Region of interest."""
+    follows: int = 0
+    """System whose positions it follows, and where that was last."""
+    followed: Vector | None = None
+    yaw_locked: bool = False
+    """Whether the pilot's yaw counts from north."""
+    pilot_pulses: list[int] = field(default_factory=lambda: [0, 0, 0])
+    """Pulse widths [us] of the pilot's channels when they last counted."""
+    controller: tuple[int, int] = (0, 0)
+    """System and component that are in control, for others to read."""
+    warned_at: Ns = NEVER
+
+
+@dataclass
+class CameraState:
+    """Camera."""
+
+    kind: int | None = None
+    """Type that the vehicle has booted with; ``None``: not known yet."""
+    pictures: int = 0
+    taken_at: Ns = NEVER
+    place: Vector | None = None
+    """Where the last picture was taken, or the distance to the next one counts from."""
+    pressed_until: Ns = NEVER
+    """Until when the servo presses the trigger."""
+    pending: bool = False
+    """Whether a picture came too early and is taken later."""
+    period: Ns = 0
+    left: int = 0
+    """Pictures that are still to be taken in that period; negative: without end."""
+    feedback: dict[str, Any] = field(default_factory=dict)
+    """Report of the last picture."""
+    has_components: bool = False
+    """Whether a component of the vehicle has been received that may be a camera."""
+
+
+@dataclass
+class MotorTestState:
+    """Test of motors on the ground."""
+
+    running: bool = False
+    motor: int = 0
+    """Number of the motor in the order of the test, from 1."""
+    motors_left: int = 1
+    """Motors that are tested yet, with this one."""
+    kind: int = 0
+    """MOTOR_TEST_THROTTLE_TYPE."""
+    value: float = 0.0
+    since: Ns = NEVER
+    period: Ns = 0
+    """Time for which each motor turns."""
 
 
 @dataclass
@@ -132,6 +236,14 @@ class OutputState:
     """Kind and number of the output that changes by itself."""
     repetitions: int = 0
     """Number of the last order to change an output repeatedly."""
+    functions: dict[int, int] = field(default_factory=dict)
+    """Function by channel, of the channels that have one, and the changes of parameters that it holds for."""
+    functions_at: int = -1
+    sprayer: SprayerState = field(default_factory=SprayerState)
+    winch: WinchState = field(default_factory=WinchState)
+    mount: MountState = field(default_factory=MountState)
+    camera: CameraState = field(default_factory=CameraState)
+    motor_test: MotorTestState = field(default_factory=MotorTestState)
 
 
 @dataclass
@@ -163,6 +275,22 @@ NO_LIMITS = GuidedLimits()
 
 
 @dataclass
+class LeadState:
+    """Another vehicle that this one may follow, as it last reported itself."""
+
+    system: int = 0
+    """System that was chosen where none is named."""
+    at: Ns = NEVER
+    """Time of the report [ns]."""
+    place: Vector = (0.0, 0.0, 0.0)
+    """North, east, down about the estimator's origin [m], as ``velocity`` [m/s]."""
+    velocity: Vector = (0.0, 0.0, 0.0)
+    heading: float = 0.0
+    """Clockwise from north [rad], and the time [ns] at which it was last reported."""
+    heading_at: Ns = NEVER
+
+
+@dataclass
 class GearState:
     """Landing gear, as its outputs were last set."""
 
@@ -174,6 +302,20 @@ class GearState:
     """Height above home [m], climb and landing at the last tick."""
     climbing: bool = False
     landing: bool = False
+
+
+@dataclass
+class VaneState:
+    """Turning into the wind."""
+
+    since: Ns = NEVER
+    """Since when [ns] the conditions have held."""
+    turning: bool = False
+    rate: float = 0.0
+    """Rate of the turn, clockwise [degrees/s]."""
+    heading: float = 0.0
+    """Heading that it has commanded, clockwise from north [rad], and the command before it."""
+    before: float | None = None
 
 
 @dataclass
@@ -195,6 +337,14 @@ class CommandedLimits:
     look_at: Vector | None = None
     """Region of interest that the nose follows, for firmwares that turn it: north, east, down [m]."""
     guided_limits: GuidedLimits = NO_LIMITS
+    backwards: bool = False
+    """Whether a rover drives to points backwards."""
+    vane: VaneState = field(default_factory=VaneState)
+
+    def forget_heading(self) -> None:
+        """Leave the heading to the target that is flown to."""
+        self.yaw = self.look_at = None
+        self.yaw_left = 0.0
 
     def forget_speeds(self) -> None:
         """Return to the firmware's own speeds."""
@@ -209,7 +359,7 @@ class FailsafeState:
     """Names of the failsafes whose condition is true."""
     station_last_ns: Ns = NEVER
     """Time of the last message of the ground station that controls the vehicle [ns]."""
-    simulated: tuple[float, float, float, float, float] = (0.0, 0.0, 1.0, 0.0, 180.0)
+    simulated: tuple[float, float, float, float, float, float] = (0.0, 0.0, 1.0, 0.0, 180.0, 12.6)
     """Values of the parameters that inject faults, as they were last applied."""
     simulated_at: int = -1
     """Changes of parameters when these were last compared."""

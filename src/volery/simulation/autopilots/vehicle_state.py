@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 from math import hypot
 from typing import Any, NamedTuple
 
+from mypy_extensions import mypyc_attr
+
 from volery.base.frames import Vector
 from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Action, Kernel
@@ -32,12 +34,14 @@ from volery.simulation.autopilots.state_groups import (
     GearState,
     GroundState,
     Home,
+    LeadState,
     OutputState,
     ReportState,
     SwitchState,
 )
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Manoeuvre:
     """One way of flying or driving.
 
@@ -49,20 +53,16 @@ class Manoeuvre:
         vehicle: The vehicle that is flown.
     """
 
-    landing: bool = False
-    """Whether it descends to land."""
-
-    taking_off: bool = False
-    """Whether it climbs from the ground to a commanded height."""
-
-    slow_start: bool = False
-    """Whether the motors come up slowly."""
-
-    target: Vector | None = None
-    """Its destination, north, east, down about the estimator's origin [m]; ``None``: it has none."""
-
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
+        self.landing = False
+        """Whether it descends to land."""
+        self.taking_off = False
+        """Whether it climbs from the ground to a commanded height."""
+        self.slow_start = False
+        """Whether the motors come up slowly."""
+        self.target: Vector | None = None
+        """Its destination, north, east, down about the estimator's origin [m]; ``None``: it has none."""
 
     @property
     def flown(self) -> Manoeuvre:
@@ -262,6 +262,7 @@ class Vehicle:
         self.commanded = CommandedLimits()
         self.outputs = OutputState()
         self.gear = GearState()
+        self.lead = LeadState()
         self.buttons = ButtonState()
         self.switches = SwitchState()
         self.failsafes = FailsafeState()

@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import NamedTuple
 
+from volery.simulation.autopilots.ardupilot.camera import picture_by_switch
+from volery.simulation.autopilots.ardupilot.estimator_sources import SOURCES_OPTION, switch_sources
 from volery.simulation.autopilots.ardupilot.fence import enable_fence
 from volery.simulation.autopilots.ardupilot.landing_gear import switch_gear
 from volery.simulation.autopilots.ardupilot.mission import mission_grew
@@ -22,8 +24,12 @@ from volery.simulation.autopilots.ardupilot.modes import (
     change_mode,
     disarm,
 )
+from volery.simulation.autopilots.ardupilot.mount import PILOT_PITCH, PILOT_ROLL, PILOT_YAW
+from volery.simulation.autopilots.ardupilot.mount_control import lock_by_switch, retract_by_switch
 from volery.simulation.autopilots.ardupilot.payload import GRAB, LET_GO, move_gripper, set_relay
 from volery.simulation.autopilots.ardupilot.pilot_input import HIGHEST, LOWEST, sticks_moved
+from volery.simulation.autopilots.ardupilot.sprayer import switch_sprayer
+from volery.simulation.autopilots.ardupilot.winch import CONTROL, switch_winch
 from volery.simulation.autopilots.manoeuvres.zigzag import ZigZag
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED, Command
 from volery.simulation.autopilots.onboard_mission import GLOBAL, LAND, TAKEOFF, WAYPOINT, MissionItem
@@ -200,6 +206,10 @@ def _save_waypoint(vehicle: Vehicle, position: int) -> None:
     mission_grew(vehicle, len(vehicle.mission))
 
 
+def _leave_to_channel(_vehicle: Vehicle, _position: int) -> None:
+    """Do nothing: the pulse width of the channel counts, not its position as a switch."""
+
+
 def _zigzag(vehicle: Vehicle, position: int) -> None:
     """Store point A (down) or B (up) of ZIGZAG or fly to its line; in the middle the pilot flies."""
     manoeuvre = vehicle.manoeuvre
@@ -218,15 +228,23 @@ def _item_here(vehicle: Vehicle, command: int) -> MissionItem:
 
 FUNCTIONS: Mapping[int, Callable[[Vehicle, int], None]] = {
     7: _save_waypoint,
+    9: picture_by_switch,
     11: _fence,
+    15: switch_sprayer,
     19: _gripper,
     24: _restart_mission,
+    27: retract_by_switch,
     29: switch_gear,
     EMERGENCY_STOP: _emergency_stop,
+    SOURCES_OPTION: switch_sources,
     INTERLOCK: _interlock,
+    44: switch_winch,
+    CONTROL: _leave_to_channel,
     46: _overrides,
     58: _clear_mission,
     61: _zigzag,
+    163: lock_by_switch,
+    **dict.fromkeys((PILOT_ROLL, PILOT_PITCH, PILOT_YAW), _leave_to_channel),
     **{option: partial(_relay, number=number) for number, option in enumerate(RELAY_OPTIONS)},
 }
 """RCn_OPTION to what its switch does at a position, but modes, arming and disarming."""

@@ -11,6 +11,7 @@ from functools import partial
 
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.modes import INFO, update_prearm_state
+from volery.simulation.autopilots.ardupilot.payload import relays_at_boot
 from volery.simulation.autopilots.autopilot import BootEvent
 from volery.simulation.autopilots.mavlink.firmware import BootBytes
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
@@ -158,6 +159,7 @@ def copter_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
         ),
         texts_event(0.16, "Calibrating barometer"),
         announcement_event(0.16, "MNT1_TYPE", "CAM1_TYPE", "BARO_ALT_OFFSET"),
+        action_event(1.75, relays_at_boot),
         texts_event(1.75, "Barometer 1 calibration complete", "Barometer 2 calibration complete"),
         measurement_event(1.75, (("BARO1_GND_PRESS", 94502.516), ("BARO2_GND_PRESS", 94502.242))),
         announcement_event(1.75, *_IDS),
@@ -185,7 +187,7 @@ def rover_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
         texts_event(0.01, "Calibrating barometer"),
         announcement_event(0.01, "BARO_ALT_OFFSET"),
         texts_event(1.73, "Barometer 1 calibration complete", "Barometer 2 calibration complete"),
-        measurement_event(1.73, (("SIM_PIN_MASK", 125), ("SIM_PIN_MASK", 121))),
+        action_event(1.73, relays_at_boot),
         texts_event(1.73, "Beginning INS calibration. Do not move vehicle"),
         measurement_event(1.73, (("BARO1_GND_PRESS", 94503.914), ("BARO2_GND_PRESS", 94503.42))),
         announcement_event(1.73, "RELAY1_FUNCTION", "RELAY2_FUNCTION", "MNT1_TYPE", "CAM1_TYPE"),

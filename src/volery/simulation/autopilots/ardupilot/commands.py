@@ -9,6 +9,8 @@ from math import isfinite, isnan, pi, radians
 from volery.base.frames import wrap
 from volery.simulation.autopilots.ardupilot import payload
 from volery.simulation.autopilots.ardupilot.battery import on_battery_reset
+from volery.simulation.autopilots.ardupilot.camera import CAMERA_COMMANDS
+from volery.simulation.autopilots.ardupilot.estimator_sources import SET_SOURCES, on_set_sources
 from volery.simulation.autopilots.ardupilot.fence import fence_admits, on_fence_enable
 from volery.simulation.autopilots.ardupilot.landing_gear import on_airframe_configuration
 from volery.simulation.autopilots.ardupilot.modes import (
@@ -21,6 +23,11 @@ from volery.simulation.autopilots.ardupilot.modes import (
     disarm,
     set_mode,
 )
+from volery.simulation.autopilots.ardupilot.motor_test import MOTOR_TEST, on_copter_test, on_rover_test
+from volery.simulation.autopilots.ardupilot.mount import point_at
+from volery.simulation.autopilots.ardupilot.mount_control import MOUNT_COMMANDS
+from volery.simulation.autopilots.ardupilot.sprayer import DO_SPRAYER, on_sprayer
+from volery.simulation.autopilots.ardupilot.winch import DO_WINCH, on_winch
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
@@ -36,14 +43,21 @@ from volery.simulation.autopilots.mavlink.messages import (
     Handler,
     all_within,
 )
-from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE, JUMP_TAG, MissionItem
+from volery.simulation.autopilots.onboard_mission import (
+    GLOBAL,
+    GLOBAL_RELATIVE,
+    JUMP_TAG,
+    LAND_START,
+    MissionItem,
+)
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 LOITER_UNLIMITED, RETURN, LAND, TAKEOFF = 17, 20, 21, 22
 CONDITION_YAW, DO_SET_MODE, CHANGE_SPEED, SET_HOME = 115, 176, 178, 179
 FLIGHT_TERMINATION, REPOSITION, PAUSE_CONTINUE, SET_YAW_SPEED, SET_MISSION_CURRENT = 185, 192, 193, 213, 224
+SET_REVERSE = 194
 REPEAT_RELAY, REPEAT_SERVO, FENCE_ENABLE, RUN_PREARM_CHECKS = 182, 184, 207, 401
-ROI_LOCATION, ROI_NONE, ROI, MOTOR_TEST = 195, 197, 201, 209
+ROI_LOCATION, ROI_NONE, ROI = 195, 197, 201
 START_MAG_CAL, ACCEPT_MAG_CAL, CANCEL_MAG_CAL = 42424, 42425, 42426
 BATTERY_RESET, VTOL_LAND, JUMP_TO_TAG, AIRFRAME_CONFIGURATION = 42651, 85, 601, 2520
 CALIBRATION, STORAGE, REBOOT, MISSION_START, ARM_DISARM, GET_HOME = 241, 245, 246, 300, 400, 410
@@ -53,8 +67,6 @@ HIGHEST = 83_000.0
 
 FARTHEST_POINT = 2.1e7
 """Largest distance of a target that is flown towards [m]: any point of the globe."""
-
-MOTORS = 4
 
 Problems = Callable[[Vehicle], list[str]]
 
@@ -272,6 +284,12 @@ def on_set_yaw_speed(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
+def on_reverse(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_SET_REVERSE of a rover: 1 drives to points backwards, until the mode changes."""
+    vehicle.commanded.backwards = command.param1 == 1.0
+    return ACCEPTED
+
+
 def on_termination(vehicle: Vehicle, command: Command, words: str) -> int:
     """Handle DO_FLIGHTTERMINATION: stop the motors, also in flight."""
     return disarm(vehicle, words, force=True) if command.param1 > 0.5 else FAILED
@@ -340,22 +358,14 @@ def on_prearm_checks(vehicle: Vehicle, _command: Command, problems: Problems) ->
 
 
 def on_region(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_SET_ROI and its two forms: without a mount the nose turns to the place."""
+    """Handle DO_SET_ROI and its two forms: without a mount that pans, the nose turns to the place."""
     if command.number == ROI_NONE or (command.x == 0.0 and command.y == 0.0):
-        vehicle.commanded.look_at = None
+        point_at(vehicle, None)
         return ACCEPTED
     if not _is_place(command):
         return FAILED
-    vehicle.commanded.look_at = vehicle.point(command.frame, command.x, command.y, command.z)
+    point_at(vehicle, vehicle.point(command.frame, command.x, command.y, command.z))
     return ACCEPTED
-
-
-def on_motor_test(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_MOTOR_TEST: only on the ground and disarmed; the test does not move anything."""
-    if vehicle.armed or not vehicle.landed:
-        vehicle.send_text(CRITICAL, "Motor Test: vehicle not landed")
-        return FAILED
-    return ACCEPTED if 1.0 <= command.param1 <= MOTORS else FAILED
 
 
 def shared_commands(
@@ -390,13 +400,16 @@ def shared_commands(
         ROI: on_region,
         ROI_LOCATION: on_region,
         ROI_NONE: on_region,
-        MOTOR_TEST: on_motor_test,
+        **MOUNT_COMMANDS,
+        **CAMERA_COMMANDS,
         payload.GRIPPER: payload.on_gripper,
+        DO_SPRAYER: on_sprayer,
         START_MAG_CAL: on_calibration,
         ACCEPT_MAG_CAL: on_calibration,
         CANCEL_MAG_CAL: on_calibration,
         FENCE_ENABLE: on_fence_enable,
         BATTERY_RESET: on_battery_reset,
+        SET_SOURCES: on_set_sources,
         JUMP_TO_TAG: on_jump_to_tag,
     }
 
@@ -412,9 +425,12 @@ def copter_commands(
         VTOL_LAND: to_mode(modes["LAND"]),
         RETURN: to_mode(modes["RTL"]),
         LOITER_UNLIMITED: to_mode(modes["LOITER"]),
+        LAND_START: to_mode(modes["AUTO_RTL"]),
         CONDITION_YAW: on_condition_yaw,
         PAUSE_CONTINUE: on_pause,
         AIRFRAME_CONFIGURATION: on_airframe_configuration,
+        DO_WINCH: on_winch,
+        MOTOR_TEST: on_copter_test,
     }
 
 
@@ -426,4 +442,6 @@ def rover_commands(
         **shared_commands(problems, prearm, words, modes["GUIDED"]),
         RETURN: to_mode(modes["RTL"]),
         SET_YAW_SPEED: on_set_yaw_speed,
+        SET_REVERSE: on_reverse,
+        MOTOR_TEST: partial(on_rover_test, problems=problems, words=words),
     }

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from functools import cache, partial
 from math import acos, cos, degrees, hypot, radians, sin
+from typing import Any
 
 from volery.base.frames import Vector
 from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, AuxiliaryFunctions
 from volery.simulation.autopilots.ardupilot.buttons import read_buttons
+from volery.simulation.autopilots.ardupilot.camera import update_camera
 from volery.simulation.autopilots.ardupilot.failsafes import (
     COPTER_FAILSAFES,
     radio_never_received,
@@ -23,8 +25,10 @@ from volery.simulation.autopilots.ardupilot.firmware import (
     send_version,
     streams,
 )
+from volery.simulation.autopilots.ardupilot.follow import Follow, on_position, on_target
 from volery.simulation.autopilots.ardupilot.guided import copter_attitude, copter_global, copter_local
 from volery.simulation.autopilots.ardupilot.landing_gear import watch_gear
+from volery.simulation.autopilots.ardupilot.landing_sequence import leave_sequence
 from volery.simulation.autopilots.ardupilot.modes import (
     COPTER_DISARMED,
     CUSTOM,
@@ -41,9 +45,14 @@ from volery.simulation.autopilots.ardupilot.modes import (
     in_position_modes,
     mode_not_armable,
 )
+from volery.simulation.autopilots.ardupilot.motor_test import turn_tested_motor
+from volery.simulation.autopilots.ardupilot.mount import update_mount
+from volery.simulation.autopilots.ardupilot.mount_control import on_other_position
 from volery.simulation.autopilots.ardupilot.parameter_checks import copter_problems
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED, copter_tuning
 from volery.simulation.autopilots.ardupilot.rally import return_point
+from volery.simulation.autopilots.ardupilot.servo_outputs import pass_transmitter_through
+from volery.simulation.autopilots.ardupilot.sprayer import update_sprayer
 from volery.simulation.autopilots.ardupilot.telemetry import (
     ACTIVE,
     CRITICAL,
@@ -52,6 +61,8 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
     Z_CONTROL,
     Health,
 )
+from volery.simulation.autopilots.ardupilot.weathervane import turn_into_wind
+from volery.simulation.autopilots.ardupilot.winch import no_servo, update_winch
 from volery.simulation.autopilots.autopilot import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, GuidedAttitude
@@ -102,7 +113,23 @@ ARMING_TEXTS = ("Arming motors", COPTER_DISARMED)
 LANDED_TO_DISARM = 200 * MS
 """Recorded: disarming 2.07 s after touch-down, most of it in the landed detector."""
 RUDDER_HOLD = 2 * S
-OPTION_MODES = {4: 6, 16: 3, 18: 9, 33: 17, 42: 21, 52: 1, 55: 4, 56: 5, 68: 0, 69: 16, 70: 2, 72: 7, 73: 11}
+OPTION_MODES = {
+    4: 6,
+    16: 3,
+    18: 9,
+    33: 17,
+    42: 21,
+    52: 1,
+    55: 4,
+    56: 5,
+    57: 23,
+    68: 0,
+    69: 16,
+    70: 2,
+    72: 7,
+    73: 11,
+    99: 27,
+}
 """RCn_OPTION to the number of the mode that its switch enters."""
 ALIGNS_ABOVE = 2.5
 """Height of the in-flight yaw alignment [m]."""
@@ -115,6 +142,16 @@ MODES = {
         Mode(
             3,
             "AUTO",
+            AUTO_BITS,
+            lambda vehicle: FlyMission(vehicle, mission.leg_of_copter, COPTER_MISSION, mission.leaves_ground),
+            LEVEL_AND_HEIGHT,
+            needs_position=True,
+            armable=False,
+            starts_high=True,
+        ),
+        Mode(
+            27,
+            "AUTO_RTL",
             AUTO_BITS,
             lambda vehicle: FlyMission(vehicle, mission.leg_of_copter, COPTER_MISSION, mission.leaves_ground),
             LEVEL_AND_HEIGHT,
@@ -151,6 +188,7 @@ MODES = {
         Mode(19, "AVOID_ADSB", AUTO_BITS, Guided, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
         Mode(20, "GUIDED_NOGPS", MANUAL_BITS, GuidedAttitude, Z_CONTROL, starts_high=True),
         Mode(21, "SMART_RTL", AUTO_BITS, ReturnAlongTrack, LEVEL_AND_HEIGHT, True, armable=False),
+        Mode(23, "FOLLOW", AUTO_BITS, Follow, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
         Mode(24, "ZIGZAG", AUTO_BITS, ZigZag, LEVEL_AND_HEIGHT, needs_position=True, pilot=True),
         Mode(17, "BRAKE", AUTO_BITS, Brake, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
     )
@@ -168,6 +206,7 @@ CHECKS = (
     Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
     Check("RC not found", radio_never_received),
     Check("Throttle below failsafe", radio_too_low),
+    Check("winch unhealthy", no_servo),
     *SHARED_CHECKS,
     *FENCE_CHECKS,
     *STOP_CHECKS,
@@ -227,11 +266,18 @@ def on_step(vehicle: Vehicle) -> None:
         pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
         AUXILIARY.read_switches(vehicle)
     read_buttons(vehicle, AUXILIARY)
+    pass_transmitter_through(vehicle)
+    update_sprayer(vehicle)
+    update_camera(vehicle)
+    update_mount(vehicle, COPTER.periodic.tick)
+    update_winch(vehicle, COPTER.periodic.tick)
     watch_gear(vehicle)
+    leave_sequence(vehicle)
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_copter)
     commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))
-    if not vehicle.armed:
+    turn_into_wind(vehicle, COPTER.periodic.tick)
+    if turn_tested_motor(vehicle) or not vehicle.armed:
         return
     _disarm_stopped_motors(vehicle)
     if not vehicle.landed:
@@ -345,6 +391,12 @@ def parameters() -> tuple[Parameter, ...]:
     return load("volery.simulation.autopilots.ardupilot", "data/copter.parameters")
 
 
+def _on_other_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
+    """Handle GLOBAL_POSITION_INT of another system, which the copter or its mount may follow."""
+    on_position(vehicle, fields, sender)
+    on_other_position(vehicle, fields, sender)
+
+
 _MAVLINK = ardupilot_mavlink(
     start=LinkStart(
         boot_bytes=boot.bytes_at(
@@ -370,6 +422,8 @@ _MAVLINK = ardupilot_mavlink(
         DO_AUX_FUNCTION: AUXILIARY.on_command,
     },
     handlers={
+        "FOLLOW_TARGET": on_target,
+        "GLOBAL_POSITION_INT": _on_other_position,
         "SET_ATTITUDE_TARGET": copter_attitude,
         "SET_POSITION_TARGET_GLOBAL_INT": copter_global,
         "SET_POSITION_TARGET_LOCAL_NED": copter_local,

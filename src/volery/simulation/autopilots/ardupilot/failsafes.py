@@ -7,6 +7,7 @@ from functools import partial
 
 from volery.base.time import S, from_seconds
 from volery.simulation.autopilots.ardupilot.battery import left_mah, used_mah
+from volery.simulation.autopilots.ardupilot.landing_sequence import AUTO_RTL
 from volery.simulation.autopilots.ardupilot.modes import (
     COPTER_DISARMED,
     CRITICAL,
@@ -29,13 +30,15 @@ def station_lost(vehicle: Vehicle) -> bool:
     """Return whether a ground station that was received is silent for longer than FS_GCS_TIMEOUT."""
     if vehicle.parameters["FS_GCS_ENABLE"] == 0.0 or vehicle.failsafes.station_last_ns == NEVER:
         return False
+    if vehicle.outputs.motor_test.running:
+        return False
     silence = vehicle.kernel.now() - vehicle.failsafes.station_last_ns
     return silence > from_seconds(vehicle.parameters["FS_GCS_TIMEOUT"])
 
 
 def radio_lost(vehicle: Vehicle) -> bool:
     """Return whether the throttle channel is below FS_THR_VALUE."""
-    if vehicle.parameters["FS_THR_ENABLE"] == 0.0:
+    if vehicle.parameters["FS_THR_ENABLE"] == 0.0 or vehicle.outputs.motor_test.running:
         return False
     return vehicle.rc[vehicle.tuning.sticks.throttle] < vehicle.parameters["FS_THR_VALUE"]
 
@@ -107,21 +110,30 @@ STATION_ACTIONS = {
     3: (SMART_RTL, RTL, LAND),
     4: (SMART_RTL, LAND),
     5: (LAND,),
+    6: (AUTO_RTL, RTL, LAND),
     7: (BRAKE, LAND),
 }
 """FS_GCS_ENABLE to the modes that are tried in order; all other values: RTL, LAND."""
-RADIO_ACTIONS = {1: (RTL, LAND), 2: (RTL, LAND), 4: (SMART_RTL, RTL, LAND), 5: (SMART_RTL, LAND)}
+RADIO_ACTIONS = {
+    1: (RTL, LAND),
+    2: (RTL, LAND),
+    4: (SMART_RTL, RTL, LAND),
+    5: (SMART_RTL, LAND),
+    6: (AUTO_RTL, RTL, LAND),
+    7: (BRAKE, LAND),
+}
 """The same for FS_THR_ENABLE; all other values: LAND."""
 BATTERY_ACTIONS = {
     1: (LAND,),
     2: (RTL, LAND),
     3: (SMART_RTL, RTL, LAND),
     4: (SMART_RTL, LAND),
+    6: (AUTO_RTL, RTL, LAND),
     7: (BRAKE, LAND),
 }
 """The same for BATT_FS_LOW_ACT and BATT_FS_CRT_ACT."""
-DISARM_ACTION = 5
-"""Value of BATT_FS_LOW_ACT and BATT_FS_CRT_ACT, and of a rover's FS_ACTION, that disarms."""
+LAND_ACTION, DISARM_ACTION = 1, 5
+"""Values of BATT_FS_LOW_ACT and BATT_FS_CRT_ACT; a rover's FS_ACTION 5 disarms, too."""
 
 
 def _on_station_lost(vehicle: Vehicle) -> None:
@@ -176,6 +188,8 @@ def _respond(vehicle: Vehicle, what: str, modes: tuple[int, ...], exception: str
     elif vehicle.landed and not mission_started:
         vehicle.send_text(WARNING, f"{what} Failsafe - Disarming")
         disarm(vehicle, COPTER_DISARMED, force=True)
+    elif manoeuvre.landing and what != "Battery" and _battery_lands(vehicle):
+        vehicle.send_text(WARNING, f"{what} + Battery Failsafe - Continuing Landing")
     elif manoeuvre.landing and round(vehicle.parameters["FS_OPTIONS"]) & CONTINUE_LANDING:
         vehicle.send_text(WARNING, f"{what} Failsafe - Continuing Landing")
     elif exception:
@@ -183,6 +197,15 @@ def _respond(vehicle: Vehicle, what: str, modes: tuple[int, ...], exception: str
     else:
         _enter_first(vehicle, modes)
         vehicle.send_text(WARNING, f"{what} Failsafe")
+
+
+def _battery_lands(vehicle: Vehicle) -> bool:
+    """Return whether the battery is at a level at which it must land: no other failsafe ends that landing."""
+    actions = {"battery low": "BATT_FS_LOW_ACT", "battery critical": "BATT_FS_CRT_ACT"}
+    reached = (
+        vehicle.parameters[name] for level, name in actions.items() if level in vehicle.failsafes.active
+    )
+    return any(action in (LAND_ACTION, DISARM_ACTION) for action in reached)
 
 
 def _on_estimator_lost(vehicle: Vehicle) -> None:

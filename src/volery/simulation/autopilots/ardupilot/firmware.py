@@ -11,10 +11,12 @@ from typing import Any
 
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.ardupilot import (
+    camera,
     dataflash,
     fence_points,
     files,
     mission,
+    mount_control,
     payload,
     pilot_input,
     rally,
@@ -23,6 +25,7 @@ from volery.simulation.autopilots.ardupilot import (
 from volery.simulation.autopilots.ardupilot.commands import go_to_item
 from volery.simulation.autopilots.ardupilot.fence import fence_status
 from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
+from volery.simulation.autopilots.ardupilot.mount import attitude_status
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED
 from volery.simulation.autopilots.ardupilot.telemetry import Health
 from volery.simulation.autopilots.flight_stack.flight import Flight
@@ -91,12 +94,16 @@ BUILDERS: Mapping[str, Builder] = {
     "ATTITUDE": messages.attitude,
     "ATTITUDE_QUATERNION": messages.attitude_quaternion,
     "BATTERY_STATUS": telemetry.battery_status,
+    "CAMERA_FEEDBACK": camera.feedback,
     "DISTANCE_SENSOR": telemetry.distance_sensor,
     "EKF_STATUS_REPORT": telemetry.ekf_status,
     "FENCE_STATUS": fence_status,
     "EXTENDED_SYS_STATE": telemetry.extended_sys_state,
     "GLOBAL_POSITION_INT": telemetry.global_position,
     "GPS_GLOBAL_ORIGIN": telemetry.origin,
+    "GIMBAL_DEVICE_ATTITUDE_STATUS": attitude_status,
+    "GIMBAL_MANAGER_INFORMATION": mount_control.manager_information,
+    "GIMBAL_MANAGER_STATUS": mount_control.manager_status,
     "GPS_RAW_INT": telemetry.gps_raw,
     "HOME_POSITION": telemetry.home_position,
     "LOCAL_POSITION_NED": telemetry.local_position,
@@ -124,10 +131,8 @@ BUILDERS: Mapping[str, Builder] = {
         (
             "ADSB_VEHICLE",
             "AOA_SSA",
-            "CAMERA_FEEDBACK",
             "EFI_STATUS",
             "GENERATOR_STATUS",
-            "GIMBAL_DEVICE_ATTITUDE_STATUS",
             "GPS2_RAW",
             "GPS2_RTK",
             "GPS_RTK",
@@ -183,6 +188,7 @@ ORDER: Sequence[str] = (
     "POSITION_TARGET_GLOBAL_INT",
     "POSITION_TARGET_LOCAL_NED",
     "BATTERY_STATUS",
+    "GIMBAL_DEVICE_ATTITUDE_STATUS",
     "ESC_TELEMETRY_1_TO_4",
     "EXTENDED_SYS_STATE",
 )
@@ -221,6 +227,7 @@ def streams(controller: Sequence[str], extra: Sequence[str]) -> dict[int, tuple[
             "EKF_STATUS_REPORT",
             "VIBRATION",
             "BATTERY_STATUS",
+            "GIMBAL_DEVICE_ATTITUDE_STATUS",
             *extra,
         ),
     }
@@ -274,9 +281,19 @@ def builders(
     }
 
 
+def on_heartbeat(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
+    """Handle HEARTBEAT of a ground station and of components."""
+    pilot_input.on_heartbeat(vehicle, fields, sender)
+    camera.on_component(vehicle, sender)
+
+
 MESSAGE_HANDLERS = {
-    "HEARTBEAT": pilot_input.on_heartbeat,
+    "DIGICAM_CONTROL": camera.on_digicam_message,
+    "HEARTBEAT": on_heartbeat,
     "FENCE_POINT": fence_points.on_fence_point,
+    "GLOBAL_POSITION_INT": mount_control.on_other_position,
+    "MOUNT_CONFIGURE": mount_control.on_mount_configure_message,
+    "MOUNT_CONTROL": mount_control.on_mount_control_message,
     "RALLY_POINT": rally.on_rally_point,
     "MANUAL_CONTROL": pilot_input.on_manual_control,
     "RC_CHANNELS_OVERRIDE": pilot_input.on_override,
@@ -320,6 +337,7 @@ def ardupilot_mavlink(
             set_mode_ack=11,
             questions=questions(messages["AUTOPILOT_VERSION"]),
             accepts=accepts,
+            nan_commands=frozenset({mount_control.GIMBAL_PITCHYAW}),
         ),
         missions=MissionPolicy(
             runs=mission.runs,

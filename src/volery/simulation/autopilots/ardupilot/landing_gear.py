@@ -8,12 +8,12 @@ change with it: only the outputs do. Pins that sense the gear are not simulated.
 from __future__ import annotations
 
 from volery.simulation.autopilots.ardupilot.modes import INFO
+from volery.simulation.autopilots.ardupilot.servo_outputs import channels, move
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, Command
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 GEAR_OUTPUT = 29
 """SERVOn_FUNCTION."""
-OUTPUTS = range(1, 17)
 STARTS_RETRACTED, STARTS_DEPLOYED = 1, 2
 """LGR_STARTUP."""
 RETRACTS_AFTER_TAKEOFF, DEPLOYS_FOR_LANDING = 1, 2
@@ -23,20 +23,13 @@ RETRACT = 1
 CLIMBS_BY_ITSELF = ("AUTO", "GUIDED")
 
 
-def _outputs(vehicle: Vehicle) -> list[int]:
-    return [n for n in OUTPUTS if vehicle.parameters[f"SERVO{n}_FUNCTION"] == GEAR_OUTPUT]
-
-
 def move_gear(vehicle: Vehicle, deploy: bool) -> None:
     """Deploy or retract, if LGR_ENABLE allows: outputs go to their upper or lower end."""
     parameters, gear = vehicle.parameters, vehicle.gear
     if not parameters["LGR_ENABLE"]:
         return
-    outputs = _outputs(vehicle)
-    for number in outputs:
-        upper = deploy != bool(parameters[f"SERVO{number}_REVERSED"])
-        vehicle.outputs.servos[number] = round(parameters[f"SERVO{number}_{'MAX' if upper else 'MIN'}"])
-    if outputs and not (deploy and gear.deployed):
+    move(vehicle, GEAR_OUTPUT, float(deploy))
+    if channels(vehicle, GEAR_OUTPUT) and not (deploy and gear.deployed):
         vehicle.send_text(INFO, f"LandingGear: {'DEPLOY' if deploy else 'RETRACT'}")
     gear.deployed = deploy
 
@@ -81,7 +74,7 @@ def _at_heights(vehicle: Vehicle) -> None:
     lower, upper = vehicle.parameters["LGR_DEPLOY_ALT"], vehicle.parameters["LGR_RETRACT_ALT"]
     height, before = max(0, int(vehicle.height)), gear.height
     gear.height = height
-    if not vehicle.armed or not _outputs(vehicle):
+    if not vehicle.armed or not channels(vehicle, GEAR_OUTPUT):
         return
     if gear.deployed is not True and lower > 0 and height <= lower < before:
         move_gear(vehicle, deploy=True)

@@ -6,10 +6,20 @@ from collections.abc import Callable, Mapping
 from math import isinf, isnan
 
 from volery.base.time import to_seconds
-from volery.simulation.autopilots.ardupilot.commands import HIGHEST, change_speed, turn_to
+from volery.simulation.autopilots.ardupilot.camera import DIGICAM_CONTROL, TRIGGER_DISTANCE, act_on_camera
+from volery.simulation.autopilots.ardupilot.commands import HIGHEST, SET_REVERSE, change_speed, turn_to
 from volery.simulation.autopilots.ardupilot.guided_items import copter_guided_leg, set_limits
-from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, INFO, NOTICE, change_mode, disarm
+from volery.simulation.autopilots.ardupilot.modes import (
+    COPTER_DISARMED,
+    INFO,
+    MISSION_MODES,
+    NOTICE,
+    change_mode,
+    disarm,
+)
 from volery.simulation.autopilots.ardupilot.payload import GRIPPER, SET_RELAY, SET_SERVO, act_on_payload
+from volery.simulation.autopilots.ardupilot.sprayer import DO_SPRAYER, act_on_sprayer
+from volery.simulation.autopilots.ardupilot.winch import DO_WINCH, act_on_winch
 from volery.simulation.autopilots.manoeuvres.manual_flight import HoldPlace
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Leg, MissionRules, copter_leg
 from volery.simulation.autopilots.manoeuvres.rover_driving import Stand
@@ -71,14 +81,19 @@ NAMES = {
     SET_RELAY: "SetRelay",
     SET_SERVO: "SetServo",
     GRIPPER: "Gripper",
+    DO_SPRAYER: "Sprayer",
+    DO_WINCH: "Winch",
+    SET_REVERSE: "SetReverse",
+    DIGICAM_CONTROL: "DigiCamCtrl",
+    TRIGGER_DISTANCE: "SetCamTrigDst",
     DO_AUX_FUNCTION: "AuxFunction",
     GUIDED_ENABLE: "GuidedEnable",
     GUIDED_LIMITS: "GuidedLimits",
 }
 """Names of the items in the firmware's status texts."""
 
-KEPT_ONLY = frozenset({94, 189, 195, 197, 201, 203, 205, 206, 182, 184, 207, 208, 212, JUMP_TAG})
-"""Items that are stored and read back without effect: cameras, repeated servos and relays, fences, regions of
+KEPT_ONLY = frozenset({94, 189, 195, 197, 201, 205, 182, 184, 207, 208, 212, JUMP_TAG})
+"""Items that are stored and read back without effect: mounts, repeated servos and relays, fences, regions of
 interest, payload places, and tags that only DO_JUMP_TAG looks for.
 """
 
@@ -195,6 +210,14 @@ def act(vehicle: Vehicle, item: MissionItem) -> None:
             vehicle.set_home(item.x / 1e7, item.y / 1e7, item.z)
     elif item.command == GUIDED_LIMITS:
         set_limits(vehicle, item)
+    elif item.command == DO_SPRAYER:
+        act_on_sprayer(vehicle, item)
+    elif item.command in (DIGICAM_CONTROL, TRIGGER_DISTANCE):
+        act_on_camera(vehicle, item)
+    elif item.command == SET_REVERSE:
+        vehicle.commanded.backwards = item.param1 == 1.0
+    elif item.command == DO_WINCH and vehicle.flies:
+        act_on_winch(vehicle, item)
     else:
         act_on_payload(vehicle, item)
 
@@ -237,7 +260,7 @@ def leaves_ground(vehicle: Vehicle) -> bool:
 def runs(vehicle: Vehicle) -> bool:
     """Return whether the mission is being flown."""
     plan = vehicle.mission
-    return vehicle.armed and vehicle.mode.name == "AUTO" and plan.current > 0 and not plan.complete
+    return vehicle.armed and vehicle.mode.name in MISSION_MODES and plan.current > 0 and not plan.complete
 
 
 def copter_ended(vehicle: Vehicle) -> Manoeuvre | None:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from volery.base.time import Ns, S
 from volery.simulation.autopilots.ardupilot.battery import left_mah
+from volery.simulation.autopilots.ardupilot.landing_sequence import AUTO_RTL, nearest_landing
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED
 from volery.simulation.autopilots.onboard_mission import DELAY, TAKEOFF
@@ -153,12 +154,14 @@ def update_prearm_state(vehicle: Vehicle, problems: Callable[[Vehicle], list[str
 
 CUSTOM_MODE_ENABLED = 1
 
+MISSION_MODES = ("AUTO", "AUTO_RTL")
+"""Names of the modes that fly the mission."""
+
 WITHOUT_EFFECT = {
     14: ("FLIP", ""),
     15: ("AUTOTUNE", ""),
     18: ("THROW", ""),
     22: ("FLOWHOLD", ""),
-    23: ("FOLLOW", "Set FOLL_ENABLE = 1"),
     25: ("SYSTEMID", "No axis selected, SID_AXIS = 0"),
     28: ("TURTLE", ""),
 }
@@ -187,9 +190,33 @@ def change_mode(vehicle: Vehicle, number: int) -> bool:
     if mode is None:
         vehicle.send_text(WARNING, f"No such mode {number}")
         return False
+    if mode.number == AUTO_RTL and vehicle.flies:
+        return _land_by_sequence(vehicle, mode)
     if mode is vehicle.mode:
         return True
-    reason = refusal(vehicle, mode) if vehicle.armed else ""
+    return _enter(vehicle, mode)
+
+
+def _land_by_sequence(vehicle: Vehicle, mode: Mode) -> bool:
+    """Enter AUTO_RTL at the nearest start of a landing, also from a later place of the sequence."""
+    start = nearest_landing(vehicle)
+    if start is None:
+        vehicle.send_text(WARNING, "Unable to start landing sequence")
+        vehicle.send_text(WARNING, "Mode change to AUTO RTL failed: No landing sequence found")
+        return False
+    plan = vehicle.mission
+    before, complete = plan.current, plan.complete
+    vehicle.choose_item(start)
+    vehicle.send_text(INFO, "Landing sequence start")
+    if mode is vehicle.mode or _enter(vehicle, mode):
+        return True
+    plan.current, plan.complete = before, complete
+    return False
+
+
+def _enter(vehicle: Vehicle, mode: Mode) -> bool:
+    """Enter a mode unless the vehicle may not; then report the reason. Return whether the mode is flown."""
+    reason = _not_set_up(vehicle, mode) or (refusal(vehicle, mode) if vehicle.armed else "")
     if reason:
         words = (
             f"Mode change to {mode.name} failed: {reason}" if vehicle.flies else "Flight mode change failed"
@@ -198,6 +225,14 @@ def change_mode(vehicle: Vehicle, number: int) -> bool:
         return False
     vehicle.enter_mode(mode)
     return True
+
+
+def _not_set_up(vehicle: Vehicle, mode: Mode) -> str:
+    """Return why even a disarmed vehicle may not enter a mode, or an empty text."""
+    if mode.name == "FOLLOW" and not vehicle.parameters["FOLL_ENABLE"]:
+        vehicle.send_text(WARNING, "Set FOLL_ENABLE = 1")
+        return "init failed"
+    return ""
 
 
 def refusal(vehicle: Vehicle, mode: Mode) -> str:
@@ -214,7 +249,7 @@ def refusal(vehicle: Vehicle, mode: Mode) -> str:
 
 
 def _refusal_on_ground(vehicle: Vehicle, mode: Mode) -> str:
-    if mode.name == "AUTO" and not _takes_off_first(vehicle):
+    if mode.name in MISSION_MODES and not _takes_off_first(vehicle):
         vehicle.send_text(CRITICAL, "Auto: Missing Takeoff Cmd")
         return "init failed"
     if mode.manual_throttle and not vehicle.mode.manual_throttle and Stabilize(vehicle).pilot.throttle > 0.5:

@@ -41,7 +41,7 @@ _SHARED = {
     **dict.fromkeys(SOURCE_PARAMETERS, "source of the estimator, or its sensor: checked before arming"),
     "ARMING_CHECK": "0 skips all checks; any other value runs all of them",
     **{
-        f"RC{channel}_OPTION": "switch: modes, arming, stop, interlock, fence, gripper, relays, mission"
+        f"RC{channel}_OPTION": "switch: modes, arming, stop, interlock, fence, payload, mission"
         for channel in range(5, 17)
     },
     "ARMING_RUDDER": "0: the yaw stick does not arm; 1 arms, 2 disarms, too",
@@ -60,6 +60,14 @@ _SHARED = {
     **{f"BTN_PIN{number}": "pin of that button; -1: none" for number in range(1, 5)},
     **{f"BTN_FUNC{number}": "function of that button, as RCn_OPTION" for number in range(1, 5)},
     **{f"BTN_OPTIONS{number}": "bit 1 inverts that button" for number in range(1, 5)},
+    "CAM1_TYPE": "from the next boot on: 1 a camera with a servo, 5 with commands to components",
+    "CAM1_DURATION": "time for which the servo presses the trigger",
+    "CAM1_INTRVAL_MIN": "least time between two pictures",
+    "CAM1_SERVO_OFF": "pulse width of the servo that does not press",
+    "CAM1_SERVO_ON": "pulse width of the servo that presses",
+    "CAM1_TRIGG_DIST": "distance between two pictures; 0: none by distance",
+    "CAM_AUTO_ONLY": "any value but 0: pictures by distance in AUTO only",
+    "CAM_MAX_ROLL": "largest roll for pictures by distance; 0: any",
     "FENCE_ACTION": "action beyond the fence; 0 only reports",
     "FENCE_ENABLE": "any value but 0 switches the fence on",
     "FENCE_RADIUS": "circle of the fence about home",
@@ -73,11 +81,37 @@ _SHARED = {
     "GPS_TYPE": "0: no receiver",
     "GRIP_ENABLE": "any value but 0: there is a gripper",
     "INITIAL_MODE": "mode after boot",
+    "MNT1_TYPE": "1: there is a camera mount with servos, from the next boot on",
+    "MNT1_DEFLT_MODE": "first mode of the mount",
+    "MNT1_RC_RATE": "positive: the pilot turns the mount at up to this rate; else to angles",
+    "MNT1_SYSID_DFLT": "system that the mount follows before one is commanded",
+    **{
+        f"MNT1_{axis}_{end}": f"{words} of the mount's {axis.lower()}"
+        for axis in ("ROLL", "PITCH", "YAW")
+        for end, words in (("MIN", "lower end"), ("MAX", "upper end"))
+    },
+    **{
+        f"MNT1_{place}_{axis}": f"angle of the {words} mount"
+        for place, words in (("RETRACT", "retracted"), ("NEUTRAL", "neutral"))
+        for axis in "XYZ"
+    },
+    "MNT1_LEAD_RLL": "time by which the mount leads the vehicle's roll",
+    "MNT1_LEAD_PTCH": "time by which the mount leads the vehicle's pitch",
     "RALLY_INCL_HOME": "any value but 0: home counts as a rally point of the return",
     "RALLY_LIMIT_KM": "distance beyond which a rally point is not used; 0: none",
     "RALLY_TOTAL": "number of rally points",
     "RC_OVERRIDE_TIME": "time after which overrides end; 0 refuses them, a negative value keeps them",
+    **{
+        f"RELAY{number}_{part}": f"{words} of that relay"
+        for number in range(1, 7)
+        for part, words in (
+            ("FUNCTION", "1: commands switch it; function"),
+            ("PIN", "pin"),
+            ("DEFAULT", "state at the boot"),
+        )
+    },
     "RNGFND1_TYPE": "any value but 0 sends RANGEFINDER and DISTANCE_SENSOR",
+    "SIM_BATT_VOLTAGE": "open-circuit voltage of the full battery; the default leaves the body's own",
     "SIM_ENGINE_FAIL": "the motor that SIM_ENGINE_MUL weakens, from 0",
     "SIM_ENGINE_MUL": "share of that motor's thrust",
     "SIM_GPS_DISABLE": "any value but 0: the receiver sees no satellites",
@@ -85,6 +119,23 @@ _SHARED = {
     "SIM_WIND_DIR": "direction that the wind comes from",
     "SIM_WIND_SPD": "mean speed of the wind",
     "SIM_PIN_MASK": "bits of the pins that are high: relays set them, buttons are read from them",
+    **{
+        f"SERVO{channel}_{part}": f"{words} of output {channel}"
+        for channel in range(1, 17)
+        for part, words in (
+            ("FUNCTION", "function"),
+            ("MIN", "lower end"),
+            ("TRIM", "middle"),
+            ("MAX", "upper end"),
+            ("REVERSED", "direction"),
+        )
+    },
+    "SERVO_RC_FS_MSK": "channels whose scaled outputs go to their middle when the transmitter is lost",
+    "SPRAY_ENABLE": "any value but 0: there is a sprayer",
+    "SPRAY_PUMP_MIN": "least share of the pump",
+    "SPRAY_PUMP_RATE": "share of the pump at 1 m/s",
+    "SPRAY_SPEED_MIN": "speed over ground below which it does not spray",
+    "SPRAY_SPINNER": "pulse width of the spinner",
     "STAT_BOOTCNT": "counts the boots",
     "SYSID_ENFORCE": "1: messages of other systems than SYSID_MYGCS are ignored",
     "SYSID_MYGCS": "system id whose heartbeats and manual control count",
@@ -103,7 +154,7 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "ATC_RAT_YAW_FLTE": "filter of the yaw rate's error",
         "ATC_RAT_YAW_I": "integral gain of the yaw rate loop",
         "ATC_RAT_YAW_P": "gain of the yaw rate loop",
-        "AUTO_OPTIONS": "bit 0 allows arming in AUTO, bit 1 its take-off without a raised throttle",
+        "AUTO_OPTIONS": "bits: 0 arming in AUTO, 1 its take-off without a raised throttle, 7 weathervaning",
         "CIRCLE_RADIUS": "circle of LOITER_TURNS",
         "CIRCLE_RATE": "yaw rate on that circle",
         "DISARM_DELAY": "time on the ground after which an idle copter disarms",
@@ -111,11 +162,20 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "FENCE_ALT_MIN": "floor of the fence above home",
         **{f"FLTMODE{position}": "mode of that position of the mode switch" for position in range(1, 7)},
         "FLTMODE_CH": "channel of the mode switch; 0: none",
-        "FRAME_TYPE": "frame name in the text after a parameter list; no effect on the flight",
+        "FOLL_ENABLE": "any value but 0: FOLLOW may be entered",
+        "FOLL_SYSID": "system that FOLLOW follows; 0: the first that reports its position",
+        "FOLL_DIST_MAX": "distance beyond which it is not followed; 0: none",
+        "FOLL_ALT_TYPE": "1: its height above home counts, 0: above the sea",
+        "FOLL_OFS_TYPE": "1: the place beside it turns with its heading",
+        **{f"FOLL_OFS_{axis}": "place beside it; all 0: the place at the start" for axis in "XYZ"},
+        "FOLL_POS_P": "speed for each metre that is missing",
+        "FOLL_YAW_BEHAVE": "1 turns the nose to it, 2 takes its heading, 3 turns the nose where it flies",
+        "FRAME_TYPE": "frame name in a text, order of the motor test; no effect on the flight",
         "FS_CRASH_CHECK": "0 switches the crash check off: a vehicle on its back keeps its motors running",
         "FS_EKF_ACTION": "action when the position is lost in flight",
         "FS_EKF_THRESH": "0 disables that action",
         "FS_OPTIONS": "bits 0 to 4: cases in which a failsafe has no effect",
+        "GUID_OPTIONS": "bit 7 allows weathervaning",
         "GUID_TIMEOUT": "time after which velocities and attitudes without a new message end",
         "LGR_ENABLE": "any value but 0: there is a landing gear",
         "LGR_STARTUP": "1 retracts, 2 deploys the landing gear at the start",
@@ -130,6 +190,8 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "LOIT_BRK_ACCEL": "LOITER's braking",
         "LOIT_BRK_DELAY": "time before LOITER brakes",
         "LOIT_SPEED": "LOITER's largest speed",
+        "MOT_PWM_MAX": "pulse width of a motor test at 100 %",
+        "MOT_PWM_MIN": "pulse width of a motor test at 0 %",
         "MOT_THST_HOVER": "hover thrust; learnt in flight and stored on disarming",
         "PILOT_ACCEL_Z": "the pilot's vertical acceleration",
         "PILOT_SPEED_DN": "the pilot's largest descent; 0: PILOT_SPEED_UP",
@@ -143,6 +205,19 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "RTL_LOIT_TIME": "waiting time over home",
         "RTL_SPEED": "speed of the return; 0: WPNAV_SPEED",
         "THR_DZ": "dead zone about the middle of the throttle",
+        "WINCH_OPTIONS": "bit 0: the winch is let go at the start; bit 1: lengths are reported",
+        "WINCH_POS_P": "rate for each metre of line that is missing",
+        "WINCH_RATE_MAX": "largest rate of the winch",
+        "WINCH_TYPE": "1: there is a winch with a servo",
+        "WVANE_ENABLE": "weathervaning: 1 nose, 2 nose or tail, 3 side, 4 tail into the wind; -1 as below",
+        "WVANE_ANG_MIN": "lean up to which it does not turn",
+        "WVANE_GAIN": "rate of the turn for each degree of lean",
+        "WVANE_HGT_MIN": "height above home up to which it does not weathervane",
+        "WVANE_LAND": "as WVANE_ENABLE, while it lands; -1: as there",
+        "WVANE_OPTIONS": "bit 0: the pitch turns it, too",
+        "WVANE_SPD_MAX": "speed in the plane above which it does not weathervane; 0: none",
+        "WVANE_TAKEOFF": "as WVANE_ENABLE, during a take-off; -1: as there",
+        "WVANE_VELZ_MAX": "climb or descent above which it does not weathervane; 0: none",
         "WPNAV_ACCEL": "acceleration in the plane",
         "WPNAV_ACCEL_Z": "vertical acceleration",
         "WPNAV_RADIUS": "radius within which a waypoint is reached",
@@ -167,6 +242,7 @@ ROVER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "MODE_CH": "channel of the mode switch; 0: none",
         "RTL_SPEED": "speed of the return; 0: WP_SPEED",
         WHEEL_ENCODER: "source of the estimator: checked before arming",
+        "STICK_MIXING": "any value but 0: the steering stick acts in the modes that the autopilot drives",
         "WP_RADIUS": "radius within which a waypoint is reached",
         "WP_SPEED": "speed",
     }

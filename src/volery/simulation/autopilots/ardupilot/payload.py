@@ -18,6 +18,7 @@ SET_RELAY, SET_SERVO, GRIPPER = 181, 183, 211
 """Commands that are mission items, too."""
 
 RELAYS = 6
+PINS = 16
 RELAY_FUNCTION = 1
 """RELAYn_FUNCTION of a relay that commands switch."""
 
@@ -75,14 +76,24 @@ def set_relay(vehicle: Vehicle, number: int, state: int) -> bool:
     return True
 
 
+def relays_at_boot(vehicle: Vehicle) -> None:
+    """Switch each relay as RELAYn_DEFAULT states: 0 off, 1 on; its pin stays as it is for any other value."""
+    for number in range(RELAYS):
+        default = f"RELAY{number + 1}_DEFAULT"
+        if has_relay(vehicle, number) and vehicle.parameters[default] in (0.0, 1.0):
+            _write_relay(vehicle, number, vehicle.parameters[default] == 1.0)
+
+
 def _write_relay(vehicle: Vehicle, number: int, on: bool) -> None:
     relays = vehicle.outputs.relays
     (relays.add if on else relays.discard)(number)
     pin = f"RELAY{number + 1}_PIN"
-    if pin in vehicle.parameters and vehicle.parameters[pin] >= 0.0:
+    if pin in vehicle.parameters and 0.0 <= vehicle.parameters[pin] < PINS:
         bit = 1 << round(vehicle.parameters[pin])
         mask = round(vehicle.parameters["SIM_PIN_MASK"])
-        vehicle.parameters.set("SIM_PIN_MASK", float(mask | bit if on else mask & ~bit))
+        changed = mask | bit if on else mask & ~bit
+        if changed != mask:
+            vehicle.set_parameter("SIM_PIN_MASK", float(changed))
 
 
 def relay_status(vehicle: Vehicle) -> Fields:

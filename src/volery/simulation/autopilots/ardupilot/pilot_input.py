@@ -116,12 +116,15 @@ def simulate_faults(vehicle: Vehicle) -> None:
     motor_and_share = parameters["SIM_ENGINE_FAIL"], parameters["SIM_ENGINE_MUL"]
     wind = parameters["SIM_WIND_SPD"], parameters["SIM_WIND_DIR"]
     no_receiver = parameters["SIM_GPS_DISABLE"] != 0.0 or parameters["GPS_TYPE"] == 0.0
-    wanted = (float(no_receiver), *motor_and_share, *wind)
+    volts = round(parameters["SIM_BATT_VOLTAGE"], 3)
+    wanted = (float(no_receiver), *motor_and_share, *wind, volts)
     before = vehicle.failsafes.simulated
     if wanted == before:
         return
     vehicle.failsafes.simulated = wanted
-    if wind != before[3:]:
+    if volts != before[5]:
+        vehicle.flight.set_full_voltage(volts)
+    if wind != before[3:5]:
         speed, towards = wind[0], radians(wind[1] + 180.0)
         vehicle.flight.set_wind(north=speed * cos(towards), east=speed * sin(towards))
     vehicle.flight.block_gps(bool(wanted[0]))
@@ -145,6 +148,25 @@ def simulate_rc_failure(vehicle: Vehicle) -> None:
         vehicle.rc.transmitter[throttle - 1] = FAILED_THROTTLE
     elif vehicle.rc.transmitter[throttle - 1] == FAILED_THROTTLE:
         vehicle.rc.transmitter[throttle - 1] = vehicle.rules.rc.transmitter[throttle - 1]
+
+
+FULL_STICK_US = 400.0
+"""Deflection of the stick from its trim at which the pilot alone steers [us]."""
+
+
+def mix_steering(vehicle: Vehicle) -> None:
+    """Add the pilot's steering to a rover's own in the modes that the autopilot drives, by STICK_MIXING."""
+    mixed = 0.0, 0.0
+    drives = not vehicle.mode.pilot and vehicle.mode.needs_position
+    if drives and vehicle.parameters["STICK_MIXING"] and not radio_lost(vehicle):
+        sticks = vehicle.tuning.sticks
+        travel, pulse = sticks.travels[0], vehicle.rc[sticks.roll]
+        steering = travel.deflection(pulse)
+        if steering:
+            mixed = steering, min(1.0, abs(pulse - travel.trim) / FULL_STICK_US)
+    if mixed != vehicle.switches.mixed_steering:
+        vehicle.switches.mixed_steering = mixed
+        vehicle.flight.mix_steering(*mixed)
 
 
 NO_PULSES = 1.0

@@ -8,6 +8,7 @@ from volery.base.time import MS, S
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, AuxiliaryFunctions
 from volery.simulation.autopilots.ardupilot.buttons import read_buttons
+from volery.simulation.autopilots.ardupilot.camera import update_camera
 from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES
 from volery.simulation.autopilots.ardupilot.fence import FENCE_CHECKS, check_fence, respond_rover
 from volery.simulation.autopilots.ardupilot.firmware import (
@@ -34,9 +35,13 @@ from volery.simulation.autopilots.ardupilot.modes import (
     failing_checks,
     mode_not_armable,
 )
+from volery.simulation.autopilots.ardupilot.motor_test import drive_tested_output
+from volery.simulation.autopilots.ardupilot.mount import update_mount
 from volery.simulation.autopilots.ardupilot.parameter_checks import source_problems
 from volery.simulation.autopilots.ardupilot.parameters import ROVER_SUPPORTED, rover_tuning
 from volery.simulation.autopilots.ardupilot.rally import return_point
+from volery.simulation.autopilots.ardupilot.servo_outputs import pass_transmitter_through
+from volery.simulation.autopilots.ardupilot.sprayer import update_sprayer
 from volery.simulation.autopilots.ardupilot.telemetry import (
     ACTIVE,
     ATTITUDE_CONTROL,
@@ -225,8 +230,14 @@ def on_step(vehicle: Vehicle) -> None:
         pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
         AUXILIARY.read_switches(vehicle)
     read_buttons(vehicle, AUXILIARY)
+    pilot_input.mix_steering(vehicle)
+    pass_transmitter_through(vehicle)
+    update_sprayer(vehicle)
+    update_camera(vehicle)
+    update_mount(vehicle, ROVER.periodic.tick)
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_rover)
+    drive_tested_output(vehicle, ROVER_DISARMED)
     if vehicle.armed:
         vehicle.ground.flight_time += ROVER.periodic.tick
 

@@ -421,8 +421,20 @@ def battery_status(vehicle: Vehicle) -> Fields:
         "current_consumed": int(used_mah(vehicle)),
         "energy_consumed": int(estimate.battery_energy_j / 100.0),
         "battery_remaining": left,
-        "charge_state": 1,
+        "charge_state": _charge_state(vehicle),
     }
+
+
+CHARGE_OK, CHARGE_LOW, CHARGE_CRITICAL = 1, 2, 3
+"""MAV_BATTERY_CHARGE_STATE."""
+
+
+def _charge_state(vehicle: Vehicle) -> int:
+    """Return the level that the failsafes of the battery have found."""
+    active = vehicle.failsafes.active
+    if "battery critical" in active:
+        return CHARGE_CRITICAL
+    return CHARGE_LOW if "battery low" in active else CHARGE_OK
 
 
 def heartbeat(vehicle: Vehicle, kind: int, system_status: int) -> Fields:
@@ -508,7 +520,7 @@ def mission_current(vehicle: Vehicle) -> Fields:
         "seq": plan.current,
         "total": max(0, len(plan) - 1),
         "mission_state": _mission_state(plan),
-        "mission_mode": int(vehicle.mode.name == "AUTO"),
+        "mission_mode": int(vehicle.mode.name in ("AUTO", "AUTO_RTL")),
     }
 
 

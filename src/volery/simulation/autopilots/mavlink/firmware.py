@@ -174,6 +174,8 @@ class CommandPolicy:
     """Whether a message, by its name and the system that sends it, is handled at all."""
     reads_nan: bool = False
     """Whether a NaN parameter of a command means that the parameter is not given."""
+    nan_commands: frozenset[int] = frozenset()
+    """Commands for which it means so at any rate."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -19,7 +19,7 @@ Fields = dict[str, Any]
 EPOCH_US = 1_767_225_600_000_000
 """Satellite time at the start of a run: 2026-01-01 00:00 UTC [us]."""
 
-LARGEST = 1e9
+LARGEST = 2.0**31
 FARTHEST = 2.1e7
 """Largest distance of a point that is accepted [m]."""
 
@@ -110,6 +110,7 @@ class Command(NamedTuple):
         z: Seventh parameter.
         frame: MAV_FRAME.
         is_int: Whether it arrived as COMMAND_INT.
+        sender: System and component that sent it.
 
     The others are NaN only for firmwares that read NaN as "not given".
     """
@@ -124,6 +125,17 @@ class Command(NamedTuple):
     z: float
     frame: int
     is_int: bool
+    sender: tuple[int, int] = (0, 0)
+
+    @property
+    def fifth(self) -> float:
+        """Fifth parameter as it was sent, where it is no latitude; likewise ``sixth``."""
+        return float(round(self.x * 1e7)) if self.is_int else self.x
+
+    @property
+    def sixth(self) -> float:
+        """Sixth parameter as it was sent, where it is no longitude."""
+        return float(round(self.y * 1e7)) if self.is_int else self.y
 
 
 Handler = Callable[[Vehicle, Command], int | None]

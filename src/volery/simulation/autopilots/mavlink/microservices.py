@@ -51,18 +51,22 @@ class CommandService:
 
     def on_long(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle COMMAND_LONG."""
-        self._perform(peer, from_long(fields, self._firmware.commands.reads_nan))
+        self._perform(peer, from_long(fields, self._reads_nan(fields)))
 
     def on_int(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle COMMAND_INT."""
-        self._perform(peer, from_int(fields, self._firmware.commands.reads_nan))
+        self._perform(peer, from_int(fields, self._reads_nan(fields)))
+
+    def _reads_nan(self, fields: dict[str, Any]) -> bool:
+        policy = self._firmware.commands
+        return policy.reads_nan or fields["command"] in policy.nan_commands
 
     def _perform(self, peer: Peer, command: Command) -> None:
         result: int | None
         if own := self._own.get(command.number):
             result = own(peer, command)
         elif handler := self._firmware.commands.commands.get(command.number):
-            result = handler(self._vehicle, command)
+            result = handler(self._vehicle, command._replace(sender=(peer.system, peer.component)))
         else:
             result = UNSUPPORTED
         if result is not None:

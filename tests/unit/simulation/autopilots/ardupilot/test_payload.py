@@ -108,3 +108,13 @@ def test_a_reboot_ends_a_repetition(station: Any) -> None:
     assert rig.command(246, 1) == ACCEPTED
     rig.run(0.1)
     assert over_time(rig, lambda: 0 in rig.vehicle.outputs.relays) == [False] * 4
+
+
+def test_a_boot_switches_relays_to_their_defaults_and_keeps_the_other_pins(station: Any) -> None:
+    pins = {"SIM_PIN_MASK": 0b1111, "RELAY1_FUNCTION": 1, "RELAY1_PIN": 1, "RELAY1_DEFAULT": 0}
+    pins |= {"RELAY2_FUNCTION": 1, "RELAY2_PIN": 4, "RELAY2_DEFAULT": 1}
+    pins |= {"RELAY3_FUNCTION": 1, "RELAY3_PIN": 2, "RELAY3_DEFAULT": 2}
+    rig = station("rover", warm=False, parameters=pins)
+    rig.run(3.0)
+    assert rig.vehicle.parameters["SIM_PIN_MASK"] == 0b11101
+    assert rig.vehicle.outputs.relays == {1}

@@ -1,0 +1,224 @@
+"""ArduPilot's camera: pictures by command, switch, mission item, time and distance.
+
+A servo presses its trigger (CAM1_TYPE 1), or components of the vehicle get each command (5). There is no
+picture: CAMERA_FEEDBACK reports where one would have been taken. CAM1_TYPE counts from the next boot on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import degrees, hypot
+from typing import Any
+
+from volery.base.time import US, from_seconds
+from volery.simulation.autopilots.ardupilot.servo_outputs import write
+from volery.simulation.autopilots.mavlink.messages import (
+    ACCEPTED,
+    EPOCH_US,
+    FAILED,
+    UNSUPPORTED,
+    Command,
+    Fields,
+    Handler,
+)
+from volery.simulation.autopilots.onboard_mission import MissionItem
+from volery.simulation.autopilots.state_groups import NEVER, CameraState
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+SERVO, COMPONENTS = 1, 5
+"""CAM1_TYPE."""
+TRIGGER = 10
+"""SERVOn_FUNCTION."""
+DIGICAM_CONFIGURE, DIGICAM_CONTROL, TRIGGER_DISTANCE, START_CAPTURE, STOP_CAPTURE = 202, 203, 206, 2000, 2001
+"""MAV_CMD."""
+SHOOT = 1
+"""Shooting command of DIGICAM_CONTROL."""
+WITHOUT_END = -1
+
+
+def _present(vehicle: Vehicle) -> bool:
+    return vehicle.outputs.camera.kind in (SERVO, COMPONENTS)
+
+
+def take_picture(vehicle: Vehicle) -> bool:
+    """Take a picture and return whether it was taken now.
+
+    One that comes before CAM1_INTRVAL_MIN has passed since the last is taken then; one that comes while the
+    servo still presses the trigger is not taken.
+    """
+    camera, now = vehicle.outputs.camera, vehicle.kernel.now()
+    if not _present(vehicle):
+        return False
+    too_early = camera.taken_at != NEVER and now - camera.taken_at < from_seconds(
+        vehicle.parameters["CAM1_INTRVAL_MIN"]
+    )
+    camera.pending = too_early
+    if too_early or camera.pressed_until > now:
+        return False
+    if camera.kind == SERVO:
+        write(vehicle, TRIGGER, round(vehicle.parameters["CAM1_SERVO_ON"]))
+        camera.pressed_until = now + from_seconds(vehicle.parameters["CAM1_DURATION"])
+    else:
+        _forward(vehicle, DIGICAM_CONTROL, 0.0, 0.0, 0.0, 0.0, float(SHOOT))
+    camera.pictures += 1
+    camera.taken_at, camera.place = now, vehicle.estimate.position
+    camera.feedback = _feedback_now(vehicle, camera)
+    vehicle.output.send_event("CAMERA_FEEDBACK", camera.feedback)
+    return True
+
+
+def _forward(vehicle: Vehicle, number: int, *params: float) -> None:
+    """Send a command to the components of the vehicle, if one has been received."""
+    if vehicle.outputs.camera.has_components:
+        values = {f"param{place}": 0.0 for place in range(1, 8)}
+        values |= {f"param{place}": value for place, value in enumerate(params, start=1)}
+        fields = {"target_system": 0, "target_component": 0, "command": number, "confirmation": 0, **values}
+        vehicle.output.send_event("COMMAND_LONG", fields)
+
+
+def on_component(vehicle: Vehicle, sender: int) -> None:
+    """Notice a heartbeat of a component of the vehicle."""
+    if sender == vehicle.system:
+        vehicle.outputs.camera.has_components = True
+
+
+def update_camera(vehicle: Vehicle) -> None:
+    """Release the trigger, and take the pictures that are due by time or distance, at each tick."""
+    camera, parameters, now = vehicle.outputs.camera, vehicle.parameters, vehicle.kernel.now()
+    if camera.kind is None:
+        camera.kind = round(parameters["CAM1_TYPE"])
+    if not _present(vehicle):
+        return
+    if camera.kind == SERVO and camera.pressed_until <= now:
+        write(vehicle, TRIGGER, round(parameters["CAM1_SERVO_OFF"]))
+    if camera.pending:
+        take_picture(vehicle)
+    if camera.left:
+        if (camera.taken_at == NEVER or now - camera.taken_at > camera.period) and take_picture(vehicle):
+            camera.left -= camera.left > 0
+    elif _due_by_distance(vehicle, camera):
+        take_picture(vehicle)
+
+
+def _due_by_distance(vehicle: Vehicle, camera: CameraState) -> bool:
+    """Return whether the vehicle is CAM1_TRIGG_DIST away from the last picture, or from where it was set."""
+    parameters, estimate = vehicle.parameters, vehicle.estimate
+    every, most_roll = parameters["CAM1_TRIGG_DIST"], parameters["CAM_MAX_ROLL"]
+    if every <= 0.0:
+        camera.place = None
+        return False
+    not_now = parameters["CAM_AUTO_ONLY"] and vehicle.mode.name != "AUTO"
+    leans = most_roll > 0.0 and abs(degrees(estimate.attitude[0])) > most_roll
+    if not_now or leans or not estimate.position_ok:
+        return False
+    here = estimate.position
+    if camera.place is None:
+        camera.place = here
+    return hypot(here[0] - camera.place[0], here[1] - camera.place[1]) >= every
+
+
+def _feedback_now(vehicle: Vehicle, camera: CameraState) -> Fields:
+    estimate = vehicle.estimate
+    latitude, longitude, amsl = estimate.geodetic
+    roll, pitch, yaw = (degrees(angle) for angle in estimate.attitude)
+    return {
+        "time_usec": EPOCH_US + vehicle.kernel.now() // US,
+        "img_idx": camera.pictures,
+        "lat": round(latitude * 1e7),
+        "lng": round(longitude * 1e7),
+        "alt_msl": amsl,
+        "alt_rel": vehicle.height,
+        "roll": roll,
+        "pitch": pitch,
+        "yaw": yaw % 360.0,
+    }
+
+
+def feedback(vehicle: Vehicle) -> Fields | None:
+    """Return CAMERA_FEEDBACK of the last picture, empty before the first; ``None`` without a camera."""
+    return vehicle.outputs.camera.feedback if _present(vehicle) else None
+
+
+def _control(vehicle: Vehicle, params: tuple[float, ...]) -> None:
+    """Take a picture or give the order to the components; params as in DIGICAM_CONTROL, from the first."""
+    if int(params[4]) == SHOOT:
+        take_picture(vehicle)
+    elif vehicle.outputs.camera.kind == COMPONENTS:
+        _forward(vehicle, DIGICAM_CONTROL, *params)
+
+
+def _set_distance(vehicle: Vehicle, metres: float, at_once: bool) -> None:
+    vehicle.parameters.set("CAM1_TRIGG_DIST", metres)
+    if at_once:
+        take_picture(vehicle)
+
+
+def on_digicam_control(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_DIGICAM_CONTROL: param5 is 1 for a picture."""
+    params = (command.param1, command.param2, command.param3, command.param4, command.fifth, command.sixth)
+    _control(vehicle, params)
+    return ACCEPTED
+
+
+def on_digicam_message(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """Handle the deprecated DIGICAM_CONTROL."""
+    names = ("session", "zoom_pos", "zoom_step", "focus_lock", "shot", "command_id")
+    _control(vehicle, tuple(float(fields[name]) for name in names))
+
+
+def on_digicam_configure(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_DIGICAM_CONFIGURE, which is for the components."""
+    if vehicle.outputs.camera.kind == COMPONENTS:
+        params = (command.param1, command.param2, command.param3, command.param4)
+        _forward(vehicle, DIGICAM_CONFIGURE, *params, command.fifth, command.sixth, command.z)
+    return ACCEPTED
+
+
+def on_trigger_distance(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_SET_CAM_TRIGG_DIST: param1 metres between pictures, 0 none; param3 is 1 for one at once."""
+    _set_distance(vehicle, command.param1, command.param3 == 1.0)
+    return ACCEPTED
+
+
+def on_start_capture(vehicle: Vehicle, command: Command) -> int:
+    """Handle IMAGE_START_CAPTURE: param2 seconds between param3 pictures, 0 without end; 0 and 0 is one."""
+    camera, period, count = vehicle.outputs.camera, command.param2, round(command.param3)
+    if command.param1 < 0.0:
+        return UNSUPPORTED
+    if command.param1 > 1.0 or not _present(vehicle):
+        return FAILED
+    if count == 1 or (period == 0.0 and count == 0):
+        return ACCEPTED if take_picture(vehicle) else FAILED
+    camera.period, camera.left = from_seconds(max(0.0, period)), count or WITHOUT_END
+    return ACCEPTED
+
+
+def on_stop_capture(vehicle: Vehicle, command: Command) -> int:
+    """Handle IMAGE_STOP_CAPTURE."""
+    if not 0.0 <= command.param1 <= 1.0 or (command.param1 == 1.0 and not _present(vehicle)):
+        return UNSUPPORTED
+    vehicle.outputs.camera.left = 0
+    return ACCEPTED
+
+
+CAMERA_COMMANDS: Mapping[int, Handler] = {
+    DIGICAM_CONFIGURE: on_digicam_configure,
+    DIGICAM_CONTROL: on_digicam_control,
+    TRIGGER_DISTANCE: on_trigger_distance,
+    START_CAPTURE: on_start_capture,
+    STOP_CAPTURE: on_stop_capture,
+}
+
+
+def act_on_camera(vehicle: Vehicle, item: MissionItem) -> None:
+    """Execute the mission item DO_DIGICAM_CONTROL or DO_SET_CAM_TRIGG_DIST."""
+    if item.command == DIGICAM_CONTROL:
+        _control(vehicle, (item.param1, item.param2, item.param3, item.param4, float(item.x), float(item.y)))
+    else:
+        _set_distance(vehicle, item.param1, item.param3 == 1.0)
+
+
+def picture_by_switch(vehicle: Vehicle, position: int) -> None:
+    """Take a picture when the switch goes up."""
+    if position > 0:
+        take_picture(vehicle)

@@ -1,0 +1,227 @@
+"""Commands and messages that point ArduPilot's camera mount, and those that describe its gimbal manager."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isnan, radians
+from typing import Any
+
+from volery.base.time import S
+from volery.simulation.autopilots.ardupilot.modes import WARNING
+from volery.simulation.autopilots.ardupilot.mount import (
+    AT_HOME,
+    AT_POINT,
+    AT_SYSTEM,
+    BY_MESSAGE,
+    BY_PILOT,
+    IS_NEUTRAL,
+    LOCKS_PITCH,
+    LOCKS_ROLL,
+    LOCKS_YAW,
+    NEUTRAL,
+    RETRACT,
+    RETRACTED,
+    limits,
+    mount_of,
+    pans,
+    point_by_angles,
+    point_by_rates,
+    set_default_mode,
+    set_mount_mode,
+)
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, Handler, boot_ms
+from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+ROI_SYSTEM, MOUNT_CONFIGURE, MOUNT_CONTROL, GIMBAL_PITCHYAW, GIMBAL_CONFIGURE = 198, 204, 205, 1000, 1001
+"""MAV_CMD."""
+
+LARGEST_PITCH, LARGEST_ROLL, LARGEST_YAW = 90.0, 180.0, 360.0
+"""Angles [degrees] beyond which MOUNT_CONTROL is refused: they were stated in 1/100 degree."""
+WARNS_EVERY = 30 * S
+LEAVE, TAKE, GIVE_BACK = -1, -2, -3
+"""Values of param1 of GIMBAL_CONFIGURE; others are system ids."""
+
+# GIMBAL_MANAGER_CAP_FLAGS: axis, follow and lock of roll, pitch and yaw
+ROLLS, PITCHES, YAWS = 0b11100, 0b1110_0000, 0b111_0000_0000
+CAPABLE = 0b11 | 1 << 13 | 1 << 16 | 1 << 17
+"""Retracts, has a neutral position, inputs of the pilot, points at local and global places."""
+
+
+def on_mount_configure(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_MOUNT_CONFIGURE: param1 is the mode; one that does not exist is accepted without effect."""
+    if mount_of(vehicle) is None:
+        return FAILED
+    set_mount_mode(vehicle, round(command.param1))
+    return ACCEPTED
+
+
+def _warn(vehicle: Vehicle, text: str) -> int:
+    """Send a warning, at most one in 30 s, and return FAILED."""
+    mount, now = vehicle.outputs.mount, vehicle.kernel.now()
+    if now - mount.warned_at >= WARNS_EVERY:
+        mount.warned_at = now
+        vehicle.send_text(WARNING, f"Mount: {text}")
+    return FAILED
+
+
+def on_mount_control(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_MOUNT_CONTROL: param7 is the mode.
+
+    Pitch, roll and yaw [degrees] are param1 to param3. A place is param5 and param6 [1/1e7 degree], also in
+    COMMAND_LONG, and param4 metres above home.
+    """
+    if mount_of(vehicle) is None:
+        return FAILED
+    mode, pitch, roll, yaw = int(command.z), command.param1, command.param2, command.param3
+    if mode in (RETRACT, NEUTRAL, BY_PILOT, AT_HOME):
+        set_mount_mode(vehicle, mode)
+    elif mode == BY_MESSAGE:
+        if abs(pitch) > LARGEST_PITCH or abs(roll) > LARGEST_ROLL or abs(yaw) > LARGEST_YAW:
+            return _warn(vehicle, "invalid angle targets")
+        point_by_angles(vehicle, roll, pitch, yaw, from_north=False)
+    elif mode == AT_POINT:
+        if pitch and roll and command.fifth == command.sixth == 0.0:
+            return _warn(vehicle, "GPS_POINT target invalid")
+        _point_at_place(vehicle, command.fifth, command.sixth, int(command.param4))
+    else:
+        return FAILED
+    return ACCEPTED
+
+
+def _point_at_place(vehicle: Vehicle, latitude: float, longitude: float, height: float) -> None:
+    """Point at a place [1/1e7 degree] at a height above home [m]. The nose does not follow it."""
+    mount = vehicle.outputs.mount
+    mount.place = vehicle.point(GLOBAL_RELATIVE, latitude / 1e7, longitude / 1e7, height)
+    mount.mode = AT_POINT
+
+
+def on_gimbal_pitchyaw(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_GIMBAL_MANAGER_PITCHYAW: angles [degrees] param1, param2, or rates param3, param4."""
+    if mount_of(vehicle) is None or command.z not in (0.0, 1.0):
+        return FAILED
+    pointed = _point(
+        vehicle, round(command.fifth), (command.param1, command.param2), (command.param3, command.param4)
+    )
+    return ACCEPTED if pointed else FAILED
+
+
+def _point(vehicle: Vehicle, flags: int, angles: tuple[float, float], rates: tuple[float, float]) -> bool:
+    """Follow flags of the gimbal manager, else pitch and yaw [degrees], else their rates; NaN: not given."""
+    from_north = bool(flags & LOCKS_YAW)
+    if flags & (RETRACTED | IS_NEUTRAL):
+        set_mount_mode(vehicle, RETRACT if flags & RETRACTED else NEUTRAL)
+    elif not any(isnan(angle) for angle in angles):
+        point_by_angles(vehicle, 0.0, *angles, from_north=from_north)
+    elif not any(isnan(rate) for rate in rates):
+        point_by_rates(vehicle, 0.0, *rates, from_north=from_north)
+    else:
+        return False
+    return True
+
+
+def on_gimbal_configure(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_GIMBAL_MANAGER_CONFIGURE: who is in control, by system and component id."""
+    mount, who = mount_of(vehicle), command.param1
+    if mount is None or command.z not in (0.0, 1.0):
+        return FAILED
+    if not all(GIVE_BACK <= value <= 255.0 for value in (who, command.param2)):
+        return FAILED
+    before = mount.controller
+    if who == TAKE:
+        mount.controller = command.sender
+    elif who == GIVE_BACK and before == command.sender:
+        mount.controller = (0, 0)
+    elif who >= 0.0:
+        mount.controller = (int(who), int(command.param2))
+    if mount.controller != before:
+        vehicle.output.send_message("GIMBAL_MANAGER_STATUS")
+    return ACCEPTED
+
+
+def on_roi_system(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_SET_ROI_SYSID: the mount follows the positions that a system sends."""
+    mount = mount_of(vehicle)
+    if mount is None:
+        return FAILED
+    mount.follows, mount.mode = int(command.param1), AT_SYSTEM
+    return ACCEPTED
+
+
+MOUNT_COMMANDS: Mapping[int, Handler] = {
+    ROI_SYSTEM: on_roi_system,
+    MOUNT_CONFIGURE: on_mount_configure,
+    MOUNT_CONTROL: on_mount_control,
+    GIMBAL_PITCHYAW: on_gimbal_pitchyaw,
+    GIMBAL_CONFIGURE: on_gimbal_configure,
+}
+
+
+def on_other_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
+    """Handle GLOBAL_POSITION_INT of another system: the place that the mount follows."""
+    mount = mount_of(vehicle)
+    if mount is not None and sender == mount.follows:
+        mount.followed = vehicle.point(
+            GLOBAL, fields["lat"] / 1e7, fields["lon"] / 1e7, fields["alt"] / 1000.0
+        )
+
+
+def on_mount_control_message(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """Handle the deprecated MOUNT_CONTROL: angles [1/100 degree] or a place, as the mode demands."""
+    mount = mount_of(vehicle)
+    a, b, c = fields["input_a"], fields["input_b"], fields["input_c"]
+    if mount is None or fields["target_system"] not in (0, vehicle.system):
+        return
+    if mount.mode == BY_MESSAGE:
+        point_by_angles(vehicle, b / 100.0, a / 100.0, c / 100.0, from_north=False)
+    elif mount.mode == AT_POINT:
+        _point_at_place(vehicle, a, b, c / 100.0)
+
+
+def on_mount_configure_message(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """Handle the deprecated MOUNT_CONFIGURE."""
+    if mount_of(vehicle) is not None and fields["target_system"] in (0, vehicle.system):
+        set_mount_mode(vehicle, fields["mount_mode"])
+
+
+def retract_by_switch(vehicle: Vehicle, position: int) -> None:
+    """Retract the mount with the switch up, return to its default mode with it down."""
+    if position > 0:
+        set_mount_mode(vehicle, RETRACT)
+    elif position < 0:
+        set_default_mode(vehicle)
+
+
+def lock_by_switch(vehicle: Vehicle, position: int) -> None:
+    """Let the pilot's yaw count from north with the switch up."""
+    vehicle.outputs.mount.yaw_locked = position > 0
+
+
+def manager_information(vehicle: Vehicle) -> Fields | None:
+    """Return GIMBAL_MANAGER_INFORMATION."""
+    if mount_of(vehicle) is None:
+        return None
+    flags = CAPABLE
+    fields: Fields = {}
+    for axis, bits in (("ROLL", ROLLS), ("PITCH", PITCHES), ("YAW", YAWS)):
+        low, high = limits(vehicle, axis)
+        flags |= bits if (pans(vehicle) if axis == "YAW" else low < high) else 0
+        fields |= {f"{axis.lower()}_min": radians(low), f"{axis.lower()}_max": radians(high)}
+    return {"time_boot_ms": boot_ms(vehicle), "cap_flags": flags, "gimbal_device_id": 1, **fields}
+
+
+def manager_status(vehicle: Vehicle) -> Fields | None:
+    """Return GIMBAL_MANAGER_STATUS: who is in control."""
+    mount = mount_of(vehicle)
+    if mount is None:
+        return None
+    system, component = mount.controller
+    return {
+        "time_boot_ms": boot_ms(vehicle),
+        "flags": LOCKS_ROLL | LOCKS_PITCH | (LOCKS_YAW if mount.yaw_locked else 0),
+        "gimbal_device_id": 1,
+        "primary_control_sysid": system,
+        "primary_control_compid": component,
+        "secondary_control_sysid": 0,
+        "secondary_control_compid": 0,
+    }

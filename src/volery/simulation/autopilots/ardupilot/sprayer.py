@@ -1,0 +1,96 @@
+"""ArduPilot's crop sprayer: a pump that follows the speed over ground, and a spinner.
+
+It runs by DO_SPRAYER, its mission item or a switch. Nothing is sprayed here: the outputs are what it does.
+"""
+
+from __future__ import annotations
+
+from math import hypot
+
+from volery.base.time import MS, S
+from volery.simulation.autopilots.ardupilot.servo_outputs import channels, move, write
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command
+from volery.simulation.autopilots.onboard_mission import MissionItem
+from volery.simulation.autopilots.state_groups import NEVER
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+DO_SPRAYER = 216
+PUMP, SPINNER = 22, 23
+"""SERVOn_FUNCTION."""
+STARTS_AFTER, STOPS_AFTER = 100 * MS, S
+"""Time beyond SPRAY_SPEED_MIN after which it sprays, and below it after which it stops."""
+TESTED_AT = 1.0
+"""Speed [m/s] for which a switch turns the pump of a disarmed vehicle."""
+
+
+def run_sprayer(vehicle: Vehicle, on: bool) -> None:
+    """Let the sprayer run or not; it sprays while it runs above SPRAY_SPEED_MIN."""
+    sprayer = vehicle.outputs.sprayer
+    if on == sprayer.running:
+        return
+    sprayer.running = on and bool(vehicle.parameters["SPRAY_ENABLE"])
+    if not sprayer.running:
+        _stop(vehicle)
+
+
+def _stop(vehicle: Vehicle) -> None:
+    vehicle.outputs.sprayer.spraying = False
+    move(vehicle, PUMP, 0.0)
+    move(vehicle, SPINNER, 0.0)
+
+
+def switch_sprayer(vehicle: Vehicle, position: int) -> None:
+    """Run the sprayer with the switch up; while disarmed this tests the pump."""
+    run_sprayer(vehicle, position > 0)
+    vehicle.outputs.sprayer.tested = position > 0 and not vehicle.armed
+
+
+def on_sprayer(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_SPRAYER: param1 is 1 to run, 0 to stop."""
+    if command.param1 not in (0.0, 1.0):
+        return FAILED
+    run_sprayer(vehicle, command.param1 == 1.0)
+    return ACCEPTED
+
+
+def act_on_sprayer(vehicle: Vehicle, item: MissionItem) -> None:
+    """Execute the mission item DO_SPRAYER."""
+    if item.param1 in (0.0, 1.0):
+        run_sprayer(vehicle, item.param1 == 1.0)
+
+
+def update_sprayer(vehicle: Vehicle) -> None:
+    """Set pump and spinner of a sprayer that runs, at each tick."""
+    sprayer, parameters = vehicle.outputs.sprayer, vehicle.parameters
+    if not sprayer.running:
+        return
+    if not parameters["SPRAY_ENABLE"]:
+        run_sprayer(vehicle, on=False)
+        return
+    if not channels(vehicle, PUMP):
+        return
+    speed = hypot(*vehicle.estimate.velocity[:2])
+    sprays = _sprays(vehicle, speed)
+    if sprayer.tested:
+        speed, sprays = TESTED_AT, True
+    if not sprays:
+        _stop(vehicle)
+        return
+    sprayer.spraying = True
+    percent = max(speed * parameters["SPRAY_PUMP_RATE"], parameters["SPRAY_PUMP_MIN"])
+    move(vehicle, PUMP, int(100.0 * percent) / 10_000.0)
+    write(vehicle, SPINNER, round(parameters["SPRAY_SPINNER"]))
+
+
+def _sprays(vehicle: Vehicle, speed: float) -> bool:
+    """Return whether it sprays: the speed [m/s] was beyond its limit for long enough."""
+    sprayer, now = vehicle.outputs.sprayer, vehicle.kernel.now()
+    fast = 100.0 * speed >= vehicle.parameters["SPRAY_SPEED_MIN"]
+    if fast == sprayer.spraying:
+        sprayer.changes_since = NEVER
+    elif sprayer.changes_since == NEVER:
+        sprayer.changes_since = now
+    elif now - sprayer.changes_since > (STARTS_AFTER if fast else STOPS_AFTER):
+        sprayer.changes_since = NEVER
+        return fast
+    return sprayer.spraying
