@@ -16,7 +16,7 @@ demo: $(VENV)/volery.stamp ## parcels across a city, two allocations side by sid
 test: $(VENV)/test.stamp ## all tests, against real sockets, clients and a browser
 	@status=0; \
 	$(BIN)/pytest -n auto --dist worksteal --durations=5 -m "not integration" || status=1; \
-	$(BIN)/pytest -n 4 --dist loadfile --durations=5 -m integration --ignore tests/integration/transports || status=1; \
+	$(BIN)/pytest -n 4 --dist loadfile --no-loadscope-reorder --durations=5 -m integration --ignore tests/integration/transports || status=1; \
 	$(BIN)/pytest --durations=5 tests/integration/transports || status=1; \
 	exit $$status
 

@@ -26,7 +26,7 @@ from numba import carray, cfunc, types  # type: ignore[attr-defined]  # numba do
 
 from volery.base.numeric_code import NumericCode, parsed
 from volery.cost.native.core_model import execute_blocks
-from volery.simulation.autopilots.flight_stack.flight import advance_flights
+from volery.simulation.autopilots.flight_stack.flight_step import advance_flights
 from volery.simulation.world.body_step import advance_bodies
 
 ENTRY_POINTS = (advance_flights, advance_bodies, execute_blocks)

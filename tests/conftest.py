@@ -1,7 +1,9 @@
 """For all tests: how fast a machine is, and how busy, is not what they are about; nor who started them."""
 
 import signal
+from collections import Counter
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile("patient", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -9,3 +11,13 @@ settings.load_profile("patient")
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what it sends to the background so,
     signal.signal(signal.SIGINT, signal.default_int_handler)  # and programs that tests start would inherit it
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the files that take long: those with the longest time-outs, then those with most tests."""
+    files = Counter(item.path for item in items)
+    limits = Counter[object]()
+    for item in items:
+        marker = item.get_closest_marker("timeout")
+        limits[item.path] = max(limits[item.path], marker.args[0] if marker else 0)
+    items.sort(key=lambda item: (-limits[item.path], -files[item.path]))

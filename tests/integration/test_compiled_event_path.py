@@ -20,7 +20,14 @@ RUNS = (
     ),
 )
 COMMAND = "from volery.cli.main import main; main()"
-MODULES = ("kernel.virtual", "requirements.ledgers", "trace.chunk", "trace.spans", "cost.ticks")
+MODULES = (
+    "kernel.virtual",
+    "kernel.event_heap",
+    "requirements.ledgers",
+    "trace.chunk",
+    "trace.spans",
+    "cost.ticks",
+)
 WHICH = f"from importlib import import_module as i; print(*(i('volery.' + m).__file__ for m in {MODULES}))"
 
 

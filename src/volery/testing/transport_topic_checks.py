@@ -190,6 +190,7 @@ def both_sides_count_their_peers(site: Site) -> None:
     site.until(speaker, lambda: publisher.subscribers() == 0, "the publisher counts 0 again")
     other = listener.subscribe("chat", STRING, lambda one: None)
     site.until(speaker, lambda: other.publishers() == 1, "a new subscription counts 1")
+    site.until(speaker, lambda: publisher.subscribers() == 1, "the publisher counts the new one")
     publisher.close()
     site.until(speaker, lambda: other.publishers() == 0, "it counts 0 when the publisher has gone")
 

@@ -49,7 +49,7 @@ from volery.ros.graph.interface import (
     full_node_name,
     no_route,
 )
-from volery.ros.messages import cdr_size, new
+from volery.ros.messages import Message, cdr_size, new
 
 if TYPE_CHECKING:
 
@@ -327,6 +327,7 @@ class EmbeddedGraph:
         unrecorded: Record no event; for a graph that is no part of the modelled system, such as the wire to a
             simulated vehicle.
         as_bytes: Encode and decode every message, so that values have the precision of a transport.
+        size_of: Returns the size of a message for its route, bytes; by default that of its encoding.
     """
 
     def __init__(
@@ -339,6 +340,7 @@ class EmbeddedGraph:
         epoch: Ns = 0,
         unrecorded: bool = False,
         as_bytes: bool = False,
+        size_of: Callable[[Message], int] = cdr_size,
     ) -> None:
         self.kernel = kernel
         self._graph = GraphContext(
@@ -350,6 +352,7 @@ class EmbeddedGraph:
             Signal(kernel, "the ROS graph"),
             unrecorded=unrecorded,
             as_bytes=as_bytes,
+            size_of=size_of,
         )
         self._graph.listen_to_clock = ClockPublisher(self._graph).listen
         self._nodes: dict[str, EmbeddedNode] = {}

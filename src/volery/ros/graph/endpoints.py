@@ -169,7 +169,7 @@ class EmbeddedPublisher:
             if self._recorded:
                 node.kernel.record(Published(sent, self.topic, self.type, node.name, data))
         elif self._sized:
-            size = cdr_size(content)
+            size = node.graph.size_of(content)
         self._due = sent + self._spacing
         if self._latches:
             self._latched.append((content.copy(), sent, size))

@@ -20,7 +20,7 @@ from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
 from volery.ros.graph.interface import NodeId, QoS, Routing, Tariffs
-from volery.ros.messages import Message, from_cdr, to_cdr
+from volery.ros.messages import Message, cdr_size, from_cdr, to_cdr
 from volery.trace.events import Charge, Event
 
 Records = Callable[[str], bool]
@@ -150,6 +150,7 @@ class GraphContext:
         listen_to_clock: Called for each subscription to ``/clock``.
         unrecorded: No event of the graph is recorded.
         as_bytes: Messages are encoded and decoded, as by a transport.
+        size_of: Size of a message for its route, bytes.
     """
 
     kernel: Kernel
@@ -164,6 +165,7 @@ class GraphContext:
     services: dict[str, ServiceEnd] = field(default_factory=dict)
     unrecorded: bool = False
     as_bytes: bool = False
+    size_of: Callable[[Message], int] = cdr_size
 
     def record(self, event: Event) -> None:
         """Record an event of the graph."""

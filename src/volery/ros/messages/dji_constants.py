@@ -68,12 +68,12 @@ class DisplayMode(IntEnum):
     ENGINE_START = 41
 
 
+_NAMES = {mode.value: mode.name for mode in DisplayMode}
+
+
 def display_name(number: int) -> str:
     """Return the public name of a mode."""
-    try:
-        return DisplayMode(number).name
-    except ValueError:
-        return f"MODE_{number}"
+    return _NAMES.get(number) or f"MODE_{number}"
 
 
 class FlightStatus(IntEnum):

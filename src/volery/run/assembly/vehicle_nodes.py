@@ -23,6 +23,8 @@ from functools import partial
 from random import Random
 from typing import TYPE_CHECKING
 
+from mypy_extensions import mypyc_attr
+
 from volery.base.errors import CapabilityError
 from volery.base.frames import LocalFrame
 from volery.base.seeds import stream
@@ -33,6 +35,7 @@ from volery.links.link import Link
 from volery.links.wire_faults import REORDER_DELAY, WireFaults
 from volery.ros.graph import EmbeddedGraph, RosGraph
 from volery.ros.graph.interface import NodeId, Route
+from volery.ros.messages import Message, cdr_size
 from volery.run.assembly.simulated_vehicles import LINK_DELAY, SimulatedVehicle
 from volery.vehicles.driver import Driver, Opener, drivers
 
@@ -46,6 +49,7 @@ NO_FAULTS = WireFaults()
 """A link without faults."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class GraphWire:
     """Route of messages between two nodes. Faults are drawn from *random* in the order of sending."""
 
@@ -60,6 +64,10 @@ class GraphWire:
     def set_faults(self, faults: WireFaults) -> None:
         """Apply *faults* to the messages in both directions from now on."""
         self._faults = faults
+
+    def size_of(self, message: Message) -> int:
+        """Return the size of a message where it matters, for bits that flip; else 0."""
+        return cdr_size(message) if self._faults.flip else 0
 
     def route(self, sender: NodeId, receiver: NodeId) -> Route:
         """Return the route between two nodes. It keeps the order of messages unless faults reorder them.
@@ -111,7 +119,7 @@ def private_graph(kernel: Kernel, wire: GraphWire, *, as_bytes: bool) -> Embedde
         wire: Route between each two nodes.
         as_bytes: Encode and decode each message, as a transport does.
     """
-    return EmbeddedGraph(kernel, route=wire.route, unrecorded=True, as_bytes=as_bytes)
+    return EmbeddedGraph(kernel, route=wire.route, unrecorded=True, as_bytes=as_bytes, size_of=wire.size_of)
 
 
 Serve = Callable[[RosGraph, Link, str, ExecutionContext, LocalFrame], object]

@@ -16,6 +16,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from math import hypot, inf, isnan
 
+from mypy_extensions import mypyc_attr
+
 from volery.base.errors import Refused, UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Position
@@ -347,6 +349,7 @@ class TargetMonitor:
         return not level or abs(target.altitude.metres - goal.altitude.metres) <= SAME_TARGET_M
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class SetpointRepeater(ABC):
     """Repeats one set-point while the vehicle is in *mode*, and manual control while the mode is ours.
 

@@ -67,6 +67,7 @@ AMSL_REMEDY = (
 
 WAITS = frozenset({DisplayMode.P_GPS, DisplayMode.ATTITUDE})
 """Modes in which it hovers and accepts commands if the pilot's switch permits."""
+_GO_HOME, _TAKE_OFF = DisplayMode.NAVI_GO_HOME.name, DisplayMode.AUTO_TAKEOFF.name
 LANDS = frozenset({DisplayMode.AUTO_LANDING, DisplayMode.FORCE_AUTO_LANDING})
 DESCENDING_MODES = LANDS | {DisplayMode.NAVI_GO_HOME}
 TAKES_OFF = frozenset({DisplayMode.ENGINE_START, DisplayMode.ASSISTED_TAKEOFF, DisplayMode.AUTO_TAKEOFF})
@@ -324,15 +325,15 @@ class DjiDecoder:
         if status in (M100Status.LANDING, M100Status.FINISHED_LANDING):
             return DisplayMode.AUTO_LANDING
         commanded = self.commanded if telemetry.flying and self.commanded in DisplayMode.__members__ else ""
-        if commanded and commanded != DisplayMode.AUTO_TAKEOFF.name:
+        if commanded and commanded != _TAKE_OFF:
             return DisplayMode[commanded]
         return DisplayMode.P_GPS
 
     def _named(self, mode: int) -> str:
         commanded = self.commanded
-        if commanded == DisplayMode.NAVI_GO_HOME.name and mode == DisplayMode.AUTO_LANDING:
+        if commanded == _GO_HOME and mode == DisplayMode.AUTO_LANDING:
             return commanded
-        if commanded == DisplayMode.AUTO_TAKEOFF.name and mode in TAKES_OFF:
+        if commanded == _TAKE_OFF and mode in TAKES_OFF:
             return commanded
         return display_name(mode) if mode != UNKNOWN else ""
 

@@ -32,6 +32,7 @@ RESEND_PERIOD: Ns = 2 * S
 SDK, WAITS = DisplayMode.NAVI_SDK_CTRL.name, DisplayMode.P_GPS.name
 STARTS = (DisplayMode.ENGINE_START.name, DisplayMode.ATTITUDE.name, WAITS, SDK)
 """Modes that the aircraft enters while the motors start."""
+TAKE_OFF_MODES = frozenset(mode.name for mode in TAKES_OFF)
 LANDING_MODES = frozenset(mode.name for mode in DESCENDING_MODES)
 
 
@@ -294,7 +295,7 @@ class DjiTasks:
     def _off_the_ground(self, seen: Telemetry) -> bool:
         if self._backend.is_m100 and not seen.above_home >= M100_GAINS_M:
             return False
-        return seen.flying and seen.mode not in {mode.name for mode in TAKES_OFF}
+        return seen.flying and seen.mode not in TAKE_OFF_MODES
 
     def return_home(self, within: Ns) -> Sequence[Step]:
         """Return steps for task 1: climb, go home and land; near home it lands at once.

@@ -42,6 +42,9 @@ THROTTLE_DEAD = 0.05
 """Half width of the throttle's range in which the height is kept."""
 
 STILL = Velocity(0.0, 0.0, 0.0)
+SDK = DisplayMode.NAVI_SDK_CTRL.name
+WAITING = frozenset(mode.name for mode in WAITS)
+"""Names of the modes in which it hovers and accepts commands."""
 
 Setpoint = tuple[int, Sequence[float]]
 """The flag, and four numbers in the conventions of ROS (REP 103)."""
@@ -128,9 +131,8 @@ class SetpointStream:
             self.stop()
 
     def _not_obeyed(self) -> bool:
-        waits = {mode.name for mode in WAITS}
         now = self._kernel.now()
-        if not self._telemetry.flying or self._telemetry.mode not in waits or self._telemetry.failsafe:
+        if not self._telemetry.flying or self._telemetry.mode not in WAITING or self._telemetry.failsafe:
             self._not_obeyed_since = None
         return self._not_obeyed_since is not None and now - self._not_obeyed_since > OBEYED_WITHIN
 
@@ -140,7 +142,7 @@ class SetpointStream:
         made = self._compute()
         if made is None:
             self._not_obeyed_since = None
-        elif self._not_obeyed_since is None and self._telemetry.mode != DisplayMode.NAVI_SDK_CTRL.name:
+        elif self._not_obeyed_since is None and self._telemetry.mode != SDK:
             self._not_obeyed_since = self._kernel.now()
         return made
 

@@ -8,7 +8,9 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
+
+from mypy_extensions import mypyc_attr
 
 from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent
 from volery.base.time import MS, Ns, S
@@ -225,6 +227,7 @@ def stream_periods(firmware: Firmware, options: Mapping[str, str]) -> dict[str, 
     return periods
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class MavlinkClient:
     """Client of the first autopilot of its firmware that sends a heartbeat on the link.
 
@@ -235,8 +238,8 @@ class MavlinkClient:
         options: see ``MAVLINK_OPTIONS``.
     """
 
-    cycle: Action | None = None
-    firmware: Firmware
+    cycle: ClassVar[Action | None] = None
+    firmware: ClassVar[Firmware]
 
     def __init__(self, kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> None:
         self.telemetry = Telemetry(kernel, name)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from math import degrees, nan
-from typing import Any
+from typing import Any, ClassVar
+
+from mypy_extensions import mypyc_attr
 
 from volery.base.errors import UsageError
 from volery.base.position import AMSL, Position
@@ -45,6 +47,7 @@ RC_CHANNELS = 18
 """Channels in RC_CHANNELS."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class TelemetryDecoder(ABC):
     """Decodes MAVLink messages into telemetry.
 
@@ -59,8 +62,8 @@ class TelemetryDecoder(ABC):
         record: whether the autopilot's texts are recorded.
     """
 
-    autopilot = ""
-    resting = ""
+    autopilot: ClassVar[str] = ""
+    resting: ClassVar[str] = ""
 
     def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool = True) -> None:
         self.last_heartbeat_ns: Ns = -1
