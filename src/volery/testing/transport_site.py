@@ -13,8 +13,7 @@ from volery.ros.graph.interface import Node, RosGraph
 from volery.testing.checks import demand
 
 LIMIT: Ns = 30 * S
-"""Time allowed for discovery and delivery: DDS repeats lost announcements only every few seconds."""
-"""Longest wait for something that must happen, ns; discovery takes time on real ROS."""
+"""Longest wait for something that must happen, ns; DDS repeats a lost announcement only after seconds."""
 QUIET: Ns = 300 * MS
 """Time of waiting for something that must not happen, ns."""
 

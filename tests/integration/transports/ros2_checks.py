@@ -59,8 +59,8 @@ def a_type_without_support(site: Site, texts: list[str]) -> None:
     node.serve("set_mode", SET_MODE, lambda asked: kind.response(asked.custom_mode == "LAND"))
     site.spinning(node)
     client = other.client("set_mode", SET_MODE)
-    demand(client.wait(10 * S), "it is served")
-    demand(client.call(request(SET_MODE, custom_mode="LAND"), 10 * S).mode_sent, "it is answered")
+    demand(client.wait(30 * S), "it is served")
+    demand(client.call(request(SET_MODE, custom_mode="LAND"), 30 * S).mode_sent, "it is answered")
 
 
 def a_type_with_other_fields(site: Site, texts: list[str]) -> None:

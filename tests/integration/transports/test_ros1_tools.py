@@ -144,8 +144,8 @@ def test_roscpp(ours: Ours, start: Start, roscpp_peer: str) -> None:
     ours.until(lambda: len(heard) == 2, "roscpp answers")
     assert set(heard) == {"roscpp heard us", "roscpp was told by volery"}
     client = node.client("roscpp_set", SET_BOOL)
-    assert client.wait(10 * S)
-    answer = client.call(request(SET_BOOL, data=True), 10 * S)
+    assert client.wait(30 * S)
+    answer = client.call(request(SET_BOOL, data=True), 30 * S)
     assert (answer.success, answer.message) == (True, "roscpp")
 
 
