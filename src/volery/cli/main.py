@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import sys
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
@@ -13,13 +12,11 @@ from typing import Annotated, Any
 import typer
 
 from volery.base.errors import UsageError
+from volery.base.garbage import seldom_collected
 from volery.cli import commands
 from volery.cli.command import BAD_INPUT, SECTIONS, Commands
 from volery.cli.configuration import read_defaults
 from volery.cli.console import Output
-
-COLLECT_EVERY = 20_000
-"""Objects between two garbage collections: most that a command makes are modules and classes, which stay."""
 
 INFORMATION = frozenset({"-h", "--help", "--version"})
 """Options that a wrong configuration file does not stop: its error is printed beside what they print."""
@@ -60,9 +57,9 @@ def _application() -> typer.Typer:
 app = _application()
 
 
+@seldom_collected()
 def main() -> None:
     """Run the command line of this process, with the defaults of the nearest configuration file."""
-    gc.set_threshold(COLLECT_EVERY)
     command = typer.main.get_group(app)
     defaults: dict[str, Any] = {}
     try:

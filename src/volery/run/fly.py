@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from volery.base.errors import ComponentError, UsageError, VoleryError, choices
+from volery.base.garbage import seldom_collected
 from volery.base.position import AMSL, Position
 from volery.components.component_api import register_kernel
 from volery.components.instance import describe
@@ -65,6 +66,7 @@ class Restrictions:
 NO_RESTRICTIONS = Restrictions()
 
 
+@seldom_collected()
 def fly(
     mission: Mission | str | Path,
     on: str | Sequence[str],

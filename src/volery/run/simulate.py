@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from volery.base.errors import CapabilityError, UsageError, choices
+from volery.base.garbage import seldom_collected
 from volery.base.time import MS, Ns
 from volery.components.cpp.build import build_framework
 from volery.kernel.virtual import VirtualKernel
@@ -54,6 +55,7 @@ GOAL_PERIOD: Ns = 100 * MS
 """Period at which the model's ``until`` is checked."""
 
 
+@seldom_collected()
 def simulate(
     model: System | ModelBuilder | str | Path,
     options: Options = DEFAULT_OPTIONS,

@@ -157,18 +157,21 @@ class EmbeddedPublisher:
         return len(self._connections)
 
     def send(self, message: Any, sent: Ns, *, fresh: bool = False) -> None:
-        """Send a message whose call has been executed; a `fresh` one was made for this call."""
+        """Send a message whose call has been executed; a `fresh` one was made for this call by the framework.
+
+        A message of others is encoded even if nothing needs its bytes: real ROS finds values that do not fit.
+        """
         node, connections = self.node, self._connections
         if not (connections or self._latches or self._recorded or (self._checked and not fresh)):
             return
         content = node.graph.copy(message) if node.graph.as_bytes else message.copy()
         size = 0
-        if self._recorded or self._checked:
+        if self._recorded or (self._checked and not fresh):
             data = copied_to_cdr(content)
             size = len(data)
             if self._recorded:
                 node.kernel.record(Published(sent, self.topic, self.type, node.name, data))
-        elif self._sized:
+        elif self._checked or self._sized:
             size = node.graph.size_of(content)
         self._due = sent + self._spacing
         if self._latches:
