@@ -22,7 +22,8 @@ from volery.run.assembly.ros_graphs import GRAPHS, open_graph
 from volery.run.fly import fly
 from volery.run.gains import GainParameters, GainsFile
 from volery.run.result import Options, Run
-from volery.trace.events import Event, Stream, Text
+from volery.trace.events import Event, Text
+from volery.trace.stream import Stream
 from volery.vehicles import Drone
 from volery.vehicles.address import MAVLINK_OPTIONS, parse
 from volery.vehicles.driver import drivers

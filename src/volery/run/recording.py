@@ -23,8 +23,9 @@ from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RUN_FILE, RunRecord, Status, write_record
 from volery.run.event_log import EventLog, LogOptions
 from volery.trace.attachments import RunSetup
-from volery.trace.events import Stream, Verdict
+from volery.trace.events import Verdict
 from volery.trace.mcap_writer import TRACE_FILE, Attachment, McapWriter
+from volery.trace.stream import Stream
 from volery.trace.timeline import TimelineWriter
 
 _LIBRARIES = ("greenlet", "llvmlite", "numba", "numpy", "pymavlink", "rosbags", "mcap")

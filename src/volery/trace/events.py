@@ -1,4 +1,4 @@
-"""The schema of a run's events, and the stream that distributes them.
+"""The schema of a run's events.
 
 All times are ``int`` nanoseconds since the start of the run. An event is a fact; costs, meanings and
 violations are derived by the readers of the stream.
@@ -7,7 +7,7 @@ violations are derived by the readers of the stream.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple
 
 from volery.base.time import Ns
 
@@ -255,45 +255,3 @@ Record = Callable[[Any], None]
 
 def ignore(event: Event) -> None:
     """Discard *event*."""
-
-
-@runtime_checkable
-class SelectiveListener(Protocol):
-    """A listener that takes only some kinds of events, or takes some by a faster function."""
-
-    def listener(self, kind: type[Any]) -> Record | None:
-        """Return what takes events of *kind*, None if they do not matter here."""
-
-
-class Stream:
-    """Distributes every event to its listeners. Itself a ``Record``.
-
-    A run records thousands of events a second, so the listeners of each kind of event are looked up once.
-    """
-
-    def __init__(self) -> None:
-        self._taps: list[Record] = []
-        self._routes = _Routes(self._taps)
-
-    def tap(self, listener: Record) -> None:
-        """Add a listener of every event; a ``SelectiveListener`` receives the kinds that it selects."""
-        self._taps.append(listener)
-        self._routes.clear()
-
-    def __call__(self, event: Event) -> None:
-        """Pass *event* to its listeners."""
-        for listener in self._routes[type(event)]:
-            listener(event)
-
-
-class _Routes(dict[type[Any], tuple[Record, ...]]):
-    """Listeners by kind of event, looked up when the first event of a kind is recorded."""
-
-    def __init__(self, taps: list[Record]) -> None:
-        super().__init__()
-        self._taps = taps
-
-    def __missing__(self, kind: type[Any]) -> tuple[Record, ...]:
-        found = [tap.listener(kind) if isinstance(tap, SelectiveListener) else tap for tap in self._taps]
-        routes = self[kind] = tuple(listener for listener in found if listener is not None)
-        return routes

@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from volery.trace.events import Event, Failure, Record, Stream, Text
+from volery.trace.events import Event, Failure, Record, Text
+from volery.trace.stream import Stream
 
 WORDS = Text(1, "a", 6, "b")
 FAILURE = Failure(2, "a", "b")
