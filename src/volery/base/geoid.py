@@ -125,7 +125,7 @@ class Geoid(ABC):
         return ellipsoidal - self.separation(latitude, longitude)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class LevelGeoid(Geoid):
     """The same separation everywhere, ``metres``; for a place where it is known better than by EGM96.
 
