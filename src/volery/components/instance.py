@@ -199,7 +199,15 @@ class Instance:
 
 
 class ForeignError(Exception):
-    """An error of code that is not Python; its text describes it completely."""
+    """An exception that code in another language did not catch; its text describes it completely.
+
+    Args:
+        kind: Type of the exception, as its language names it.
+        what: Its own text; may be empty.
+    """
+
+    def __init__(self, kind: str, what: str) -> None:
+        super().__init__(f"{kind}: {what}" if what else kind)
 
 
 def describe(error: BaseException) -> str:

@@ -17,7 +17,6 @@ from volery.base.position import AMSL, Position
 from volery.components import component_api
 from volery.components.cpp.build import CompiledComponent, CppOperation, operations
 from volery.components.cpp.framework import (
-    CppError,
     FiberPool,
     LoadedLibrary,
     ProcessExit,
@@ -25,6 +24,7 @@ from volery.components.cpp.framework import (
     ToSteps,
     framework_runtime,
 )
+from volery.components.instance import ForeignError
 from volery.components.ports import PortList
 from volery.components.virtual_stdlib import EPOCH
 from volery.components.virtual_stdlib.process_environment import INFO
@@ -304,7 +304,7 @@ class CppProgram:
             status = Reader(returned).integer() if returned else 0  # run() of a class returns nothing
         except ProcessExit as exited:
             status = exited.status
-        except CppError as error:
+        except ForeignError as error:
             if self._compiled.component.class_name:
                 raise
             raise ComponentError(self._name, f"main() raised {error}") from error

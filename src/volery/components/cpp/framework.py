@@ -52,13 +52,6 @@ class ProcessExit(BaseException):
         super().__init__(f"exit({status})")
 
 
-class CppError(ForeignError):
-    """A C++ exception that the code did not catch."""
-
-    def __init__(self, kind: str, what: str) -> None:
-        super().__init__(f"{kind}: {what}" if what else kind)
-
-
 class _FiberState(ctypes.Structure):
     """``volery_fiber`` of ``<volery/framework.h>``."""
 
@@ -201,12 +194,12 @@ class Fiber:
     def _exception(self, outcome: bytes, data: bytes) -> BaseException:
         """Return the exception that a callable ended with, the original one where it came from Python."""
         if outcome == _CANCELLED:
-            return self._cancellation or CppError("volery::Cancelled", "")
+            return self._cancellation or ForeignError("volery::Cancelled", "")
         reader = Reader(data)
         kind, what = reader.text(), reader.text()
         if outcome == _FAILED and self._error is not None and str(self._error) == what:
             return self._error
-        return CppError(kind, what)
+        return ForeignError(kind, what)
 
 
 class FiberPool:
