@@ -5,7 +5,7 @@ is what braking over the remaining distance allows, and it runs slower, down to 
 farther the vehicle is behind it (MPC_XY_ERR_MAX). Position error times MPC_XY_P, the trajectory's velocity
 and acceleration feed a PID on velocity. The loops fly the airframe that was recorded, SIH's quadrotor, whose
 drag is large: the integral winds up against it on a long leg, and the leg ends too far by what it has to
-unwind. The flight stack follows the position and velocity of that airframe.
+unwind. The loops see what EKF2 would state of that airframe, and the flight stack follows that position.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from volery.base.frames import Vector
 from volery.base.time import Ns, from_seconds, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.flight_stack.guidance import approach, shorten
+from volery.simulation.autopilots.px4.delay_error import STEP, DelayError
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
-SUBSTEP: Final = 0.02
+SUBSTEP: Final = STEP
 """Step of the integration [s]."""
 
 DRAG: Final = 1.0
@@ -100,7 +101,7 @@ class Trajectory:
             gains: Limits of acceleration and jerk.
             point: North, east, down [m]; down may be infinite: it sinks at ``cruise.down``.
             cruise: Limits of speed.
-            flown: Position of the aircraft [m].
+            flown: Position of the aircraft by its estimate [m].
             passed: Time [s].
         """
         jerk, push, place, speed = gains.jerk, gains.push, self.position, self.velocity
@@ -173,11 +174,18 @@ class Wanted(NamedTuple):
 
 
 class AirframeLoops:
-    """Position and velocity loops that fly the recorded airframe."""
+    """Position and velocity loops that fly the recorded airframe.
+
+    Position and velocity are those that EKF2 states; they differ by ``DelayError`` from the flown ones.
+    """
 
     def __init__(self, position: Vector, velocity: Vector) -> None:
         self.position, self.velocity = list(position), list(velocity)
+        self.moving = list(velocity)
+        """Rate at which the stated position moves [m/s]."""
         self.accel = [0.0, 0.0, 0.0]
+        self._flown = list(velocity)
+        self._errors = DelayError(), DelayError()
         self._thrust = [DRAG * v for v in velocity]
         self._integral = list(self._thrust)
         self._hover = 1.0
@@ -188,6 +196,8 @@ class AirframeLoops:
         self.position = list(position)
         for axis in range(2):
             self.velocity[axis] = self.accel[axis] = self._thrust[axis] = self._integral[axis] = 0.0
+            self._flown[axis] = self.moving[axis] = 0.0
+        self._errors = DelayError(), DelayError()
         self._hover = 1.0
 
     def step(self, gains: Gains, wanted: Wanted, limits: Cruise) -> None:
@@ -231,12 +241,18 @@ class AirframeLoops:
 
     def _move(self, axis: int, wanted: float, lag: float) -> None:
         """Advance one axis by a substep under a commanded acceleration, which it follows with a lag [s]."""
-        before = self.velocity[axis]
+        before = self._flown[axis]
         thrust = self._thrust[axis] + SUBSTEP / lag * (wanted - self._thrust[axis])
         accel = thrust - DRAG * before
         speed = before + accel * SUBSTEP
-        self._thrust[axis], self.accel[axis], self.velocity[axis] = thrust, accel, speed
-        self.position[axis] += 0.5 * (before + speed) * SUBSTEP
+        self._thrust[axis], self.accel[axis], self._flown[axis] = thrust, accel, speed
+        moving, stated = 0.5 * (before + speed), speed
+        if axis < 2:
+            error = self._errors[axis]
+            error.step(speed, accel)
+            moving, stated = moving + error.rate, stated + error.velocity
+        self.position[axis] += moving * SUBSTEP
+        self.moving[axis], self.velocity[axis] = moving, stated
 
     def _estimate_hover(self, given: float, push: float) -> None:
         """Estimate the thrust that hovers from thrust and acceleration; the integral keeps the thrust.
@@ -321,7 +337,7 @@ class PositionLoops:
         vehicle, here = self._vehicle, self._vehicle.estimate.position
         north, east, down = (
             v + FOLLOW_LEAD * a + FOLLOW_GAIN * (place - at)
-            for place, v, a, at in zip(loops.position, loops.velocity, loops.accel, here, strict=True)
+            for place, v, a, at in zip(loops.position, loops.moving, loops.accel, here, strict=True)
         )
         vehicle.drive(
             Setpoint(

@@ -67,3 +67,10 @@ def test_the_integral_holds_the_whole_drag_at_the_end_of_a_long_descent() -> Non
     loops = flown((4.8, 0.0, 1.1), 60.0)
     assert loops.velocity == pytest.approx([4.8, 0.0, 1.1], abs=0.02)
     assert loops._integral[0] > 4.7
+
+
+def test_the_stated_position_is_ahead_of_the_flown_one() -> None:
+    loops = flown((4.8, 0.0, 0.0), 60.0)
+    assert loops.position[0] > 0.0
+    assert loops.moving[0] == pytest.approx(4.8, abs=0.02)
+    assert loops._errors[0].position == pytest.approx(0.06 * 4.8, abs=0.01)
