@@ -23,8 +23,8 @@ of PX4 1.14 in SIH, 0.04 to 0.09."""
 FROM_VELOCITY: Final = (0.0607, 0.0396, 0.00874)
 FROM_POSITION: Final = (0.0556, 0.0177, 0.00266)
 """Gains of a fix's velocity [s, 1, 1/s] and position [1, 1/s, 1/s^2] on position, velocity and the
-acceleration that a wrong tilt appears as. Steady state of the filter with EKF2_ACC_NOISE 0.35, EKF2_GYR_NOISE 0.015 in
-steps of EKF2_PREDICT_US, and the receiver's stated deviations of 0.5 m/s and 0.9 m."""
+acceleration that a wrong tilt appears as: the steady state of the filter with EKF2_ACC_NOISE 0.35 and
+EKF2_GYR_NOISE 0.015 in steps of EKF2_PREDICT_US; the receiver states deviations of 0.5 m/s and 0.9 m."""
 
 PREDICTOR_LAG: Final = 0.25
 """EKF2_TAU_VEL, EKF2_TAU_POS [s]."""
