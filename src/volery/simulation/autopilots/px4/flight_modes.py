@@ -16,6 +16,7 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, 
 from volery.simulation.autopilots.manoeuvres.to_point import Land, ToPoint, bearing
 from volery.simulation.autopilots.manual_control import StickPositions
 from volery.simulation.autopilots.px4.position_control import Cruise, PositionLoops
+from volery.simulation.autopilots.px4.yaw_stick import YawStick
 from volery.simulation.autopilots.state_groups import NEVER, Home
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
@@ -262,17 +263,42 @@ def apply_expo(stick: float, dead: float) -> float:
 class AltitudeControl(AltitudeHold):
     """ALTCTL: as ``AltitudeHold``; throttle and yaw stick have a dead zone and an expo curve."""
 
+    def __init__(self, vehicle: Vehicle) -> None:
+        super().__init__(vehicle)
+        self._turn = YawStick()
+        self._turned_at: Ns = vehicle.kernel.now()
+
     def climb(self, throttle: float) -> float:
         """Return the climb rate [m/s] for a throttle position 0..1 on the expo curve."""
         rate = super().climb(throttle)
         most = self.vehicle.tuning.pilot_up if rate > 0.0 else self.vehicle.tuning.pilot_down
         return most * bend(rate / most)
 
+    def enter(self) -> None:
+        """Start without a turn."""
+        super().enter()
+        self._turn, self._turned_at = YawStick(), self.vehicle.kernel.now()
+
+    def step(self) -> None:
+        """Turn as the yaw stick results in, and pass the sticks on."""
+        now = self.vehicle.kernel.now()
+        passed, self._turned_at = to_seconds(now - self._turned_at), now
+        turn_by_stick(self.vehicle, self._turn, super().pilot.yaw, passed)
+        super().step()
+
     @property
     def pilot(self) -> StickPositions:
-        """The stick positions now, the yaw as PX4 shapes it."""
-        sticks = super().pilot
-        return sticks._replace(yaw=apply_expo(sticks.yaw, self.vehicle.parameters["MPC_HOLD_DZ"]))
+        """The stick positions now, the yaw as the rate of turn that it results in."""
+        return super().pilot._replace(yaw=self._turn.rate / self.vehicle.tuning.pilot_yaw_rate)
+
+
+def turn_by_stick(vehicle: Vehicle, turn: YawStick, stick: float, passed: float) -> float:
+    """Advance a turn by a yaw stick -1..1 and return its rate [rad/s]; on the ground there is none."""
+    if vehicle.landed:
+        turn.reset()
+        return 0.0
+    wanted = apply_expo(stick, vehicle.parameters["MPC_HOLD_DZ"]) * vehicle.tuning.pilot_yaw_rate
+    return turn.step(wanted, passed)
 
 
 class BlindDescent(Manoeuvre):
@@ -310,6 +336,7 @@ class PositionControl(ManualFlight):
         super().__init__(vehicle)
         self.slow_start = True
         self._velocity = (0.0, 0.0)
+        self._turn = YawStick()
         self._last: Ns = 0
         self._held: Vector | None = None
         self._blind: BlindDescent | None = None
@@ -318,7 +345,7 @@ class PositionControl(ManualFlight):
         """Start with the present velocity."""
         north, east, _ = self.vehicle.estimate.velocity
         self._velocity, self._held, self._blind = (north, east), None, None
-        self._last = self.vehicle.kernel.now()
+        self._last, self._turn = self.vehicle.kernel.now(), YawStick()
 
     def takeoff_requested(self) -> bool:
         """Return whether the pilot commands a climb."""
@@ -361,7 +388,7 @@ class PositionControl(ManualFlight):
                 position=self._held or (0.0, 0.0, 0.0),
                 velocity=(north, east, -climb),
                 climb=min(climb, climb_share(vehicle) * tuning.speed_up),
-                yaw_rate=apply_expo(sticks.yaw, dead) * tuning.pilot_yaw_rate,
+                yaw_rate=turn_by_stick(vehicle, self._turn, sticks.yaw, passed),
                 speed=tuning.speed,
                 speed_up=climb_share(vehicle) * tuning.speed_up,
                 speed_down=tuning.speed_down,
