@@ -20,8 +20,8 @@ AHEAD: Final = 0.06
 """Time by which the estimate is ahead of the aircraft [s]: position error over speed in six logged flights
 of PX4 1.14 in SIH, 0.04 to 0.09."""
 
-FROM_VELOCITY: Final = (0.0607, 0.0396, 0.00874)
-FROM_POSITION: Final = (0.0556, 0.0177, 0.00266)
+FROM_VELOCITY = (0.0607, 0.0396, 0.00874)
+FROM_POSITION = (0.0556, 0.0177, 0.00266)
 """Gains of a fix's velocity [s, 1, 1/s] and position [1, 1/s, 1/s^2] on position, velocity and the
 acceleration that a wrong tilt appears as: the steady state of the filter with EKF2_ACC_NOISE 0.35 and
 EKF2_GYR_NOISE 0.015 in steps of EKF2_PREDICT_US; the receiver states deviations of 0.5 m/s and 0.9 m."""
