@@ -191,11 +191,13 @@ class Instance:
                 self.flush_charges()
 
     def _wait_for_object(self) -> object:
-        if self.object is None:
+        made = self.object
+        if made is None:
             self._constructed.wait_for(lambda: self.object is not None or self._unavailable)
-            if self.object is None:
+            made = self.object
+            if made is None:
                 raise ComponentError(self.name, f"cannot be called: {self._unavailable}")
-        return self.object
+        return made
 
 
 class ForeignError(Exception):
