@@ -60,7 +60,7 @@ $(VENV)/dev.stamp: $(VENV)/volery.stamp
 $(VENV)/test.stamp: $(VENV)/dev.stamp scripts/debian-packages $(VENV)/ros1.stamp $(ROS2)
 	@echo "setting up $(VENV): independent MAVLink clients"
 	@$(PIP) install --group clients
-	@scripts/debian-packages chromium native
+	@scripts/debian-packages chromium native libeigen3-dev
 	@touch $@
 
 $(VENV)/ros1.stamp: $(VENV)/volery.stamp scripts/debian-packages scripts/ros1-modules
