@@ -72,9 +72,10 @@ def test_a_vehicle_behind_mavros(beside: Beside) -> None:
 
 def test_the_graph_is_shown_to_whoever_has_just_come(beside: Beside) -> None:
     """All of it: who joins knows nobody at first."""
-    found = beside("ros2_shown.py", "/mavros/state")
+    found = beside("ros2_shown.py", "/mavros/state,/mavros/mavros,/mavros/cmd/arming")
     assert found["nodes"] == ["/mavros/mavros"]
     topics = {topic["name"]: topic for topic in found["topics"]}
     assert topics["/mavros/state"]["publishers"] == ["/mavros/mavros"]
     assert len(topics) > 40
     assert "/mavros/cmd/arming" in {service["name"] for service in found["services"]}
+    assert {service["server"] for service in found["services"]} == {"/mavros/mavros"}

@@ -7,11 +7,13 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
-from volery.base.time import MS, Ns, to_seconds
+from volery.base.time import MS, Ns, S, to_seconds
 from volery.ros.graph.interface import AS_OFFERED, QoS, RosGraph, ServiceState
 
 _MEASURING = QoS(1000, AS_OFFERED.reliability, AS_OFFERED.durability)
 _PORTION: Ns = 100 * MS
+_DISCOVERY_LIMIT: Ns = 4 * S
+"""Longest wait for the first node, ns; DDS repeats a lost announcement after 3 s."""
 
 
 class TopicSnapshot(NamedTuple):
@@ -43,11 +45,16 @@ class GraphSnapshot(NamedTuple):
 def snapshot(graph: RosGraph, within: Ns = 0) -> GraphSnapshot:
     """Return a snapshot of a graph; the node that measures is not in it.
 
+    An empty graph is watched for 4 s, as the nodes of ROS 2 may be discovered late.
+
     Args:
         graph: The graph.
         within: Time for which each topic's messages are counted, ns; the call blocks for that time. 0 for no
             rates.
     """
+    end = graph.kernel.now() + _DISCOVERY_LIMIT
+    while not graph.node_names() and (now := graph.kernel.now()) < end:
+        graph.kernel.sleep_until(now + _PORTION)
     topics, nodes, services = graph.topics(), graph.node_names(), graph.services()
     rates = _rates(graph, within) if within > 0 else {}
     lines = (TopicSnapshot(*topic, rates.get(topic.name)) for topic in topics)

@@ -33,7 +33,9 @@ from volery.ros.transports.ros2.rclpy_endpoints import (
 from volery.ros.transports.transport_graph import TransportGraph
 
 DISCOVERY_S = 0.6
-"""Time after the start of a process within which discovery is assumed to be complete, s."""
+"""Time after the start of a process within which discovery is complete if no announcement is lost, s."""
+DISCOVERY_LIMIT_S = 5.0
+"""Longest wait for the nodes of endpoints that are known already; DDS repeats announcements every 3 s."""
 GOODBYE_S = 2.0
 WATCH_S = 1.0
 """Period of looking for topics that carry several types, s."""
@@ -137,6 +139,7 @@ class Ros2Library:
             f"{HIDDEN}_{os.getpid()}", "/", enable_rosout=False, start_parameter_services=False
         )
         self._began = time.monotonic()
+        self._discovered = False
         self._thread = threading.Thread(target=self._spin, name="rclpy", daemon=True)
         self._thread.start()
 
@@ -164,12 +167,16 @@ class Ros2Library:
                 if not self._over.is_set():
                     self.say(f"rclpy: {type(error).__name__}: {error}")
 
+    def _endpoints(self, topic: str) -> list[Any]:
+        """Return rclpy's descriptions of the publishers and subscriptions of a topic."""
+        own = self._own
+        return [*own.get_publishers_info_by_topic(topic), *own.get_subscriptions_info_by_topic(topic)]
+
     def _warn_of_types(self) -> None:
         """Warn once of each topic with several types, whose endpoints DDS silently leaves unconnected."""
         for name, kinds in self._own.get_topic_names_and_types():
             if len(kinds) > 1 and name not in self._warned:
-                ends = self._own.get_publishers_info_by_topic(name)
-                ends += self._own.get_subscriptions_info_by_topic(name)
+                ends = self._endpoints(name)
                 if any(one.node_name == NOT_KNOWN_YET for one in ends):
                     continue  # the next look has the node's name
                 self._warned.add(name)
@@ -211,10 +218,20 @@ class Ros2Library:
             node.destroy_node()
 
     def _wait_for_discovery(self) -> None:
-        """Wait until the nodes that exist at the start of this process have been discovered."""
-        left = self._began + DISCOVERY_S - time.monotonic()
-        if left > 0:
-            time.sleep(left)
+        """Wait until the nodes that exist at the start of this process have been discovered.
+
+        An endpoint can be known before its node: then the wait goes on until the limit.
+        """
+        if self._discovered:
+            return
+        time.sleep(max(0.0, self._began + DISCOVERY_S - time.monotonic()))
+        while time.monotonic() < self._began + DISCOVERY_LIMIT_S and any(
+            one.node_name == NOT_KNOWN_YET
+            for topic, _ in self._own.get_topic_names_and_types()
+            for one in self._endpoints(topic)
+        ):
+            time.sleep(POLL_S)
+        self._discovered = True
 
     def node_names(self) -> list[str]:
         """Return the discovered nodes, sorted."""
@@ -238,6 +255,8 @@ class Ros2Library:
         self._wait_for_discovery()
         servers: dict[str, tuple[str, str]] = {}
         for name, space in self._own.get_node_names_and_namespaces():
+            if name.startswith(HIDDEN):
+                continue
             with suppress(Exception):  # a node that has just left
                 for service, kinds in self._own.get_service_names_and_types_by_node(name, space):
                     servers[service] = (kinds[0], join_names(space, name))
