@@ -27,6 +27,8 @@ def main(namespace: str) -> None:
     if answered:
         rclpy.spin_until_future_complete(node, future := arm.call_async(Empty.Request()), timeout_sec=LIMIT_S)
         answered = future.done()
+    while time.monotonic() < end and len(node.get_node_names()) < 2:  # names may come after topics
+        rclpy.spin_once(node, timeout_sec=0.2)
     last = fixes[-1] if fixes else NavSatFix()
     place = [last.latitude, last.longitude, last.altitude]
     sys.stdout.write(json.dumps({"place": place, "armed": answered, "nodes": node.get_node_names()}))

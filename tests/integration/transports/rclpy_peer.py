@@ -100,6 +100,7 @@ def main(names):
     asked = parameters.get_parameters(["rate"])
     spin_until(executor, asked.done, "our parameter")
     found["rate"] = asked.result().values[0].integer_value
+    spin_until(executor, lambda: "mavros" in node.get_node_names(), "our node's name")
     found["nodes"] = sorted(
         f"{space.rstrip('/')}/{name}" for name, space in node.get_node_names_and_namespaces()
     )
