@@ -304,6 +304,8 @@ def graph(
     seen = _read_graph(source, within)
     output.give(seen.as_dict())
     output.show(*_graph_tables(seen))
+    if not seen.nodes:
+        output.note(f"no node is in this graph; {_WHERE_NODES_ARE.get(source, 'the run recorded none')}")
     if svg is not None:
         from volery.report.graph_picture import graph_svg
 
@@ -313,6 +315,13 @@ def graph(
             raise UsageError(f"{svg} cannot be written: {error.strerror or error}") from error
         output.note(f"drawn in {svg}")
     return OK
+
+
+_WHERE_NODES_ARE = {
+    "ros1": "is ROS_MASTER_URI that of your nodes?",
+    "ros2": "are ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE those of your nodes?",
+}
+"""What to check for a graph without nodes."""
 
 
 def _read_graph(source: str, within: float) -> GraphSnapshot:
