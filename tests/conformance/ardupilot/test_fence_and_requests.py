@@ -79,36 +79,58 @@ BREACHES: list[Any] = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("parameters", "points", "velocity"), [row[1:] for row in BREACHES], ids=[row[0] for row in BREACHES]
-)
-def test_beyond_the_fence_it_returns(
-    parameters: dict[str, float], points: list[Any], velocity: tuple[float, float, float], bench: Any
-) -> None:
-    rig = bench(parameters=parameters)
+def fly_towards_the_fence(rig: Any, points: list[Any], velocity: tuple[float, float, float]) -> None:
+    """Fly with a velocity in GUIDED, for 20 s or until the mode changes."""
     rig.run(0.5)
     if points:
         assert upload(rig, FENCE, points) == ACCEPTED
     assert rig.command(207, 1) == ACCEPTED
     rig.airborne()
     north, east, down = velocity
+    given = {"vx": north, "vy": east, "vz": down}
     for _ in range(40):
-        rig.send(
-            "SET_POSITION_TARGET_LOCAL_NED",
-            **TARGET,
-            coordinate_frame=1,
-            type_mask=3527,
-            vx=north,
-            vy=east,
-            vz=down,
-        )
+        rig.send("SET_POSITION_TARGET_LOCAL_NED", **TARGET, coordinate_frame=1, type_mask=3527, **given)
         rig.run(0.5)
         if rig.vehicle.mode.name != "GUIDED":
             break
     rig.run(0.1)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "points", "velocity"), [row[1:] for row in BREACHES], ids=[row[0] for row in BREACHES]
+)
+def test_beyond_the_fence_it_returns(
+    parameters: dict[str, float], points: list[Any], velocity: tuple[float, float, float], bench: Any
+) -> None:
+    rig = bench(parameters={**parameters, "AVOID_ENABLE": 0})
+    fly_towards_the_fence(rig, points, velocity)
     assert rig.vehicle.mode.name == "RTL"
     assert "Fence Breached" in rig.texts()
     assert rig.latest["HEARTBEAT"]["system_status"] in (4, 5)
+
+
+LIMITS = {"circle": (38.0, 0), "ceiling": (18.0, 2), "polygon": (48.0, 1)}
+"""Limit less FENCE_MARGIN along the axis of the flight [m], and that axis."""
+
+
+@pytest.mark.parametrize("behaviour", [0, 1], ids=["slides", "stops"])
+@pytest.mark.parametrize(("name", "parameters", "points", "velocity"), BREACHES)
+def test_avoidance_stops_at_the_margin_of_the_fence(
+    name: str,
+    parameters: dict[str, float],
+    points: list[Any],
+    velocity: tuple[float, float, float],
+    behaviour: int,
+    bench: Any,
+) -> None:
+    rig = bench(parameters={**parameters, "AVOID_BEHAVE": behaviour})
+    fly_towards_the_fence(rig, points, velocity)
+    assert rig.vehicle.mode.name == "GUIDED"
+    assert not rig.vehicle.fence.breached
+    place, axis = LIMITS[name]
+    position = rig.vehicle.estimate.position
+    reached = rig.vehicle.height if axis == 2 else abs(position[axis])
+    assert reached == pytest.approx(place, abs=0.6)
 
 
 def test_a_guided_point_beyond_the_fence_is_ignored(bench: Any) -> None:

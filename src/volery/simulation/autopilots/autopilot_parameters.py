@@ -172,6 +172,7 @@ class Tuning:
     return_final: float = 0.0
     """Height above home at which a return ends; 0: it lands."""
 
+    pilot_speed: float = 2.0
     pilot_up: float = 2.5
     pilot_down: float = 2.5
     pilot_accel_z: float = 2.5

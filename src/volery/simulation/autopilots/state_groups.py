@@ -401,3 +401,40 @@ class FenceState:
     """Uptime of the last of them [ns]."""
     total: int = 0
     """Number of points that was stated last."""
+
+
+@dataclass
+class ProximityState:
+    """Proximity sensor. Distances are in metres, directions eighths of a turn clockwise from the nose."""
+
+    kind: int | None = None
+    """Type that the vehicle has booted with; ``None``: not known yet."""
+    range: tuple[float, float] = (0.0, 0.0)
+    """Least and largest distance that the sensor states."""
+    distances: dict[int, float] = field(default_factory=dict)
+    """Last distance by direction."""
+    filtered: dict[int, float] = field(default_factory=dict)
+    """The same after the low-pass."""
+    angles: dict[int, float] = field(default_factory=dict)
+    """Angle of each last distance from the nose, clockwise [degrees]."""
+    measured_at: dict[int, Ns] = field(default_factory=dict)
+    collected: dict[int, tuple[float, float]] = field(default_factory=dict)
+    """Least distance by direction and its angle, of the messages with the time stamp that came last."""
+    stamp: int = -1
+    received_at: Ns = NEVER
+    """When a message came last."""
+    upward: float = 0.0
+    """Distance above the vehicle."""
+    upward_at: Ns = NEVER
+
+
+@dataclass
+class AvoidanceState:
+    """Avoidance of the fence and of obstacles."""
+
+    by_proximity: bool = True
+    """Whether the switch of the transmitter admits avoidance by the proximity sensor."""
+    velocity: Vector = (0.0, 0.0, 0.0)
+    """Velocity that was last given, north, east, down [m/s]."""
+    limited_at: Ns = NEVER
+    """When avoidance last changed a velocity."""

@@ -27,6 +27,7 @@ from volery.simulation.autopilots.protocol_endpoint import VehicleOutput
 from volery.simulation.autopilots.state_groups import (
     NEVER,
     ArmingState,
+    AvoidanceState,
     ButtonState,
     CommandedLimits,
     FailsafeState,
@@ -36,6 +37,7 @@ from volery.simulation.autopilots.state_groups import (
     Home,
     LeadState,
     OutputState,
+    ProximityState,
     ReportState,
     SwitchState,
 )
@@ -141,6 +143,11 @@ def do_nothing(_vehicle: Vehicle) -> None:
     """Do nothing: the default of a firmware's actions."""
 
 
+def unlimited(_vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
+    """Return *setpoint*: the default of a firmware without avoidance."""
+    return setpoint
+
+
 class StartupTimes(NamedTuple):
     """Uptimes [ns] from which parts of the autopilot work."""
 
@@ -200,6 +207,8 @@ class VehicleRules:
     rc: RcDefaults
     return_point: Callable[[Vehicle], Vector | None] = do_nothing
     """Return where a return ends and its least height, north, east, down [m]; ``None``: home."""
+    limit: Callable[[Vehicle, Setpoint], Setpoint] = unlimited
+    """Return the set-point that a manoeuvre may give, as avoidance limits it."""
     firmware_state: Callable[[Vehicle], object] = do_nothing
     """Create the state that only this firmware keeps about a vehicle: ``Vehicle.firmware_state``."""
 
@@ -267,6 +276,8 @@ class Vehicle:
         self.switches = SwitchState()
         self.failsafes = FailsafeState()
         self.fence = FenceState()
+        self.proximity = ProximityState()
+        self.avoidance = AvoidanceState()
         self.reports = ReportState(arming_checks_at=self.uptime(), counters_at=self.uptime())
         self.home: Home | None = None
         self._setpoint: Setpoint = OFF
@@ -409,7 +420,8 @@ class Vehicle:
     # -- motors
 
     def drive(self, setpoint: Setpoint) -> None:
-        """Pass a set-point to the inner loops, unless it is in force already."""
+        """Pass a set-point to the inner loops within the firmware's limits, unless it is in force already."""
+        setpoint = self.rules.limit(self, setpoint)
         if setpoint != self._setpoint:
             self._setpoint = setpoint
             self.flight.drive(setpoint)

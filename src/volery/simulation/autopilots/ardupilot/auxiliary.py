@@ -1,8 +1,8 @@
 """ArduPilot's auxiliary functions: what RCn_OPTION assigns to a switch of the transmitter.
 
 The same functions act by a switch that moves, by the command DO_AUX_FUNCTION and by its mission item. A
-position is 1 up, 0 in the middle, -1 down. Two functions count as soon as the transmitter is first read:
-emergency stop and motor interlock, both of which keep the motors from turning.
+position is 1 up, 0 in the middle, -1 down. Three functions count as soon as the transmitter is first read:
+emergency stop and motor interlock, both of which keep the motors from turning, and avoidance by proximity.
 """
 
 from __future__ import annotations
@@ -40,8 +40,10 @@ UP, DOWN = 1800, 1200
 """Pulse widths [us] beyond which a switch is up or down."""
 FIRST_SWITCH = 5
 
-NOTHING, ARMING, DISARMING, EMERGENCY_STOP, INTERLOCK = 0, 153, 81, 31, 32
+NOTHING, ARMING, DISARMING, EMERGENCY_STOP, INTERLOCK, PROXIMITY = 0, 153, 81, 31, 32, 40
 """Values of RCn_OPTION."""
+READ_AT_ONCE = (EMERGENCY_STOP, INTERLOCK, PROXIMITY)
+"""Those that count as soon as the transmitter is first read."""
 RELAY_OPTIONS = (28, 34, 35, 36, 66, 67)
 LOWEST_TAKEOFF = 1.0
 """Least height of a take-off item that the pilot saves [m]."""
@@ -86,7 +88,7 @@ class AuxiliaryFunctions(NamedTuple):
             position = (pulse > UP) - (pulse < DOWN)
             before = vehicle.switches.options.get(channel)
             vehicle.switches.options[channel] = position
-            if before == position or (before is None and function not in (EMERGENCY_STOP, INTERLOCK)):
+            if before == position or (before is None and function not in READ_AT_ONCE):
                 continue
             self.run(vehicle, function, position)
         update_stop(vehicle)
@@ -149,6 +151,11 @@ def _interlock(vehicle: Vehicle, position: int) -> None:
 
 def _fence(vehicle: Vehicle, position: int) -> None:
     enable_fence(vehicle, on=position > 0)
+
+
+def _proximity(vehicle: Vehicle, position: int) -> None:
+    if position:
+        vehicle.avoidance.by_proximity = position > 0
 
 
 def _gripper(vehicle: Vehicle, position: int) -> None:
@@ -238,6 +245,7 @@ FUNCTIONS: Mapping[int, Callable[[Vehicle, int], None]] = {
     EMERGENCY_STOP: _emergency_stop,
     SOURCES_OPTION: switch_sources,
     INTERLOCK: _interlock,
+    PROXIMITY: _proximity,
     44: switch_winch,
     CONTROL: _leave_to_channel,
     46: _overrides,

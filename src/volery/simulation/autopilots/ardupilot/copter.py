@@ -10,6 +10,7 @@ from volery.base.frames import Vector
 from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, AuxiliaryFunctions
+from volery.simulation.autopilots.ardupilot.avoidance import limit_copter, obstacle_problems
 from volery.simulation.autopilots.ardupilot.buttons import read_buttons
 from volery.simulation.autopilots.ardupilot.camera import update_camera
 from volery.simulation.autopilots.ardupilot.failsafes import (
@@ -50,6 +51,7 @@ from volery.simulation.autopilots.ardupilot.mount import update_mount
 from volery.simulation.autopilots.ardupilot.mount_control import on_other_position
 from volery.simulation.autopilots.ardupilot.parameter_checks import copter_problems
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED, copter_tuning
+from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, update_proximity
 from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.servo_outputs import pass_transmitter_through
 from volery.simulation.autopilots.ardupilot.sprayer import update_sprayer
@@ -209,6 +211,7 @@ CHECKS = (
     Check("winch unhealthy", no_servo),
     *SHARED_CHECKS,
     *FENCE_CHECKS,
+    PROXIMITY_CHECK,
     *STOP_CHECKS,
 )
 
@@ -217,7 +220,7 @@ HEALTH = Health(0x5371FC2F, 0x53619C2F, 0x57719C2F, round(22.0 * S), round(22.0 
 
 def failing_prearm_checks(vehicle: Vehicle) -> list[str]:
     """Return the texts of the pre-arm checks that fail."""
-    return failing_checks(vehicle, CHECKS, copter_problems)
+    return failing_checks(vehicle, CHECKS, lambda one: copter_problems(one) + obstacle_problems(one))
 
 
 def arming_problems(vehicle: Vehicle) -> list[str]:
@@ -275,6 +278,7 @@ def on_step(vehicle: Vehicle) -> None:
     leave_sequence(vehicle)
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_copter)
+    update_proximity(vehicle)
     commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))
     turn_into_wind(vehicle, COPTER.periodic.tick)
     if turn_tested_motor(vehicle) or not vehicle.armed:
@@ -438,6 +442,7 @@ COPTER = Firmware(
         modes=MODES,
         boot_mode=MODES[0],
         return_point=return_point,
+        limit=limit_copter,
         startup=StartupTimes(READY, ORIGIN, POSITION, POSITION),
         arming=ArmingTimes(
             motors_rest=2 * S, spool_up=500 * MS, takeoff_slew=100 * MS, abandoned_after=1500 * MS

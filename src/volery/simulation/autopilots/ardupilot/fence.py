@@ -2,24 +2,17 @@
 
 The fence is also checked while disarmed. A breach counts anew once the vehicle is 20 m further out. The floor
 counts only after DO_FENCE_ENABLE or its switch, not by FENCE_ENABLE alone. A guided point beyond the fence is
-ignored without a text. Avoidance (slowing down at the fence) is not modelled.
+ignored without a text. ``avoidance`` slows the vehicle down before the fence.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 from math import hypot, inf
 
 from volery.base.frames import Vector
-from volery.simulation.autopilots.ardupilot.fence_points import (
-    CIRCLE_EXCLUSION,
-    CIRCLE_INCLUSION,
-    EXCLUSION,
-    FENCE,
-    INCLUSION,
-    clear_if_emptied,
-)
+from volery.simulation.autopilots.ardupilot.fence_points import FENCE, clear_if_emptied
+from volery.simulation.autopilots.ardupilot.fence_shapes import shapes
 from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, NOTICE, Check, change_mode, disarm
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields
@@ -60,34 +53,6 @@ def _types(vehicle: Vehicle) -> int:
     return round(vehicle.parameters["FENCE_TYPE"])
 
 
-def _inside(corners: list[Vector], point: Vector) -> bool:
-    """Return whether a point lies within a polygon, seen from above."""
-    inside = False
-    for (north, east, _), (before_north, before_east, _) in pairwise([*corners, corners[0]]):
-        if (east > point[1]) != (before_east > point[1]):
-            along = (point[1] - east) / (before_east - east)
-            inside ^= point[0] < north + along * (before_north - north)
-    return inside
-
-
-def _beyond_polygons(vehicle: Vehicle, point: Vector) -> bool:
-    """Return whether a point is outside an inclusion or inside an exclusion."""
-    corners: list[Vector] = []
-    for item in vehicle.points.get(FENCE, []):
-        place = vehicle.point(item.frame, item.x / 1e7, item.y / 1e7, item.z)
-        if item.command in (CIRCLE_INCLUSION, CIRCLE_EXCLUSION):
-            within = hypot(point[0] - place[0], point[1] - place[1]) <= item.param1
-            if within != (item.command == CIRCLE_INCLUSION):
-                return True
-        elif item.command in (INCLUSION, EXCLUSION):
-            corners.append(place)
-            if len(corners) == round(item.param1):
-                if _inside(corners, point) != (item.command == INCLUSION):
-                    return True
-                corners = []
-    return False
-
-
 def _beyond(vehicle: Vehicle, point: Vector, *, floor: bool) -> dict[int, float]:
     """Return how far a point is beyond each limit.
 
@@ -112,7 +77,7 @@ def _beyond(vehicle: Vehicle, point: Vector, *, floor: bool) -> dict[int, float]
     if types & CIRCLE:
         away = hypot(point[0] - home.ned[0], point[1] - home.ned[1])
         found[CIRCLE] = away - parameters["FENCE_RADIUS"]
-    if types & POLYGON and _beyond_polygons(vehicle, point):
+    if types & POLYGON and not all(shape.admits((point[0], point[1])) for shape in shapes(vehicle)):
         found[POLYGON] = 0.0
     return {limit: distance for limit, distance in found.items() if distance >= 0.0}
 

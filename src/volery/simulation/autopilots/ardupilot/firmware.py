@@ -19,6 +19,7 @@ from volery.simulation.autopilots.ardupilot import (
     mount_control,
     payload,
     pilot_input,
+    proximity,
     rally,
     telemetry,
 )
@@ -64,11 +65,12 @@ def accepts(vehicle: Vehicle, name: str, system: int) -> bool:
     return system in (vehicle.system, round(vehicle.parameters["SYSID_MYGCS"]))
 
 
-def questions(version: Builder) -> dict[str, QuestionHandler]:
-    """Return the handlers by message; *version* builds AUTOPILOT_VERSION."""
+def questions(sent: TelemetryPolicy) -> dict[str, QuestionHandler]:
+    """Return the handlers by message; *sent* builds AUTOPILOT_VERSION."""
 
     def on_version(vehicle: Vehicle, _fields: dict[str, Any], sender: Peer) -> None:
-        sender.send("AUTOPILOT_VERSION", version(vehicle) or {})
+        for version in sent.build("AUTOPILOT_VERSION", vehicle):
+            sender.send("AUTOPILOT_VERSION", version)
 
     return {
         "AUTOPILOT_VERSION_REQUEST": on_version,
@@ -289,6 +291,7 @@ def on_heartbeat(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
 
 MESSAGE_HANDLERS = {
     "DIGICAM_CONTROL": camera.on_digicam_message,
+    "DISTANCE_SENSOR": proximity.on_distance_sensor,
     "HEARTBEAT": on_heartbeat,
     "FENCE_POINT": fence_points.on_fence_point,
     "GLOBAL_POSITION_INT": mount_control.on_other_position,
@@ -296,6 +299,8 @@ MESSAGE_HANDLERS = {
     "MOUNT_CONTROL": mount_control.on_mount_control_message,
     "RALLY_POINT": rally.on_rally_point,
     "MANUAL_CONTROL": pilot_input.on_manual_control,
+    "OBSTACLE_DISTANCE": proximity.on_obstacle_distance,
+    "OBSTACLE_DISTANCE_3D": proximity.on_obstacle_3d,
     "RC_CHANNELS_OVERRIDE": pilot_input.on_override,
 }
 """Messages that need no answer, for every kind of vehicle."""
@@ -318,24 +323,25 @@ def ardupilot_mavlink(
         on_parameter_list(vehicle)
         return ACCEPTED
 
+    sent = TelemetryPolicy(
+        messages=messages,
+        message_order=ORDER,
+        streams=streams,
+        on_stream_request=on_stream_request,
+        least_period=least_period,
+        intervals_after=100 * MS,
+        refuse_interval=refuse_interval,
+        unknown_message=FAILED,
+    )
     return MavlinkFirmware(
         start=start._replace(timesync_every=10 * S),
-        telemetry=TelemetryPolicy(
-            messages=messages,
-            message_order=ORDER,
-            streams=streams,
-            on_stream_request=on_stream_request,
-            least_period=least_period,
-            intervals_after=100 * MS,
-            refuse_interval=refuse_interval,
-            unknown_message=FAILED,
-        ),
+        telemetry=sent,
         commands=CommandPolicy(
             commands={**commands, SEND_BANNER: on_banner},
             handlers={**MESSAGE_HANDLERS, **handlers},
             set_mode=set_mode,
             set_mode_ack=11,
-            questions=questions(messages["AUTOPILOT_VERSION"]),
+            questions=questions(sent),
             accepts=accepts,
             nan_commands=frozenset({mount_control.GIMBAL_PITCHYAW}),
         ),

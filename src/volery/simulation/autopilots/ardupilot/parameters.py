@@ -57,6 +57,12 @@ _SHARED = {
     "BATT_LOW_VOLT": "low level by voltage",
     "BTN_ENABLE": "any value but 0: buttons are read",
     "BTN_REPORT_SEND": "time after a change for which BUTTON_CHANGE is repeated",
+    "AVOID_ACCEL_MAX": "largest change of the velocity by avoidance; 0: any",
+    "AVOID_BACKUP_DZ": "distance within AVOID_MARGIN at which the vehicle backs away from an obstacle",
+    "AVOID_BACKUP_SPD": "largest speed of backing away",
+    "AVOID_BEHAVE": "1 shortens the velocity before a limit, 0 slides along it",
+    "AVOID_ENABLE": "bits: 1 avoids the fence, 2 obstacles by the proximity sensor",
+    "AVOID_MARGIN": "distance that avoidance keeps from obstacles",
     **{f"BTN_PIN{number}": "pin of that button; -1: none" for number in range(1, 5)},
     **{f"BTN_FUNC{number}": "function of that button, as RCn_OPTION" for number in range(1, 5)},
     **{f"BTN_OPTIONS{number}": "bit 1 inverts that button" for number in range(1, 5)},
@@ -72,7 +78,7 @@ _SHARED = {
     "FENCE_ENABLE": "any value but 0 switches the fence on",
     "FENCE_RADIUS": "circle of the fence about home",
     "FENCE_TYPE": "bits: 1 height, 2 circle, 4 polygons, 8 floor",
-    "FENCE_MARGIN": "arming is refused while it does not fit between the limits",
+    "FENCE_MARGIN": "distance that avoidance keeps from the fence; the limits have to leave room for it",
     "FENCE_TOTAL": "number of points; 0 clears the fence",
     "FS_GCS_ENABLE": "action when the ground station is lost",
     "FS_GCS_TIMEOUT": "silence after which the ground station is lost",
@@ -97,6 +103,12 @@ _SHARED = {
     },
     "MNT1_LEAD_RLL": "time by which the mount leads the vehicle's roll",
     "MNT1_LEAD_PTCH": "time by which the mount leads the vehicle's pitch",
+    "PRX1_MAX": "largest distance of the proximity sensor that counts; 0: any",
+    "PRX1_MIN": "least distance of the proximity sensor that counts",
+    "PRX1_ORIENT": "any value but 0: OBSTACLE_DISTANCE counts anticlockwise",
+    "PRX1_TYPE": "from the next boot on: 2 distances come by messages, 10 the fence is measured",
+    "PRX1_YAW_CORR": "angle that is added to those of OBSTACLE_DISTANCE",
+    "PRX_FILT": "cut-off frequency of the distances that avoidance reads; 0: no filter",
     "RALLY_INCL_HOME": "any value but 0: home counts as a rally point of the return",
     "RALLY_LIMIT_KM": "distance beyond which a rally point is not used; 0: none",
     "RALLY_TOTAL": "number of rally points",
@@ -154,6 +166,10 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "ATC_RAT_YAW_FLTE": "filter of the yaw rate's error",
         "ATC_RAT_YAW_I": "integral gain of the yaw rate loop",
         "ATC_RAT_YAW_P": "gain of the yaw rate loop",
+        "AVOID_ALT_MIN": "height by the rangefinder below which obstacles do not count",
+        "AVOID_ANGLE_MAX": "largest lean away from obstacles in ALT_HOLD",
+        "AVOID_BACKZ_SPD": "largest rate of sinking back below the ceiling",
+        "AVOID_DIST_MAX": "distance of obstacles from which ALT_HOLD leans away",
         "AUTO_OPTIONS": "bits: 0 arming in AUTO, 1 its take-off without a raised throttle, 7 weathervaning",
         "CIRCLE_RADIUS": "circle of LOITER_TURNS",
         "CIRCLE_RATE": "yaw rate on that circle",
@@ -233,7 +249,8 @@ ROVER_SUPPORTED: Mapping[str, str] = MappingProxyType(
     {
         **_SHARED,
         "ATC_ACCEL_MAX": "acceleration; 0: 1 m/s^2",
-        "CRUISE_SPEED": "speed where WP_SPEED is 0",
+        "CRUISE_SPEED": "speed where WP_SPEED is 0; at CRUISE_THROTTLE",
+        "CRUISE_THROTTLE": "throttle of CRUISE_SPEED, from which the speed at full stick is projected",
         "FS_ACTION": "action when ground station or radio is lost",
         "FS_OPTIONS": "bit 0: failsafes act in HOLD, too",
         "FS_TIMEOUT": "time for which ground station or radio are lost before the action",
@@ -244,6 +261,7 @@ ROVER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         WHEEL_ENCODER: "source of the estimator: checked before arming",
         "STICK_MIXING": "any value but 0: the steering stick acts in the modes that the autopilot drives",
         "WP_RADIUS": "radius within which a waypoint is reached",
+        "SPEED_MAX": "speed at full stick; 0: as projected",
         "WP_SPEED": "speed",
     }
 )
@@ -349,6 +367,10 @@ def copter_tuning(parameters: Parameters) -> Tuning:
     )
 
 
+FASTEST_PILOT, LEAST_CRUISE = 30.0, 0.05
+"""Largest speed at full stick of a rover [m/s], and least share of the throttle that it is projected from."""
+
+
 def rover_tuning(parameters: Parameters) -> Tuning:
     """Return the tuning of a rover, whose parameters are in m and deg."""
     p = parameters
@@ -359,4 +381,13 @@ def rover_tuning(parameters: Parameters) -> Tuning:
         accel=_moving(p["ATC_ACCEL_MAX"], 1.0),
         waypoint_radius=_moving(p["WP_RADIUS"]),
         return_speed=_moving(p["RTL_SPEED"], speed),
+        pilot_speed=min(FASTEST_PILOT, _pilot_speed(p)),
     )
+
+
+def _pilot_speed(p: Parameters) -> float:
+    """Return a rover's speed at full stick [m/s]: stated, or projected from CRUISE_SPEED at CRUISE_THROTTLE."""
+    share = p["CRUISE_THROTTLE"] / 100.0
+    if not LEAST_CRUISE <= share <= 1.0:
+        return p["CRUISE_SPEED"]
+    return p["SPEED_MAX"] if p["SPEED_MAX"] > 0.0 else p["CRUISE_SPEED"] / share

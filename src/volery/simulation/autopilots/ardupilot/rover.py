@@ -7,6 +7,7 @@ from functools import cache, partial
 from volery.base.time import MS, S
 from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
 from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, AuxiliaryFunctions
+from volery.simulation.autopilots.ardupilot.avoidance import limit_rover
 from volery.simulation.autopilots.ardupilot.buttons import read_buttons
 from volery.simulation.autopilots.ardupilot.camera import update_camera
 from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES
@@ -39,6 +40,7 @@ from volery.simulation.autopilots.ardupilot.motor_test import drive_tested_outpu
 from volery.simulation.autopilots.ardupilot.mount import update_mount
 from volery.simulation.autopilots.ardupilot.parameter_checks import source_problems
 from volery.simulation.autopilots.ardupilot.parameters import ROVER_SUPPORTED, rover_tuning
+from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, update_proximity
 from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.servo_outputs import pass_transmitter_through
 from volery.simulation.autopilots.ardupilot.sprayer import update_sprayer
@@ -175,6 +177,7 @@ CHECKS = (
     Check("Battery 1 unhealthy", between_uptimes(0.0, 2.4)),
     *SHARED_CHECKS,
     *FENCE_CHECKS,
+    PROXIMITY_CHECK,
     *STOP_CHECKS,
 )
 
@@ -237,6 +240,7 @@ def on_step(vehicle: Vehicle) -> None:
     update_mount(vehicle, ROVER.periodic.tick)
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_rover)
+    update_proximity(vehicle)
     drive_tested_output(vehicle, ROVER_DISARMED)
     if vehicle.armed:
         vehicle.ground.flight_time += ROVER.periodic.tick
@@ -314,6 +318,7 @@ ROVER = Firmware(
         modes=MODES,
         boot_mode=INITIALISING,
         return_point=return_point,
+        limit=limit_rover,
         startup=StartupTimes(READY, HOME, POSITION, HOME),
         parameters=ParameterTable(parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
         rc=RcDefaults((1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0), True),

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
 from volery.base.time import US, S
+from volery.simulation.autopilots.ardupilot import proximity
 from volery.simulation.autopilots.ardupilot.battery import used_mah
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
@@ -300,18 +301,19 @@ def rangefinder(vehicle: Vehicle) -> Fields | None:
     return None if distance is None else {"distance": distance, "voltage": 0.0}
 
 
-def distance_sensor(vehicle: Vehicle) -> Fields | None:
-    """Return DISTANCE_SENSOR (downwards) while a configured rangefinder measures."""
+def distance_sensor(vehicle: Vehicle) -> list[Fields]:
+    """Return DISTANCE_SENSOR of a configured rangefinder (downwards) while it measures, and of proximity."""
     distance = vehicle.estimate.rangefinder if vehicle.parameters["RNGFND1_TYPE"] else None
     if distance is None:
-        return None
-    return {
+        return proximity.reports(vehicle)
+    downward = {
         "time_boot_ms": boot_ms(vehicle),
         "min_distance": 20,
         "max_distance": 3000,
         "current_distance": to_uint16(distance * 100.0),
         "orientation": 25,
     }
+    return [downward, *proximity.reports(vehicle)]
 
 
 ARMED = 128
@@ -338,6 +340,7 @@ RATE_CONTROL, ATTITUDE_CONTROL, YAW_CONTROL, Z_CONTROL, XY_CONTROL = (
     1 << 14,
 )
 GEOFENCE = 1 << 20
+PROXIMITY = 1 << 25
 AHRS, TERRAIN, LOGGING, BATTERY, PREARM = 1 << 21, 1 << 22, 1 << 24, 1 << 25, 1 << 28
 
 
@@ -383,6 +386,9 @@ def sys_status(vehicle: Vehicle, health: Health) -> Fields:
         healthy = healthy & ~GEOFENCE if vehicle.fence.breached else healthy | GEOFENCE
     if age > FIX_AFTER and vehicle.estimate.fix_type == 0:
         healthy &= ~GPS
+    if proximity.is_present(vehicle):
+        present, enabled = present | PROXIMITY, enabled | PROXIMITY
+        healthy |= PROXIMITY if proximity.is_healthy(vehicle) else 0
     volts, amps, left = _battery(vehicle)
     return {
         "onboard_control_sensors_present": present & ~missing,

@@ -235,6 +235,9 @@ class Loiter(ClimbByThrottle):
                 tilt=tuning.tilt,
             )
         )
+        given = self.vehicle.setpoint
+        if given.control is Control.VELOCITY:  # avoidance may have changed it
+            self._velocity, self._held = given.velocity[:2], None
 
 
 ACRO_RATE = radians(360.0)
@@ -397,7 +400,7 @@ class Steering(Manoeuvre):
         """Pass the sticks on."""
         sticks, channels, tuning = self.vehicle.tuning.sticks, self.vehicle.rc, self.vehicle.tuning
         turn = sticks.travels[0].deflection(channels[sticks.roll])
-        speed = sticks.travels[2].deflection(channels[sticks.throttle]) * tuning.speed
+        speed = sticks.travels[2].deflection(channels[sticks.throttle]) * tuning.pilot_speed
         self.vehicle.drive(
             Setpoint(
                 Control.DRIVE,
@@ -425,13 +428,13 @@ class Simple(Manoeuvre):
         sticks, channels, tuning = self.vehicle.tuning.sticks, self.vehicle.rc, self.vehicle.tuning
         right = sticks.travels[0].deflection(channels[sticks.roll])
         ahead = sticks.travels[2].deflection(channels[sticks.throttle])
-        speed = min(1.0, hypot(right, ahead)) * tuning.speed
+        speed = min(1.0, hypot(right, ahead)) * tuning.pilot_speed
         self.vehicle.drive(
             Setpoint(
                 Control.DRIVE,
                 velocity=(speed, 0.0, 0.0),
                 yaw=self._ahead + atan2(right, ahead) if speed else None,
-                speed=tuning.speed,
+                speed=max(speed, tuning.speed),
                 accel=tuning.accel,
             )
         )

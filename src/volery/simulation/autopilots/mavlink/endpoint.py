@@ -136,13 +136,10 @@ class MavlinkEndpoint:
         )
 
     def _burst(self, channel: MavlinkChannel, names: Sequence[str]) -> None:
-        messages, vehicle = self.firmware.telemetry.messages, self._vehicle
         for name in names:
-            if not channel.is_wanted(name):
-                continue
-            fields = messages[name](vehicle)
-            if fields is not None:
-                channel.send(name, fields)
+            if channel.is_wanted(name):
+                for fields in self.firmware.telemetry.build(name, self._vehicle):
+                    channel.send(name, fields)
 
     def _send_bytes(self, data: bytes) -> None:
         """Send bytes that are no message, on all links that carry bytes."""
@@ -231,8 +228,7 @@ class MavlinkEndpoint:
 
     def send_message(self, message: str) -> None:
         """Send a telemetry message now, on all links."""
-        fields = self.firmware.telemetry.messages[message](self._vehicle)
-        if fields is not None:
+        for fields in self.firmware.telemetry.build(message, self._vehicle):
             self.send_event(message, fields)
 
     def send_event(self, message: str, fields: dict[str, Any]) -> None:

@@ -92,8 +92,10 @@ class MissionUploadPolicy(NamedTuple):
     """Reports that; returns the MAV_MISSION_RESULT that is acknowledged, or ``None``."""
 
 
-Builder = Callable[[Vehicle], dict[str, Any] | None]
-"""Returns the fields of a message as sent now, or ``None`` while the firmware does not send it."""
+Builder = Callable[[Vehicle], dict[str, Any] | list[dict[str, Any]] | None]
+"""Returns the fields of a message as sent now, a list where several are sent at once, or ``None`` while the
+firmware does not send it.
+"""
 
 MessageHandler = Callable[[Vehicle, dict[str, Any], int], None]
 """Handles a message that needs no answer: vehicle, fields, system id of the sender."""
@@ -150,6 +152,13 @@ class TelemetryPolicy:
     """Messages that a change of mode sends at once on all links."""
     on_home_change: Sequence[str] = ("GPS_GLOBAL_ORIGIN", "HOME_POSITION")
     """Messages that a change of the home position sends at once on all links."""
+
+    def build(self, name: str, vehicle: Vehicle) -> list[dict[str, Any]]:
+        """Return the fields of each message called *name* that is sent now."""
+        built = self.messages[name](vehicle)
+        if isinstance(built, list):
+            return built
+        return [] if built is None else [built]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -105,7 +105,7 @@ class CommandService:
         name = self._name(round(finite(command.param1)))
         if name is None:
             return self._firmware.telemetry.unknown_message
-        if self._firmware.telemetry.messages[name](self._vehicle) is None:
+        if not self._firmware.telemetry.build(name, self._vehicle):
             return self._firmware.telemetry.nothing_to_send
         return self._send(peer, name)
 
@@ -113,8 +113,7 @@ class CommandService:
         """Send a message after the acknowledgement."""
 
         def send() -> None:
-            fields = self._firmware.telemetry.messages[name](self._vehicle)
-            if fields is not None:
+            for fields in self._firmware.telemetry.build(name, self._vehicle):
                 peer.channel.send(name, fields)
 
         self._vehicle.output.after_reply(send)
@@ -477,9 +476,8 @@ class MissionService:
     def on_set_current(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle MISSION_SET_CURRENT."""
         if self._vehicle.choose_item(fields["seq"]):
-            peer.channel.send(
-                "MISSION_CURRENT", self._firmware.telemetry.messages["MISSION_CURRENT"](self._vehicle) or {}
-            )
+            for current in self._firmware.telemetry.build("MISSION_CURRENT", self._vehicle):
+                peer.channel.send("MISSION_CURRENT", current)
 
     def on_ack(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle MISSION_ACK: the end of a download, or the refusal of a request for an item."""
