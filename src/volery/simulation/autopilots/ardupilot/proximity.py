@@ -55,11 +55,6 @@ def update_proximity(vehicle: Vehicle) -> None:
             sensor.distances.pop(direction, None)
 
 
-def is_present(vehicle: Vehicle) -> bool:
-    """Return whether the vehicle has booted with a proximity sensor of a type that is simulated."""
-    return vehicle.proximity.kind in (MESSAGES, FENCE)
-
-
 def is_healthy(vehicle: Vehicle) -> bool:
     """Return whether there is a proximity sensor, and it measures."""
     sensor, now = vehicle.proximity, vehicle.kernel.now()
@@ -68,11 +63,12 @@ def is_healthy(vehicle: Vehicle) -> bool:
     return sensor.kind == FENCE and any(shape.inside for shape in shapes(vehicle))
 
 
-def _without_data(vehicle: Vehicle) -> bool:
-    return is_present(vehicle) and not is_healthy(vehicle)
+def lacks_data(vehicle: Vehicle) -> bool:
+    """Return whether there is a proximity sensor that does not measure."""
+    return vehicle.proximity.kind in (MESSAGES, FENCE) and not is_healthy(vehicle)
 
 
-PROXIMITY_CHECK = Check("PRX1: No Data", _without_data)
+PROXIMITY_CHECK = Check("PRX1: No Data", lacks_data)
 """Arming check of the sensor."""
 
 

@@ -386,9 +386,8 @@ def sys_status(vehicle: Vehicle, health: Health) -> Fields:
         healthy = healthy & ~GEOFENCE if vehicle.fence.breached else healthy | GEOFENCE
     if age > FIX_AFTER and vehicle.estimate.fix_type == 0:
         healthy &= ~GPS
-    if proximity.is_present(vehicle):
-        present, enabled = present | PROXIMITY, enabled | PROXIMITY
-        healthy |= PROXIMITY if proximity.is_healthy(vehicle) else 0
+    if proximity.lacks_data(vehicle):
+        healthy &= ~PROXIMITY
     volts, amps, left = _battery(vehicle)
     return {
         "onboard_control_sensors_present": present & ~missing,
