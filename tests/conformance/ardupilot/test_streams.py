@@ -9,6 +9,7 @@ import pytest
 NOT_SENT = {"TERRAIN_REQUEST"}
 """Recorded, not sent here: see docs/ardupilot-behaviour.md."""
 
+FAILED = 4
 REGULAR = {"HEARTBEAT", "TIMESYNC"}
 
 
@@ -97,6 +98,13 @@ def test_an_interval_overrules_the_stream_for_one_message(bench: Any) -> None:
     assert not rig.of("ATTITUDE")
     rig.command(510, 74)
     assert rig.latest["MESSAGE_INTERVAL"] == {"message_id": 74, "interval_us": 250_000}
+    assert rig.command(510, 30) == 0
+    assert rig.latest["MESSAGE_INTERVAL"] == {"message_id": 30, "interval_us": -1}
+    assert rig.command(510, 145) == FAILED
+    assert rig.latest["MESSAGE_INTERVAL"] == {"message_id": 145, "interval_us": 0}
+    rig.received.clear()
+    assert rig.command(510, 70_000) == FAILED
+    assert not rig.of("MESSAGE_INTERVAL")
 
 
 def test_an_interval_asked_for_at_boot_is_acknowledged_and_lost(bench: Any) -> None:

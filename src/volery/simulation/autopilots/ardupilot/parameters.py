@@ -386,7 +386,7 @@ def rover_tuning(parameters: Parameters) -> Tuning:
 
 
 def _pilot_speed(p: Parameters) -> float:
-    """Return a rover's speed at full stick [m/s]: stated, or projected from CRUISE_SPEED at CRUISE_THROTTLE."""
+    """Return a rover's speed at full stick [m/s]: SPEED_MAX, else projected from CRUISE_SPEED."""
     share = p["CRUISE_THROTTLE"] / 100.0
     if not LEAST_CRUISE <= share <= 1.0:
         return p["CRUISE_SPEED"]

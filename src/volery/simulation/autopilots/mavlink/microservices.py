@@ -36,6 +36,12 @@ GET_MESSAGE_INTERVAL, SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 510, 511, 512
 REQUEST_CAPABILITIES = 520
 
 
+UNKNOWN, NOT_SENT = 0, -1
+"""Intervals in MESSAGE_INTERVAL of a message that is not known, and of one that is not sent."""
+LARGEST_REPORTED = 65_535
+"""Largest number of a message that MESSAGE_INTERVAL can report."""
+
+
 class CommandService:
     """Command protocol of one vehicle."""
 
@@ -81,11 +87,10 @@ class CommandService:
     def _get_interval(self, peer: Peer, command: Command) -> int:
         number = round(finite(command.param1))
         name = self._name(number)
-        if name is None:
-            return FAILED
-        period = peer.channel.streams.period(name)
-        peer.channel.send("MESSAGE_INTERVAL", {"message_id": number, "interval_us": period // US or -1})
-        return ACCEPTED
+        interval = UNKNOWN if name is None else peer.channel.streams.period(name) // US or NOT_SENT
+        if 0 <= number <= LARGEST_REPORTED:
+            peer.channel.send("MESSAGE_INTERVAL", {"message_id": number, "interval_us": interval})
+        return FAILED if name is None else ACCEPTED
 
     def _set_interval(self, peer: Peer, command: Command) -> int:
         number, interval = round(finite(command.param1)), finite(command.param2)
