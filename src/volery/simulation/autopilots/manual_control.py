@@ -68,6 +68,8 @@ class RcChannels:
     def __init__(self, transmitter: Sequence[int]) -> None:
         self.transmitter = list(transmitter)
         self._override = [0] * len(transmitter)
+        self._none = [0] * len(transmitter)
+        self._in_force = self._override
         self._given = [NEVER] * len(transmitter)
 
     def override(self, channel: int, pulse: int, now: Ns) -> None:
@@ -84,7 +86,14 @@ class RcChannels:
 
     def release(self) -> None:
         """Return every channel to the transmitter."""
-        self._override = [0] * len(self._override)
+        self._override[:] = self._none
+
+    def admit(self, *, overrides: bool) -> bool:
+        """Let overrides count or not, without dropping them; return whether that changes."""
+        wanted = self._override if overrides else self._none
+        changed = wanted is not self._in_force
+        self._in_force = wanted
+        return changed
 
     def expire(self, now: Ns, within: Ns) -> bool:
         """Drop overrides that were not repeated within a time [ns], and return whether one was dropped."""
@@ -100,16 +109,16 @@ class RcChannels:
     @property
     def overridden(self) -> bool:
         """Whether any channel is overridden."""
-        return any(self._override)
+        return any(self._in_force)
 
     def __getitem__(self, channel: int) -> int:
-        return self._override[channel - 1] or self.transmitter[channel - 1]
+        return self._in_force[channel - 1] or self.transmitter[channel - 1]
 
     def pulses(self) -> list[int]:
         """Return the pulse widths of all channels in order [us]."""
-        if not any(self._override):
+        if not any(self._in_force):
             return list(self.transmitter)
-        return [over or given for over, given in zip(self._override, self.transmitter, strict=True)]
+        return [over or given for over, given in zip(self._in_force, self.transmitter, strict=True)]
 
 
 class StickPositions(NamedTuple):

@@ -112,7 +112,7 @@ _SHARED = {
     "RALLY_INCL_HOME": "any value but 0: home counts as a rally point of the return",
     "RALLY_LIMIT_KM": "distance beyond which a rally point is not used; 0: none",
     "RALLY_TOTAL": "number of rally points",
-    "RC_OVERRIDE_TIME": "time after which overrides end; 0 refuses them, a negative value keeps them",
+    "RC_OVERRIDE_TIME": "time after which overrides end; 0 ignores them, a negative value keeps them",
     **{
         f"RELAY{number}_{part}": f"{words} of that relay"
         for number in range(1, 7)

@@ -37,7 +37,7 @@ def on_override(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
 
     Channels 1 to 8: 0 releases, 65535 is ignored. From channel 9: 0 and 65535 are ignored, 65534 releases.
     """
-    if not _is_my_station(vehicle, sender) or vehicle.parameters["RC_OVERRIDE_TIME"] == 0.0:
+    if not _is_my_station(vehicle, sender):
         return
     now = vehicle.kernel.now()
     vehicle.failsafes.station_last_ns = now
@@ -106,8 +106,7 @@ def on_step(vehicle: Vehicle) -> None:
     if vehicle.parameters.changes != vehicle.failsafes.simulated_at:
         vehicle.failsafes.simulated_at = vehicle.parameters.changes
         simulate_faults(vehicle)
-    if vehicle.rc.overridden:
-        expire_overrides(vehicle)
+    expire_overrides(vehicle)
 
 
 def simulate_faults(vehicle: Vehicle) -> None:
@@ -135,9 +134,12 @@ def simulate_faults(vehicle: Vehicle) -> None:
 
 
 def expire_overrides(vehicle: Vehicle) -> None:
-    """Release overrides that are older than RC_OVERRIDE_TIME; a negative time keeps them."""
+    """Release overrides that are older than RC_OVERRIDE_TIME; 0 ignores them, a negative time keeps them."""
     seconds = vehicle.parameters["RC_OVERRIDE_TIME"]
+    changed = vehicle.rc.admit(overrides=seconds != 0.0)
     if seconds > 0.0 and vehicle.rc.expire(vehicle.kernel.now(), from_seconds(seconds)):
+        changed = True
+    if changed:
         sticks_moved(vehicle)
 
 
