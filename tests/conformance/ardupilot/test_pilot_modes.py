@@ -128,6 +128,21 @@ def test_a_rover_is_steered_holds_its_place_and_returns_along_its_way(bench: Any
     assert hypot(north, east) < 3.0
 
 
+def test_a_rover_brakes_by_its_motor_where_that_is_permitted(bench: Any) -> None:
+    stopping = []
+    for brakes in (1, 0):
+        rig = bench("rover", parameters={"ATC_BRAKE": brakes, "ATC_ACCEL_MAX": 10})
+        rig.beat()
+        rig.run(0.5)
+        assert rig.mode(STEERING) == 0
+        assert rig.command(400, 1) == 0
+        rig.hold_sticks(6.0, 1500, 1500, 1900, 1500)
+        start = rig.vehicle.estimate.position[0]
+        rig.hold_sticks(12.0, 1500, 1500, 1500, 1500)
+        stopping.append(rig.vehicle.estimate.position[0] - start)
+    assert stopping[0] < 0.9 * stopping[1]
+
+
 def test_simple_drives_about_the_first_heading(bench: Any) -> None:
     rig = bench("rover")
     rig.beat()

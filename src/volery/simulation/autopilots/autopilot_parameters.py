@@ -160,6 +160,9 @@ class Tuning:
     yaw_loop: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Gain, integral gain and filter in rad/s of the yaw rate loop, see ``Flight.set_yaw_loop``."""
 
+    brakes: bool = True
+    """Whether a rover brakes by its motor."""
+
     land_speed: float = 0.5
     land_speed_high: float = 1.5
     land_slow_below: float = 10.0

@@ -250,8 +250,7 @@ class Vehicle:
         self.parameters = Parameters(
             rules.parameters.defaults(), {**rules.parameters.of_vehicle(system, flight), **(overrides or {})}
         )
-        self.tuning = rules.parameters.tuning(self.parameters)
-        flight.set_yaw_loop(*self.tuning.yaw_loop)
+        self._tune()
         self.rc = RcChannels(rules.rc.transmitter)
         self.mission = OnboardMission()
         self.points: dict[int, list[MissionItem]] = {}
@@ -373,10 +372,14 @@ class Vehicle:
         """Set a parameter and report it; return False if it does not exist or does not take *value*."""
         if self.parameters.set(name, value) is None:
             return False
-        self.tuning = self.rules.parameters.tuning(self.parameters)
-        self.flight.set_yaw_loop(*self.tuning.yaw_loop)
+        self._tune()
         self.output.parameter_changed(name)
         return True
+
+    def _tune(self) -> None:
+        self.tuning = self.rules.parameters.tuning(self.parameters)
+        self.flight.set_yaw_loop(*self.tuning.yaw_loop)
+        self.flight.set_brakes(on=self.tuning.brakes)
 
     def seconds_parameter(self, name: str) -> Ns:
         """Return the value of a parameter in seconds as nanoseconds."""

@@ -37,7 +37,10 @@ def airspeed_package(tmp_path, monkeypatch):
     (info / "entry_points.txt").write_text("\n".join(groups))
     (tmp_path / "airspeed_sensor.py").write_text((EXAMPLE / "airspeed_sensor.py").read_text())
     monkeypatch.syspath_prepend(str(tmp_path))
+    registry = vars(sensors.sensors)
+    registry.pop("_installed", None)  # another test may have read what is installed
     yield
+    registry.pop("_installed", None)
     sys.modules.pop("airspeed_sensor", None)
 
 

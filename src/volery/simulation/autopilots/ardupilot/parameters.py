@@ -249,6 +249,7 @@ ROVER_SUPPORTED: Mapping[str, str] = MappingProxyType(
     {
         **_SHARED,
         "ATC_ACCEL_MAX": "acceleration; 0: 1 m/s^2",
+        "ATC_BRAKE": "0: the motor does not brake",
         "CRUISE_SPEED": "speed where WP_SPEED is 0; at CRUISE_THROTTLE",
         "CRUISE_THROTTLE": "throttle of CRUISE_SPEED, from which the speed at full stick is projected",
         "FS_ACTION": "action when ground station or radio is lost",
@@ -381,6 +382,7 @@ def rover_tuning(parameters: Parameters) -> Tuning:
         accel=_moving(p["ATC_ACCEL_MAX"], 1.0),
         waypoint_radius=_moving(p["WP_RADIUS"]),
         return_speed=_moving(p["RTL_SPEED"], speed),
+        brakes=p["ATC_BRAKE"] != 0.0,
         pilot_speed=min(FASTEST_PILOT, _pilot_speed(p)),
     )
 

@@ -20,6 +20,7 @@ from math import sqrt
 from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_ACCEL,
+    C_COASTS,
     C_CONTROL,
     C_MOTOR,
     C_POSITION,
@@ -281,7 +282,10 @@ def _throttle_for(row: Array, target: float) -> float:
         return 0.0
     grown = row[K_SPEED_INTEGRAL] + _SPEED_INTEGRAL * miss * GUIDE_S
     row[K_SPEED_INTEGRAL] = clip(grown, -0.3, 0.3)
-    return clip(target / row[P_MAX_SPEED] + _SPEED_GAIN * miss + row[K_SPEED_INTEGRAL], -1.0, 1.0)
+    throttle: float = clip(target / row[P_MAX_SPEED] + _SPEED_GAIN * miss + row[K_SPEED_INTEGRAL], -1.0, 1.0)
+    if row[C_COASTS] > 0.5 and throttle * (1.0 if target >= 0.0 else -1.0) < 0.0:
+        return 0.0
+    return throttle
 
 
 @numeric

@@ -15,6 +15,7 @@ from volery.base.frames import LocalFrame, Vector
 from volery.base.time import Ns
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_AIDED,
+    C_COASTS,
     C_CONTROL,
     C_STICK,
     C_YAW_P,
@@ -214,6 +215,10 @@ class Flight:
             corner: Corner frequency of the filter [rad/s].
         """
         self._world.set_input(self._body, C_YAW_P, gain, integral, corner)
+
+    def set_brakes(self, *, on: bool) -> None:
+        """Let a rover brake by its motor, or only coast."""
+        self._world.set_input(self._body, C_COASTS, float(not on))
 
     def mix_steering(self, steering: float, share: float) -> None:
         """Add a pilot's steering to that of a rover's controls.

@@ -102,6 +102,7 @@ C_STICK = _add("C_STICK", "1", "rover: steering -1..1 that a pilot adds to that 
 C_STICK_SHARE = _add(
     "C_STICK_SHARE", "1", "rover: share by which the autopilot's own steering is reduced then"
 )
+C_COASTS = _add("C_COASTS", "1", "1: a rover does not brake by its motor")
 
 # --- memory that ``Estimate`` shows ---
 K_POSITION = _add("K_POSITION", "m", "estimated, about the world's origin", 3, NED)
