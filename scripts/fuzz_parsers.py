@@ -9,15 +9,19 @@ to the current folder as ``crash-…``. tests/properties/test_hostile_bytes.py k
 
 from __future__ import annotations
 
+import re
+import struct
 import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from importlib.resources import files
+from io import BytesIO
 from itertools import islice
 from pathlib import Path
 
 import atheris
+from mcap.writer import CompressionType, IndexType, Writer
 
 INSTRUMENTED = ["volery.base", "volery.links", "volery.model", "volery.ros.messages", "volery.trace", "mcap"]
 
@@ -40,7 +44,10 @@ with atheris.instrument_imports(include=INSTRUMENTED):
     from volery.ros.messages.store import idl_fields, interface_messages
     from volery.testing.fuzzing import SEALS
     from volery.testing.sample_run import sample_events, sample_setup
-    from volery.trace.mcap_writer import McapWriter
+    from volery.trace.attachments import SETUP_ATTACHMENT, ComponentSetup, RunSetup, to_json
+    from volery.trace.encoding import Codec, type_name
+    from volery.trace.events import Published
+    from volery.trace.mcap_writer import TRACE_SCHEMA, McapWriter
     from volery.trace.reader import Reading
     from volery.vehicles import address
 
@@ -48,7 +55,9 @@ ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 from rigs.flight_log_files import dataflash, ulog  # noqa: E402
 
-FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-"))
+MEMORY = Path("/dev/shm")
+"""A file system in memory, where a file is written in a hundredth of the time."""
+FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-", dir=MEMORY if MEMORY.is_dir() else None))
 VOCABULARY = Vocabulary({}, frozenset({"python", "rospy"}), frozenset({"ardupilot", "px4"}))
 MESSAGES = 200
 """Messages read of one file: a longer one shows nothing new."""
@@ -64,14 +73,18 @@ TYPES = (
 
 def _file(suffix: str, read: Callable[[Path], object]) -> Callable[[bytes], None]:
     """Return a target that reads its input from a file."""
-    path = FOLDER / f"input{suffix}"
 
     def run(data: bytes) -> None:
-        path.write_bytes(data)
         with suppress(VoleryError):
-            read(path)
+            read(_stored(suffix, data))
 
     return run
+
+
+def _stored(suffix: str, data: bytes) -> Path:
+    path = FOLDER / f"input{suffix}"
+    path.write_bytes(data)
+    return path
 
 
 def _mavlink(data: bytes) -> None:
@@ -178,19 +191,63 @@ def _every_pprzlink_message() -> list[bytes]:
 
 
 def _written_trace() -> list[bytes]:
-    path = FOLDER / "seed-trace.mcap"
-    writer = McapWriter(path, sample_setup(7))
+    """Return a trace as it is written, and a short one without compression and checksums, for mutations."""
+    path, short = FOLDER / "seed-trace.mcap", BytesIO()
+    own = McapWriter(path, sample_setup(7))
+    bare = {"repeat_channels": False, "repeat_schemas": False, "use_statistics": False, "enable_crcs": False}
+    plain = Writer(short, compression=CompressionType.NONE, index_types=IndexType.NONE, **bare)
+    plain.start("ros2", "volery")
+    plain.add_metadata("volery", {"schema": TRACE_SCHEMA})
+    setup = RunSetup("s", components=(ComponentSetup("c"),))
+    plain.add_attachment(0, 0, SETUP_ATTACHMENT, "", to_json(setup))
+    seen: set[type[object]] = {Published}
     for event in sample_events(7, 1.0):
-        writer(event)
-    writer.close()
-    return [path.read_bytes()]
+        own(event)
+        kind = type(event)
+        if kind not in seen:
+            seen.add(kind)
+            number = plain.register_schema(type_name(kind), "ros2msg", b"")
+            channel = plain.register_channel(kind.__name__, "cdr", number)
+            plain.add_message(channel, 0, Codec(kind).encode(event), 0)
+    own.close()
+    plain.finish()
+    return [path.read_bytes(), short.getvalue()]
 
 
-def _written_bag(name: str, pattern: str) -> list[bytes]:
+def _written_bag(name: str, pattern: str) -> bytes:
+    """Return a recording of two short messages: other targets decode long ones."""
     with create_bag(FOLDER / name) as bag:
-        for at, kind in enumerate(TYPES):
-            bag.write(f"/topic{at}", at, _filled(kind))
-    return [next(FOLDER.glob(pattern)).read_bytes()]
+        for at in range(2):
+            bag.write(f"/t{at}", at, new("std_msgs/msg/String"))
+    return next(FOLDER.glob(pattern)).read_bytes()
+
+
+def _written_mcap() -> list[bytes]:
+    """Return a file as it is written, and one without rosbag 2's metadata, for mutations."""
+    short = BytesIO()
+    plain = Writer(short, compression=CompressionType.NONE, enable_crcs=False)
+    plain.start("ros2", "")
+    number = plain.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+    for at in range(2):
+        channel = plain.register_channel(f"/t{at}", "cdr", number)
+        plain.add_message(channel, at, to_cdr(new("std_msgs/msg/String")), at)
+    plain.finish()
+    assert len(list(open_bag(_stored(".mcap", short.getvalue())).messages())) == 2
+    return [_written_bag("seed", "seed/*.mcap"), short.getvalue()]
+
+
+def _written_rosbag() -> list[bytes]:
+    """Return a rosbag as it is written, and one without the padding of its first record, for mutations."""
+    bag = _written_bag("seed.bag", "seed.bag")
+    begin = bag.index(b"    ")
+    end = begin + len(bag[begin:]) - len(bag[begin:].lstrip(b" "))
+    short = bytearray(bag[:begin] + bag[end:])
+    short[begin - 4 : begin] = bytes(4)
+    for place in re.finditer(b"(index|chunk)_pos=", bytes(short)):
+        (value,) = struct.unpack_from("<Q", short, place.end())
+        struct.pack_into("<Q", short, place.end(), value - (end - begin))
+    assert len(list(open_bag(_stored(".bag", bytes(short))).messages())) == 2
+    return [bag, bytes(short)]
 
 
 def _flight_logs() -> list[bytes]:
@@ -212,8 +269,8 @@ SEEDS: dict[str, Callable[[], list[bytes]]] = {
     "address": lambda: [b"px4:udp://:14540?system=1", b"ardupilot:serial:///dev/ttyUSB0?baud=57600"],
     "quantity": lambda: [b"2 ms", b"57600 bit/s", b"0.5 %", b"1e3 kg*m/s^2"],
     "trace": _written_trace,
-    "mcap": lambda: _written_bag("seed", "seed/*.mcap"),
-    "rosbag": lambda: _written_bag("seed.bag", "seed.bag"),
+    "mcap": _written_mcap,
+    "rosbag": _written_rosbag,
     "tlog": lambda: [b"".join(bytes(8) + frame for frame in _recorded()[:10])],
     "flight-log": _flight_logs,
     "model": lambda: [(ROOT / "examples/starter/model.yaml").read_bytes()],
@@ -237,7 +294,8 @@ def main() -> None:
     if len(sys.argv) < 2 or sys.argv[1] not in TARGETS:
         sys.exit(f"{__doc__}\nTargets: {', '.join(TARGETS)}")
     name = sys.argv.pop(1)
-    corpus = Path(tempfile.mkdtemp(prefix="seeds-"))
+    corpus = FOLDER / "seeds"
+    corpus.mkdir()
     for number, seed in enumerate(SEEDS[name]()):
         (corpus / str(number)).write_bytes(seed)
     mutators = {"mavlink": SEALS["MAVLink"], "pprzlink": SEALS["pprzlink"]}

@@ -7,6 +7,7 @@ the run.
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,9 +16,10 @@ from typing import NamedTuple
 from volery.base.time import US, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.link import Frame, Link, Receiver
-from volery.links.mavlink_codec import MavlinkParser, encode, frame_length
+from volery.links.mavlink_codec import STX, STX_V1, MavlinkParser, encode, frame_length
 
 _STAMP = struct.Struct(">Q")
+_FRAME_START = re.compile(b"[" + bytes((STX, STX_V1)) + b"]")
 
 
 class TlogTap:
@@ -90,14 +92,11 @@ class Entry(NamedTuple):
 def read_tlog(path: Path) -> Iterator[Entry]:
     """Yield the frames of known messages of a log in order. Damaged parts and a cut end are skipped."""
     data = path.read_bytes()
-    at = 0
-    while at + _STAMP.size < len(data):
-        length = frame_length(data, at + _STAMP.size)
-        if not length:
-            at += 1
-            continue
-        start = at + _STAMP.size
-        frames = MavlinkParser().feed(data[start : start + length])
+    after = 0
+    while (found := _FRAME_START.search(data, after + _STAMP.size)) is not None:
+        start = found.start()
+        length = frame_length(data, start)
+        after = start + length if length else start + 1 - _STAMP.size
+        frames = MavlinkParser().feed(data[start:after])
         if frames:
-            yield Entry(_STAMP.unpack_from(data, at)[0], frames[0])
-        at = start + length
+            yield Entry(_STAMP.unpack_from(data, start - _STAMP.size)[0], frames[0])

@@ -17,6 +17,7 @@ from volery.trace.events import NONE
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
+    from pydantic import TypeAdapter
 
 D = TypeVar("D")
 
@@ -38,16 +39,28 @@ def from_json(data: bytes, kind: type[D], schema: str, what: str) -> D:
     Raises:
         UsageError: *data* is not a description of that schema.
     """
-    from pydantic import TypeAdapter, ValidationError  # noqa: PLC0415  # writing a trace needs neither
+    from pydantic import ValidationError  # noqa: PLC0415  # writing a trace needs no pydantic
 
     try:
         raw: Any = json.loads(data)
         version = raw.get("schema") if isinstance(raw, dict) else None
         if version != schema:
             raise UsageError(f"the trace's {what} has schema {version!r}; this version reads {schema!r}")
-        return TypeAdapter(kind).validate_python(raw)
-    except (ValueError, ValidationError) as error:
+        return _adapter(kind).validate_python(raw)
+    except (ValueError, RecursionError, ValidationError) as error:
         raise UsageError(f"the trace's {what} cannot be read: {error}") from error
+
+
+_ADAPTERS: dict[object, TypeAdapter[Any]] = {}
+
+
+def _adapter(kind: type[D]) -> TypeAdapter[D]:
+    """Return what checks descriptions of *kind*. To make one takes 5 ms."""
+    from pydantic import TypeAdapter  # noqa: PLC0415
+
+    if kind not in _ADAPTERS:
+        _ADAPTERS[kind] = TypeAdapter(kind)
+    return _ADAPTERS[kind]
 
 
 SETUP_SCHEMA = "volery-setup/1"

@@ -10,6 +10,7 @@ import struct
 import zlib
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
@@ -87,7 +88,6 @@ class Reading:
         self.metadata: dict[str, dict[str, str]] = {}
         self.complete = False
         self.lost = ""
-        self._codecs = {type_name(kind): Codec(kind) for kind in OWN_EVENTS}
         self._schemas: dict[int, str] = {}
         self._decoders: dict[int, _Decoder | None] = {}
         self._wanted: Callable[[type[Any]], bool] = lambda kind: True
@@ -191,7 +191,7 @@ class Reading:
             raise UsageError(f"{self.path} {what}")
         else:
             body = content
-        if not record.missing and zlib.crc32(body) != checksum:
+        if checksum and not record.missing and zlib.crc32(body) != checksum:  # 0: none was computed
             self._lose(f"a part that follows {clock(self._last)} is damaged: its checksum is wrong")
             return
         yield from self._events_of_body(body)
@@ -222,7 +222,7 @@ class Reading:
     def _decoder(self, channel: records.Channel) -> _Decoder | None:
         """Return what makes events of the messages of *channel*, None if they are not wanted."""
         schema, topic = self._schemas[channel.schema_id], channel.topic
-        codec = self._codecs.get(schema)
+        codec = _codecs().get(schema)
         if not self._wanted(Published if codec is None else codec.kind):
             return None
         if codec is None:
@@ -242,6 +242,11 @@ class Reading:
 
     def _unknown_channel(self, _: Ns, __: bytes) -> None:
         self._lose("what a channel carries stood in a damaged part: its events are missing")
+
+
+@cache
+def _codecs() -> dict[str, Codec]:
+    return {type_name(kind): Codec(kind) for kind in OWN_EVENTS}
 
 
 def _decompressed(content: bytes, size: int) -> bytes:

@@ -410,7 +410,11 @@ def _learn(topic: str, name: str, text: str, unreadable: dict[str, str], *, idl:
         parsed = parse(text) if idl else parse(text, name)
         store().register({key: what for key, what in parsed.items() if key not in store().fielddefs})
     except (RecursionError, SyntaxError, *DAMAGE) as error:  # classes are made of source code
-        unreadable[topic] = f"its type {name} is not known and not defined in the recording: {error}"
+        problem = str(error)
+    else:
+        problem = "" if name in store().fielddefs else "the name cannot be that of a type"
+    if problem:
+        unreadable[topic] = f"its type {name} is not known and not defined in the recording: {problem}"
 
 
 _METADATA_VERSION: Literal[9] = 9

@@ -162,3 +162,11 @@ def test_a_type_whose_name_begins_with_a_digit_is_named(tmp_path: Path) -> None:
     assert "5_msgs/msg/Word is not known" in bag.unreadable["/words"]
     with pytest.raises(UsageError, match="5_msgs/msg/Word: not a name"):
         define("5_msgs/msg/Word", "string data\n")
+
+
+def test_a_type_whose_name_is_none_is_reported_once_and_not_for_each_message(tmp_path: Path) -> None:
+    file = tmp_path / "name.mcap"
+    recorded(file, CompressionType.NONE, kind="x_msgs/m/Word")
+    bag = open_bag(file)
+    assert "x_msgs/m/Word is not known" in bag.unreadable["/words"]
+    assert (list(bag.messages()), bag.damage) == ([], [])
