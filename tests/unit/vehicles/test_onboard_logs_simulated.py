@@ -92,6 +92,8 @@ def test_pymavlink_reads_the_log_of_an_ardupilot(dataflash: tuple[list[LogEntry]
     steps = {round(b.TimeUS - a.TimeUS, -3) for a, b in pairwise(found["ATT"])}
     assert steps == {200_000}
     assert len(found["ATT"]) == len(found["POS"]) == len(found["BAT"])
+    assert [one.Id for one in found["EV"]] == [10, 11]  # armed, disarmed
+    assert "PRX" not in found  # no proximity sensor
 
 
 def test_pymavlink_knows_vehicle_modes_and_time(dataflash: tuple[list[LogEntry], Path]) -> None:

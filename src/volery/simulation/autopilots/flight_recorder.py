@@ -38,6 +38,7 @@ class FlightRecorder:
             self._open = self._begin()
         if self._ticks % EACH == 0:
             self._open.values.extend(self._sample())
+            self._open.extras.append(self._vehicle.rules.log_extras(self._vehicle))
         self._ticks += 1
 
     def _begin(self) -> FlightLog:

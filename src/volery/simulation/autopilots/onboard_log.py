@@ -45,6 +45,10 @@ class LogSample(NamedTuple):
     amsl: float
 
 
+LogRow = tuple[str, tuple[float, ...]]
+"""A row that only one firmware logs: name of the message, and its values after the time."""
+
+
 @dataclass
 class FlightLog:
     """One log, from arming to disarming.
@@ -63,6 +67,8 @@ class FlightLog:
     home_down: float
     parameters: tuple[Parameter, ...]
     values: array[float] = field(default_factory=lambda: array("d"))
+    extras: list[tuple[LogRow, ...]] = field(default_factory=list)
+    """Rows of the firmware's own beside each sample."""
     encoded: bytes | None = None
     """The file, once it has been requested."""
 

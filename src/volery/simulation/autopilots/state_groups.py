@@ -44,6 +44,10 @@ class ArmingState:
     """Time at which arming was last refused."""
     checks_passed: bool = False
     """Result of the last arming checks, for firmwares that check regularly."""
+    blocked: bool = False
+    """Whether the motors of an armed vehicle on the ground stay idle."""
+    warned_at: Ns = NEVER
+    """Time of the last warning of that."""
 
 
 @dataclass
@@ -236,6 +240,8 @@ class OutputState:
     """Kind and number of the output that changes by itself."""
     repetitions: int = 0
     """Number of the last order to change an output repeatedly."""
+    gripper: int | None = None
+    """What the gripper has done: 0 released, 1 grabbed; ``None``: it is neutral or moves."""
     functions: dict[int, int] = field(default_factory=dict)
     """Function by channel, of the channels that have one, and the changes of parameters that it holds for."""
     functions_at: int = -1
@@ -438,3 +444,45 @@ class AvoidanceState:
     """Velocity that was last given, north, east, down [m/s]."""
     limited_at: Ns = NEVER
     """When avoidance last changed a velocity."""
+
+
+@dataclass
+class Aircraft:
+    """Another aircraft: its last report, and the threat that it is. Lengths in metres, times in ns."""
+
+    place: Vector
+    """North, east, down about the estimator's origin."""
+    velocity: Vector
+    """North, east, down [m/s]."""
+    at: Ns
+    """Time of the report."""
+    level: int = 0
+    """MAV_COLLISION_THREAT_LEVEL."""
+    nearest: float = 0.0
+    """Least horizontal distance to come."""
+    nearest_height: float = 0.0
+    """Least vertical distance to come."""
+    time: float = 0.0
+    """Time until the least horizontal distance [s]."""
+    reported_at: Ns = NEVER
+
+
+@dataclass
+class TrafficState:
+    """Other aircraft, and the response to the most serious threat. Times in ns."""
+
+    others: dict[tuple[int, int], Aircraft] = field(default_factory=dict)
+    """By the kind of report and the address or system id."""
+    level: int = 0
+    """Level of threat that the vehicle responds to."""
+    level_since: Ns = NEVER
+    action: int = 0
+    """MAV_COLLISION_ACTION that was last possible."""
+    active: bool = False
+    """Whether avoidance acts."""
+    mode_before: int = 0
+    """Number of the mode before avoidance."""
+    mode_entered: int | None = None
+    """Number of the mode that avoidance has entered."""
+    threatened_at: Ns = NEVER
+    """When a threat was last reported."""

@@ -21,7 +21,7 @@ from volery.kernel.api import Action, Kernel
 from volery.simulation.autopilots.autopilot_parameters import Parameter, Parameters, Tuning
 from volery.simulation.autopilots.flight_stack.flight import Control, Estimate, Flight, Setpoint
 from volery.simulation.autopilots.manual_control import RcChannels
-from volery.simulation.autopilots.onboard_log import FlightLog
+from volery.simulation.autopilots.onboard_log import FlightLog, LogRow
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_INT, MissionItem, OnboardMission
 from volery.simulation.autopilots.protocol_endpoint import VehicleOutput
 from volery.simulation.autopilots.state_groups import (
@@ -40,6 +40,7 @@ from volery.simulation.autopilots.state_groups import (
     ProximityState,
     ReportState,
     SwitchState,
+    TrafficState,
 )
 
 
@@ -148,6 +149,11 @@ def unlimited(_vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     return setpoint
 
 
+def no_rows(_vehicle: Vehicle) -> tuple[LogRow, ...]:
+    """Return no rows: the default of a firmware that logs nothing of its own."""
+    return ()
+
+
 class StartupTimes(NamedTuple):
     """Uptimes [ns] from which parts of the autopilot work."""
 
@@ -209,6 +215,8 @@ class VehicleRules:
     """Return where a return ends and its least height, north, east, down [m]; ``None``: home."""
     limit: Callable[[Vehicle, Setpoint], Setpoint] = unlimited
     """Return the set-point that a manoeuvre may give, as avoidance limits it."""
+    log_extras: Callable[[Vehicle], tuple[LogRow, ...]] = no_rows
+    """Return what the log on board records beside the samples of every firmware."""
     firmware_state: Callable[[Vehicle], object] = do_nothing
     """Create the state that only this firmware keeps about a vehicle: ``Vehicle.firmware_state``."""
 
@@ -277,6 +285,7 @@ class Vehicle:
         self.fence = FenceState()
         self.proximity = ProximityState()
         self.avoidance = AvoidanceState()
+        self.traffic = TrafficState()
         self.reports = ReportState(arming_checks_at=self.uptime(), counters_at=self.uptime())
         self.home: Home | None = None
         self._setpoint: Setpoint = OFF
@@ -454,7 +463,7 @@ class Vehicle:
         self.manoeuvre.on_ground()
         if not self.armed:
             return
-        if not self.manoeuvre.takeoff_requested():
+        if self.arming.blocked or not self.manoeuvre.takeoff_requested():
             ground.takeoff_requested_at = NEVER
             self.drive(IDLE)
             return

@@ -358,9 +358,13 @@ def on_prearm_checks(vehicle: Vehicle, _command: Command, problems: Problems) ->
 
 
 def on_region(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_SET_ROI and its two forms: without a mount that pans, the nose turns to the place."""
+    """Handle DO_SET_ROI and its two forms: without a mount that pans, the nose turns to the place.
+
+    Without a place the nose turns along the path again, also after CONDITION_YAW.
+    """
     if command.number == ROI_NONE or (command.x == 0.0 and command.y == 0.0):
         point_at(vehicle, None)
+        vehicle.commanded.forget_heading()
         return ACCEPTED
     if not _is_place(command):
         return FAILED

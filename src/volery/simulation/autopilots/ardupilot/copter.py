@@ -8,7 +8,15 @@ from typing import Any
 
 from volery.base.frames import Vector
 from volery.base.time import MS, S, from_seconds, to_seconds
-from volery.simulation.autopilots.ardupilot import boot, commands, mission, pilot_input, telemetry
+from volery.simulation.autopilots.ardupilot import (
+    boot,
+    commands,
+    follow,
+    mission,
+    pilot_input,
+    telemetry,
+    traffic,
+)
 from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, AuxiliaryFunctions
 from volery.simulation.autopilots.ardupilot.avoidance import limit_copter, obstacle_problems
 from volery.simulation.autopilots.ardupilot.buttons import read_buttons
@@ -26,7 +34,6 @@ from volery.simulation.autopilots.ardupilot.firmware import (
     send_version,
     streams,
 )
-from volery.simulation.autopilots.ardupilot.follow import Follow, on_position, on_target
 from volery.simulation.autopilots.ardupilot.guided import copter_attitude, copter_global, copter_local
 from volery.simulation.autopilots.ardupilot.landing_gear import watch_gear
 from volery.simulation.autopilots.ardupilot.landing_sequence import leave_sequence
@@ -51,10 +58,11 @@ from volery.simulation.autopilots.ardupilot.mount import update_mount
 from volery.simulation.autopilots.ardupilot.mount_control import on_other_position
 from volery.simulation.autopilots.ardupilot.parameter_checks import copter_problems
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED, copter_tuning
-from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, update_proximity
+from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, log_rows, update_proximity
 from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.servo_outputs import pass_transmitter_through
 from volery.simulation.autopilots.ardupilot.sprayer import update_sprayer
+from volery.simulation.autopilots.ardupilot.takeoff_check import check_takeoff
 from volery.simulation.autopilots.ardupilot.telemetry import (
     ACTIVE,
     CRITICAL,
@@ -190,7 +198,7 @@ MODES = {
         Mode(19, "AVOID_ADSB", AUTO_BITS, Guided, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
         Mode(20, "GUIDED_NOGPS", MANUAL_BITS, GuidedAttitude, Z_CONTROL, starts_high=True),
         Mode(21, "SMART_RTL", AUTO_BITS, ReturnAlongTrack, LEVEL_AND_HEIGHT, True, armable=False),
-        Mode(23, "FOLLOW", AUTO_BITS, Follow, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
+        Mode(23, "FOLLOW", AUTO_BITS, follow.Follow, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
         Mode(24, "ZIGZAG", AUTO_BITS, ZigZag, LEVEL_AND_HEIGHT, needs_position=True, pilot=True),
         Mode(17, "BRAKE", AUTO_BITS, Brake, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
     )
@@ -212,6 +220,7 @@ CHECKS = (
     *SHARED_CHECKS,
     *FENCE_CHECKS,
     PROXIMITY_CHECK,
+    traffic.TRAFFIC_CHECK,
     *STOP_CHECKS,
 )
 
@@ -279,6 +288,8 @@ def on_step(vehicle: Vehicle) -> None:
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_copter)
     update_proximity(vehicle)
+    traffic.update_traffic(vehicle)
+    check_takeoff(vehicle)
     commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))
     turn_into_wind(vehicle, COPTER.periodic.tick)
     if turn_tested_motor(vehicle) or not vehicle.armed:
@@ -396,9 +407,10 @@ def parameters() -> tuple[Parameter, ...]:
 
 
 def _on_other_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
-    """Handle GLOBAL_POSITION_INT of another system, which the copter or its mount may follow."""
-    on_position(vehicle, fields, sender)
+    """Handle GLOBAL_POSITION_INT of another system, which the copter or its mount may follow, or avoid."""
+    follow.on_position(vehicle, fields, sender)
     on_other_position(vehicle, fields, sender)
+    traffic.on_position(vehicle, fields, sender)
 
 
 _MAVLINK = ardupilot_mavlink(
@@ -426,7 +438,8 @@ _MAVLINK = ardupilot_mavlink(
         DO_AUX_FUNCTION: AUXILIARY.on_command,
     },
     handlers={
-        "FOLLOW_TARGET": on_target,
+        "ADSB_VEHICLE": traffic.on_adsb,
+        "FOLLOW_TARGET": follow.on_target,
         "GLOBAL_POSITION_INT": _on_other_position,
         "SET_ATTITUDE_TARGET": copter_attitude,
         "SET_POSITION_TARGET_GLOBAL_INT": copter_global,
@@ -443,6 +456,7 @@ COPTER = Firmware(
         boot_mode=MODES[0],
         return_point=return_point,
         limit=limit_copter,
+        log_extras=log_rows,
         startup=StartupTimes(READY, ORIGIN, POSITION, POSITION),
         arming=ArmingTimes(
             motors_rest=2 * S, spool_up=500 * MS, takeoff_slew=100 * MS, abandoned_after=1500 * MS

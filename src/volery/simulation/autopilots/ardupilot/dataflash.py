@@ -58,7 +58,18 @@ ATT = _Form(133, "ATT", "Qfff", "TimeUS,Roll,Pitch,Yaw")
 POS = _Form(134, "POS", "QLLfff", "TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt")
 GPS = _Form(135, "GPS", "QBBIHBcLLffff", "TimeUS,I,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ")
 BAT = _Form(136, "BAT", "QBffffB", "TimeUS,Inst,Volt,VoltR,Curr,CurrTot,RemPct")
-FORMS = (FMT, PARM, MSG, MODE, ARM, ATT, POS, GPS, BAT)
+PRX = _Form(
+    137,
+    "PRX",
+    "QBBfffffffffff",
+    "TimeUS,Layer,He,D0,D45,D90,D135,D180,D225,D270,D315,DUp,CAn,CDis",
+)
+PRXR = _Form(138, "PRXR", "QBffffffff", "TimeUS,Layer,D0,D45,D90,D135,D180,D225,D270,D315")
+EV = _Form(139, "EV", "QB", "TimeUS,Id")
+ARMED_EVENT, DISARMED_EVENT = 10, 11
+EXTRAS = {form.name: form for form in (PRX, PRXR)}
+"""Messages of ``FlightLog.extras``."""
+FORMS = (FMT, PARM, MSG, MODE, ARM, EV, ATT, POS, GPS, BAT, *EXTRAS.values())
 
 
 def encode(log: FlightLog) -> bytes:
@@ -78,16 +89,27 @@ def encode(log: FlightLog) -> bytes:
     ]
     out.append(MSG.row(start, f"{name} V4.5.6 (7ce11b41)".encode()))
     out += [PARM.row(start, one.name.encode(), one.value, one.value) for one in log.parameters]
-    out.append(ARM.row(start, 1, 0, 0, 1))
+    out += [ARM.row(start, 1, 0, 0, 1), EV.row(start, ARMED_EVENT)]
     mode = -1.0
-    for sample in samples:
+    for sample, extras in zip(samples, log.extras, strict=True):
         if sample.mode != mode:
             mode = sample.mode
             out.append(MODE.row(round(sample.time_us), int(mode), int(mode), 0))
         out += _rows(log, sample, start)
+        out += [_extra_row(sample, name, values) for name, values in extras]
     if samples:
-        out.append(ARM.row(round(samples[-1].time_us), 0, 0, 0, 1))
+        end = round(samples[-1].time_us)
+        out += [ARM.row(end, 0, 0, 0, 1), EV.row(end, DISARMED_EVENT)]
     return b"".join(out)
+
+
+def _extra_row(sample: LogSample, name: str, values: tuple[float, ...]) -> bytes:
+    """Return a row of the firmware's own at the time of a sample."""
+    form = EXTRAS[name]
+    fitting = (
+        int(one) if letter == "B" else one for letter, one in zip(form.letters[1:], values, strict=True)
+    )
+    return form.row(round(sample.time_us), *fitting)
 
 
 def _rows(log: FlightLog, sample: LogSample, start: int) -> list[bytes]:

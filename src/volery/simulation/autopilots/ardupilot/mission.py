@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import isinf, isnan
+from dataclasses import replace
+from math import dist, isinf, isnan
 
-from volery.base.time import to_seconds
+from volery.base.time import from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot.camera import DIGICAM_CONTROL, TRIGGER_DISTANCE, act_on_camera
 from volery.simulation.autopilots.ardupilot.commands import HIGHEST, SET_REVERSE, change_speed, turn_to
 from volery.simulation.autopilots.ardupilot.guided_items import copter_guided_leg, set_limits
@@ -18,6 +19,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
     disarm,
 )
 from volery.simulation.autopilots.ardupilot.payload import GRIPPER, SET_RELAY, SET_SERVO, act_on_payload
+from volery.simulation.autopilots.ardupilot.payload_place import payload_leg
 from volery.simulation.autopilots.ardupilot.sprayer import DO_SPRAYER, act_on_sprayer
 from volery.simulation.autopilots.ardupilot.winch import DO_WINCH, act_on_winch
 from volery.simulation.autopilots.manoeuvres.manual_flight import HoldPlace
@@ -47,6 +49,7 @@ from volery.simulation.autopilots.onboard_mission import (
     LOITER_TO_ALTITUDE,
     LOITER_TURNS,
     LOITER_UNLIMITED,
+    PAYLOAD_PLACE,
     RETURN,
     SET_HOME,
     SET_YAW_SPEED,
@@ -89,12 +92,13 @@ NAMES = {
     DO_AUX_FUNCTION: "AuxFunction",
     GUIDED_ENABLE: "GuidedEnable",
     GUIDED_LIMITS: "GuidedLimits",
+    PAYLOAD_PLACE: "PayloadPlace",
 }
 """Names of the items in the firmware's status texts."""
 
-KEPT_ONLY = frozenset({94, 189, 195, 197, 201, 205, 182, 184, 207, 208, 212, JUMP_TAG})
+KEPT_ONLY = frozenset({189, 195, 197, 201, 205, 182, 184, 207, 208, 212, JUMP_TAG})
 """Items that are stored and read back without effect: mounts, repeated servos and relays, fences, regions of
-interest, payload places, and tags that only DO_JUMP_TAG looks for.
+interest, and tags that only DO_JUMP_TAG looks for.
 """
 
 PLACED = frozenset(
@@ -106,15 +110,16 @@ PLACED = frozenset(
         LOITER_TIME,
         LOITER_TO_ALTITUDE,
         LAND,
+        PAYLOAD_PLACE,
         TAKEOFF,
         SET_HOME,
     }
 )
 """Items whose place is checked and whose frame is stored."""
 
-KEEPS_FRAME = PLACED | {GUIDED_ENABLE, 94, 189, 191, 195, 201}
-"""Items whose frame is stored; the others read back frame 0. The last five: payload place, landing sequence,
-go-around and regions of interest.
+KEEPS_FRAME = PLACED | {GUIDED_ENABLE, 189, 191, 195, 201}
+"""Items whose frame is stored; the others read back frame 0. The last four: landing sequence, go-around and
+regions of interest.
 """
 
 STORED_FRAMES = {
@@ -223,6 +228,8 @@ def act(vehicle: Vehicle, item: MissionItem) -> None:
 
 
 DAY_S = 86_400
+LEAST_JERK = 0.1
+"""Lower limit of WPNAV_JERK [m/s^3]."""
 UNSTATED = -1.0
 """Hour, minute or second of NAV_DELAY that is not stated."""
 
@@ -231,11 +238,30 @@ def leg_of_copter(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
     """Return the leg of an item. A delay without a duration lasts until a time of day."""
     if item.command == GUIDED_ENABLE:
         return copter_guided_leg(vehicle, item)
+    if item.command == PAYLOAD_PLACE:
+        return payload_leg(vehicle, item)
     if item.command == DELAY:
         if item.param1 <= 0.0:
             item = item._replace(param1=_seconds_until(vehicle, item))
         vehicle.send_text(INFO, f"Delaying {int(item.param1)} sec")
-    return copter_leg(vehicle, item, goes_on)
+    leg = copter_leg(vehicle, item, goes_on)
+    going = leg.manoeuvre
+    if item.command in (WAYPOINT, SPLINE_WAYPOINT) and isinstance(going, ToPoint) and going.point is not None:
+        length = dist(vehicle.estimate.position, going.point)
+        return leg if length > vehicle.tuning.waypoint_radius else _not_before(leg, vehicle, length)
+    return leg
+
+
+def _not_before(leg: Leg, vehicle: Vehicle, length: float) -> Leg:
+    """Return a leg that takes at least the time for its *length* [m] from rest to rest within WPNAV_JERK.
+
+    A waypoint within the waypoint radius takes a moment, too, as ArduCopter's path of limited jerk does: four
+    equal parts of constant jerk.
+    """
+    jerk = max(LEAST_JERK, vehicle.parameters["WPNAV_JERK"])
+    earliest = vehicle.kernel.now() + from_seconds(4.0 * (length / (2.0 * jerk)) ** (1.0 / 3.0))
+    done = leg.done
+    return replace(leg, done=lambda: vehicle.kernel.now() >= earliest and done())
 
 
 def _seconds_until(vehicle: Vehicle, item: MissionItem) -> float:

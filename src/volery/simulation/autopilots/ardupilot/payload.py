@@ -111,7 +111,14 @@ def move_gripper(vehicle: Vehicle, action: int) -> bool:
     if said is None or not vehicle.parameters["GRIP_ENABLE"]:
         return False
     vehicle.send_text(INFO, f"{said}ing")
-    vehicle.kernel.call_at(vehicle.kernel.now() + GRIPS_WITHIN, lambda: vehicle.send_text(INFO, f"{said}ed"))
+    outputs = vehicle.outputs
+    outputs.gripper = None
+
+    def finish() -> None:
+        outputs.gripper = action
+        vehicle.send_text(INFO, f"{said}ed")
+
+    vehicle.kernel.call_at(vehicle.kernel.now() + GRIPS_WITHIN, finish)
     return True
 
 

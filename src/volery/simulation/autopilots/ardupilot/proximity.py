@@ -15,6 +15,7 @@ from volery.base.time import MS, S, to_seconds
 from volery.simulation.autopilots.ardupilot.fence_shapes import Level, shapes
 from volery.simulation.autopilots.ardupilot.modes import Check
 from volery.simulation.autopilots.mavlink.messages import Fields, all_within, boot_ms, to_uint16
+from volery.simulation.autopilots.onboard_log import LogRow
 from volery.simulation.autopilots.state_groups import NEVER, ProximityState
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -232,6 +233,31 @@ def on_obstacle_3d(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> No
 
 
 # -- reports
+
+
+LEVEL_LAYER = 2
+"""Number of the layer of the vehicle's level among the original's five."""
+NO_DATA, GOOD = 1, 2
+"""Health in the log."""
+
+
+def log_rows(vehicle: Vehicle) -> tuple[LogRow, ...]:
+    """Return PRX, and with PRX_LOG_RAW also PRXR, while there is a distance; open directions: the range."""
+    sensor = vehicle.proximity
+    nearest = closest(vehicle)
+    if nearest is None:
+        return ()
+    known, filtered = sensor.distances, sensor.filtered
+    health = GOOD if is_healthy(vehicle) else NO_DATA
+    smooth = (filtered[one] if one in known else sensor.range[1] for one in range(DIRECTIONS))
+    far, angle = nearest
+    rows: list[LogRow] = [
+        ("PRX", (LEVEL_LAYER, health, *smooth, upward(vehicle) or 0.0, angle, far)),
+    ]
+    if vehicle.parameters["PRX_LOG_RAW"]:
+        raw = (known.get(one, sensor.range[1]) for one in range(DIRECTIONS))
+        rows.append(("PRXR", (LEVEL_LAYER, *raw)))
+    return tuple(rows)
 
 
 def reports(vehicle: Vehicle) -> list[Fields]:

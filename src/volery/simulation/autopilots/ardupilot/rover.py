@@ -40,7 +40,7 @@ from volery.simulation.autopilots.ardupilot.motor_test import drive_tested_outpu
 from volery.simulation.autopilots.ardupilot.mount import update_mount
 from volery.simulation.autopilots.ardupilot.parameter_checks import source_problems
 from volery.simulation.autopilots.ardupilot.parameters import ROVER_SUPPORTED, rover_tuning
-from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, update_proximity
+from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, log_rows, update_proximity
 from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.servo_outputs import pass_transmitter_through
 from volery.simulation.autopilots.ardupilot.sprayer import update_sprayer
@@ -319,6 +319,7 @@ ROVER = Firmware(
         boot_mode=INITIALISING,
         return_point=return_point,
         limit=limit_rover,
+        log_extras=log_rows,
         startup=StartupTimes(READY, HOME, POSITION, HOME),
         parameters=ParameterTable(parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
         rc=RcDefaults((1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0), True),

@@ -12,6 +12,7 @@ from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
 from volery.base.time import US, S
 from volery.simulation.autopilots.ardupilot import proximity
 from volery.simulation.autopilots.ardupilot.battery import used_mah
+from volery.simulation.autopilots.ardupilot.takeoff_check import has_speed_telemetry, reported_rotor_speed
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.mavlink.messages import (
@@ -577,16 +578,15 @@ def terrain_report(vehicle: Vehicle) -> Fields:
 
 def esc_telemetry(vehicle: Vehicle) -> Fields | None:
     """Return ESC_TELEMETRY_1_TO_4 with the constants of the firmware's simulator."""
-    age = vehicle.uptime()
-    if age < 6 * S:
+    if not has_speed_telemetry(vehicle):
         return None
-    count = age // (S // 10) % 65_536
+    count = vehicle.uptime() // (S // 10) % 65_536
     return {
         "temperature": (32,) * 4,
         "voltage": (1679,) * 4,
         "current": (80,) * 4,
         "totalcurrent": (1,) * 4,
-        "rpm": (0,) * 4,
+        "rpm": (to_uint16(reported_rotor_speed(vehicle)),) * 4,
         "count": (count,) * 4,
     }
 

@@ -39,3 +39,27 @@ def test_a_delay_ends_at_a_time_of_day(
     if ahead > 0:
         rig.run_until(lambda: any("Reached command #1" in text for text in rig.texts()))
         assert rig.now - start == pytest.approx(ahead, abs=3.0)
+
+
+def test_a_waypoint_where_the_copter_is_takes_a_moment(station: Any) -> None:
+    rig = station(parameters={"AUTO_OPTIONS": 3})
+    rig.run(0.5)
+    item = {f"param{place}": 0.0 for place in range(1, 5)} | {"x": 460_000_000, "y": 70_000_000, "frame": 3}
+    target = {"target_system": 1, "target_component": 1, "mission_type": 0}
+    items = [
+        {**item, "command": 16, "z": 0.0},
+        {**item, "command": 22, "z": 10.0},
+        {**item, "command": 16, "z": 10.0},
+        {**item, "command": 16, "x": 460_010_000, "z": 10.0},
+    ]
+    rig.send("MISSION_COUNT", **target, count=len(items))
+    rig.run(0.1)
+    for number, one in enumerate(items):
+        rig.send("MISSION_ITEM_INT", **target, seq=number, current=0, autocontinue=1, **one)
+        rig.run(0.1)
+    rig.command(176, 1, 3)
+    assert rig.command(400, 1) == 0
+    rig.run_until(lambda: "Mission: 2 WP" in rig.texts())
+    begun = rig.now
+    rig.run_until(lambda: "Mission: 3 WP" in rig.texts())
+    assert 0.5 < rig.now - begun < 3.0

@@ -106,6 +106,11 @@ def test_a_region_of_interest_is_for_the_mount_or_for_the_nose(rig: Any) -> None
     rig.vehicle.set_parameter("SERVO11_FUNCTION", 0.0)
     assert rig.command(ROI, 0, 0, 0, 0, 46.001, 7.0, 0.0) == 0
     assert rig.vehicle.commanded.look_at is not None
+    rig.run(0.5)
+    assert rig.vehicle.commanded.yaw is not None
+    assert rig.command(ROI_NONE) == 0
+    rig.run(0.5)
+    assert rig.vehicle.commanded.yaw is None  # along the path again
 
 
 def test_it_follows_the_positions_of_another_system(rig: Any) -> None:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from math import cos, nan, radians, sin
+from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink import DFReader
 
+from volery.simulation.autopilots.ardupilot.dataflash import encode
 from volery.simulation.autopilots.ardupilot.proximity import edges
 
 ARM, REQUEST, PREARM = 400, 512, 401
@@ -218,3 +221,25 @@ def test_the_boundary_goes_on_beside_an_obstacle(sensing: Any) -> None:
     far = 3.0 * cos(radians(67.5)), 3.0 * sin(radians(67.5))
     assert start == pytest.approx((far[0], -far[1]))
     assert end == pytest.approx(far)
+
+
+def test_the_log_on_board_has_the_distances(station: Any, tmp_path: Path) -> None:
+    given = {"PRX_LOG_RAW": 1, "PRX_FILT": 0, "ARMING_CHECK": 0}
+    rig = station(parameters={**BY_MESSAGES, **given}, logging=True)
+    rig.run(0.5)
+    assert rig.command(ARM, 1.0) == 0
+    for _ in range(5):
+        measure(rig, 300, 2)
+    rig.run(0.3)
+    assert rig.command(ARM, 0.0) == 0
+    rig.run(0.3)
+    file = tmp_path / "1.bin"
+    file.write_bytes(encode(rig.vehicle.logs[0]))
+    found: dict[str, Any] = {}
+    log = DFReader.DFReader_binary(str(file))
+    while (message := log.recv_msg()) is not None:
+        found[message.get_type()] = message
+    last = found["PRX"]
+    assert (last.Layer, last.He, last.D90, last.D0) == (2, 2, 3.0, 10.0)
+    assert (last.CAn, last.CDis) == (90.0, 3.0)
+    assert (found["PRXR"].D90, found["PRXR"].D0) == (3.0, 10.0)
