@@ -12,10 +12,9 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 from itertools import count
-from queue import Empty, SimpleQueue
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, Self
 
@@ -24,6 +23,7 @@ from greenlet import GreenletExit, getcurrent, greenlet
 from volery.base.errors import Deadlock, UsageError
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import PeriodicAction
+from volery.kernel.bell import Bell
 from volery.kernel.event_heap import EventHeap, heappop, heappush, heapreplace
 from volery.kernel.interrupts import LONGEST_WAIT_S, Interrupts, Watchdog
 from volery.kernel.task import Cancelled, ExecutionContext, Scope, Task
@@ -49,7 +49,7 @@ class Pacer:
             raise UsageError(f"a pace of {pace}: give seconds per second on the wall, above 0")
         self._pace = pace
         self._anchor: tuple[int, Ns] | None = None  # one instant in wall time and in virtual time
-        self._bell: SimpleQueue[None] = SimpleQueue()  # unlike an Event, safe to use in a signal handler
+        self._bell = Bell()
 
     def rest(self) -> None:
         """Stop virtual time until the next ``wait``."""
@@ -57,7 +57,7 @@ class Pacer:
 
     def ring(self) -> None:
         """End the wait in progress, or else the next one; from any thread."""
-        self._bell.put(None)
+        self._bell.ring()
 
     def wait(self, now: Ns, when: Ns) -> Ns | None:
         """Wait for `when`, ns; return None if it has come, else the time after a wait, perhaps short."""
@@ -67,8 +67,7 @@ class Pacer:
         ahead = to_seconds(when - virtual) / self._pace - to_seconds(monotonic_ns() - wall)
         if ahead <= 0.0:
             return None
-        with suppress(Empty):
-            self._bell.get(timeout=min(ahead, LONGEST_WAIT_S))
+        self._bell.wait(min(ahead, LONGEST_WAIT_S))
         passed = int((monotonic_ns() - wall) * self._pace)
         return max(now, min(virtual + passed, when))
 

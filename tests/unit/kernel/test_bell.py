@@ -1,0 +1,45 @@
+"""The bell: rings from anywhere end a wait, and a signal does not make it endless."""
+
+from __future__ import annotations
+
+import signal
+from threading import Timer
+from time import monotonic_ns
+
+from volery.base.time import MS
+from volery.kernel.bell import Bell
+
+
+def test_rings_are_not_counted() -> None:
+    bell = Bell()
+    bell.ring()
+    bell.ring()
+    bell.wait(1e6)  # ended by the rings before
+    bell.wait(0.0)
+    Timer(0.01, bell.ring).start()
+    bell.wait(1e6)
+
+
+def test_a_wait_whose_time_passes_while_a_signal_is_handled_ends() -> None:
+    bell, rescued = Bell(), []
+
+    def handle(*_signal: object) -> None:
+        until = monotonic_ns() + 100 * MS  # longer than the wait
+        while monotonic_ns() < until:
+            pass
+
+    def rescue() -> None:
+        rescued.append(True)
+        bell.ring()
+
+    before = signal.signal(signal.SIGALRM, handle)
+    timer = Timer(20.0, rescue)
+    timer.start()
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.01)
+        bell.wait(0.05)
+    finally:
+        timer.cancel()
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert not rescued
