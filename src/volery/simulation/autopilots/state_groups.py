@@ -369,6 +369,8 @@ class FailsafeState:
     """Values of the parameters that inject faults, as they were last applied."""
     simulated_at: int = -1
     """Changes of parameters when these were last compared."""
+    pushed: bool = False
+    """Whether a simulated force from outside acts."""
     rc_received: bool = False
     """Whether a transmitter or overrides have been received since boot."""
     crashing_since: Ns = NEVER

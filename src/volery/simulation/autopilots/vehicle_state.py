@@ -62,6 +62,10 @@ class Manoeuvre:
         """Whether it descends to land."""
         self.taking_off = False
         """Whether it climbs from the ground to a commanded height."""
+        self.starts_at_once = False
+        """Whether the motors may come up as soon as the vehicle is armed."""
+        self.waiting = IDLE
+        """Set-point of an armed vehicle on the ground until it takes off."""
         self.slow_start = False
         """Whether the motors come up slowly."""
         self.target: Vector | None = None
@@ -457,7 +461,7 @@ class Vehicle:
     def _run_on_ground(self) -> None:
         """Stop, idle or start the motors in the firmware's own time, as the manoeuvre requests a take-off."""
         now, times, ground = self.kernel.now(), self.rules.arming, self.ground
-        if now - self.arming.armed_at < times.motors_rest:
+        if now - self.arming.armed_at < times.motors_rest and not self.manoeuvre.starts_at_once:
             self.drive(OFF)
             return
         self.manoeuvre.on_ground()
@@ -465,7 +469,7 @@ class Vehicle:
             return
         if self.arming.blocked or not self.manoeuvre.takeoff_requested():
             ground.takeoff_requested_at = NEVER
-            self.drive(IDLE)
+            self.drive(self.manoeuvre.waiting)
             return
         if ground.takeoff_requested_at == NEVER:
             ground.takeoff_requested_at = now

@@ -15,6 +15,7 @@ from volery.simulation.world.dynamics import (
     drive_power,
     electrical_power,
     follow_ground,
+    is_pushed,
     multirotor_slope,
     rotation_matrix,
     rover_slope,
@@ -150,7 +151,7 @@ def _settle_multirotor(row: Array) -> None:
         row[S_CONTACT_SPEED] = max(0.0, -row[W_LAST_VELOCITY + 2])
         row[S_CONTACTS] += 1.0
     row[S_ON_GROUND] = 1.0 if touching else 0.0
-    light = total_thrust(row) < _LIGHT * row[P_MASS] * row[P_GRAVITY]
+    light = total_thrust(row) < _LIGHT * row[P_MASS] * row[P_GRAVITY] and not is_pushed(row)
     speed = 0.0
     spin = 0.0
     for axis in range(3):

@@ -85,6 +85,7 @@ from volery.simulation.world.state_layout import (
     STEP_S,
     U_MOTOR_HEALTH,
     U_PAYLOAD,
+    U_PUSH,
     W_AIR_VELOCITY,
     W_FORCE,
     W_GROUND,
@@ -256,6 +257,13 @@ def turn_rotors(row: Array, at: int, to: int) -> None:
 
 
 @numeric
+def is_pushed(row: Array) -> bool:
+    """Return whether a force from outside acts on a multirotor."""
+    pushed: bool = row[U_PUSH] != 0.0 or row[U_PUSH + 1] != 0.0 or row[U_PUSH + 2] != 0.0
+    return pushed
+
+
+@numeric
 def _add_rotor_and_air_loads(row: Array) -> None:
     """Compute force (east, north, up, without gravity) and torque (forward, left, up) of rotors and air."""
     lift = 0.0
@@ -279,6 +287,10 @@ def _add_rotor_and_air_loads(row: Array) -> None:
     row[W_FORCE] = ae * lift - drag * ve
     row[W_FORCE + 1] = an * lift - drag * vn
     row[W_FORCE + 2] = au * lift - drag * vu
+    if is_pushed(row):
+        for axis in range(3):
+            for part in range(3):
+                row[W_FORCE + axis] += row[P_MASS] * row[W_ROTATION + 3 * axis + part] * row[U_PUSH + part]
     for axis in range(3):
         row[W_TORQUE + axis] -= row[P_SPIN_DAMPING] * row[W_STATE + S_RATES + axis]
 

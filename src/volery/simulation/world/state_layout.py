@@ -118,6 +118,7 @@ U_BARO_BLOCKED = _add("U_BARO_BLOCKED", "1", "1: the barometer gives no new samp
 U_MAG_BLOCKED = _add("U_MAG_BLOCKED", "1", "1: the magnetometer gives no new samples")
 U_GPS_DRIFT = _add("U_GPS_DRIFT", "m/s", "speed at which the reported position drifts", 2, "north, east")
 U_GPS_DRIFT_START = _add("U_GPS_DRIFT_START", "1", "grid step at which the drift began")
+U_PUSH = _add("U_PUSH", "m/s^2", "acceleration by a force from outside; multirotors only", 3, FLU)
 
 # --- measurements: last sample of each sensor, in the axes of autopilots ---
 M_GYRO = _add("M_GYRO", "rad/s", "body rates", 3, FRD)

@@ -71,6 +71,7 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
     Z_CONTROL,
     Health,
 )
+from volery.simulation.autopilots.ardupilot.throw import Throw
 from volery.simulation.autopilots.ardupilot.weathervane import turn_into_wind
 from volery.simulation.autopilots.ardupilot.winch import no_servo, update_winch
 from volery.simulation.autopilots.autopilot import BootSequence, Firmware, PeriodicWork
@@ -195,6 +196,7 @@ MODES = {
         Mode(7, "CIRCLE", AUTO_BITS, CircleMode, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
         Mode(11, "DRIFT", MANUAL_BITS, Drift, needs_position=True, pilot=True, manual_throttle=True),
         Mode(16, "POSHOLD", AUTO_BITS, Loiter, LEVEL_AND_HEIGHT, True, pilot=True, user_takeoff=True),
+        Mode(18, "THROW", MANUAL_BITS, Throw, needs_position=True, manual_throttle=True),
         Mode(19, "AVOID_ADSB", AUTO_BITS, Guided, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
         Mode(20, "GUIDED_NOGPS", MANUAL_BITS, GuidedAttitude, Z_CONTROL, starts_high=True),
         Mode(21, "SMART_RTL", AUTO_BITS, ReturnAlongTrack, LEVEL_AND_HEIGHT, True, armable=False),
@@ -379,7 +381,7 @@ def _disarm_automatically(vehicle: Vehicle) -> None:
     if finished and now - vehicle.ground.landed_at >= LANDED_TO_DISARM:
         disarm(vehicle, COPTER_DISARMED, force=True)
         return
-    if ManualFlight(vehicle).pilot.throttle > 0.0:
+    if vehicle.mode.name == "THROW" or ManualFlight(vehicle).pilot.throttle > 0.0:
         vehicle.ground.idle_since = now
     delay = vehicle.parameters["DISARM_DELAY"]
     if delay > 0.0 and now - vehicle.ground.idle_since >= from_seconds(delay):

@@ -160,7 +160,6 @@ MISSION_MODES = ("AUTO", "AUTO_RTL")
 WITHOUT_EFFECT = {
     14: ("FLIP", ""),
     15: ("AUTOTUNE", ""),
-    18: ("THROW", ""),
     22: ("FLOWHOLD", ""),
     25: ("SYSTEMID", "No axis selected, SID_AXIS = 0"),
     28: ("TURTLE", ""),
@@ -228,7 +227,9 @@ def _enter(vehicle: Vehicle, mode: Mode) -> bool:
 
 
 def _not_set_up(vehicle: Vehicle, mode: Mode) -> str:
-    """Return why even a disarmed vehicle may not enter a mode, or an empty text."""
+    """Return why a vehicle may not enter a mode, armed or not, or an empty text."""
+    if mode.name == "THROW" and vehicle.armed:
+        return "init failed"
     if mode.name == "FOLLOW" and not vehicle.parameters["FOLL_ENABLE"]:
         vehicle.send_text(WARNING, "Set FOLL_ENABLE = 1")
         return "init failed"

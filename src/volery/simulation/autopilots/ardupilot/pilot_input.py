@@ -105,6 +105,7 @@ def on_step(vehicle: Vehicle) -> None:
         vehicle.failsafes.rc_received = pulses or bool(vehicle.rc.overridden)
     if vehicle.parameters.changes != vehicle.failsafes.simulated_at:
         vehicle.failsafes.simulated_at = vehicle.parameters.changes
+        simulate_push(vehicle)
         simulate_faults(vehicle)
     expire_overrides(vehicle)
 
@@ -131,6 +132,26 @@ def simulate_faults(vehicle: Vehicle) -> None:
         for motor in range(4):
             weak = motor == round(wanted[1])
             vehicle.flight.weaken_motor(motor, min(1.0, max(0.0, wanted[2])) if weak else 1.0)
+
+
+def simulate_push(vehicle: Vehicle) -> None:
+    """Push a copter by SIM_SHOVE_X, _Y and _Z, forward, right, down, for SIM_SHOVE_TIME, then 0."""
+    parameters, failsafes = vehicle.parameters, vehicle.failsafes
+    lasts = round(parameters["SIM_SHOVE_TIME"]) * MS
+    if lasts <= 0 or not vehicle.flies:
+        return
+    forward, right, down = (parameters[f"SIM_SHOVE_{axis}"] for axis in "XYZ")
+    vehicle.flight.push(forward, -right, -down)
+    if failsafes.pushed:
+        return
+    failsafes.pushed = True
+
+    def end() -> None:
+        failsafes.pushed = False
+        vehicle.flight.push(0.0, 0.0, 0.0)
+        parameters.set("SIM_SHOVE_TIME", 0.0)
+
+    vehicle.kernel.call_at(vehicle.kernel.now() + lasts, end)
 
 
 def expire_overrides(vehicle: Vehicle) -> None:

@@ -47,6 +47,7 @@ from volery.simulation.world.state_layout import (
     U_GPS_DRIFT,
     U_MAG_BLOCKED,
     U_MOTOR_HEALTH,
+    U_PUSH,
     U_WIND,
 )
 from volery.simulation.world.world import STEP, Truth, World
@@ -251,6 +252,10 @@ class Flight:
     def set_wind(self, north: float, east: float) -> None:
         """Set the mean velocity of the air about this vehicle, towards the north and the east [m/s]."""
         self._world.set_input(self._body, U_WIND, east, north, 0.0)
+
+    def push(self, forward: float, left: float, up: float) -> None:
+        """Inject or clear a fault: a force from outside accelerates a multirotor along its axes [m/s^2]."""
+        self._world.set_input(self._body, U_PUSH, forward, left, up)
 
     def short_cells(self, cells: int) -> None:
         """Inject or clear a fault: *cells* of the battery give no voltage; at least one always does."""
