@@ -16,9 +16,9 @@ from statistics import median
 from time import process_time
 from typing import Any
 
+from volery.base.elementary import exp
 from volery.base.frames import LocalFrame
 from volery.base.numeric_code import NumericCode, numeric
-from volery.simulation.world.arithmetic import exponential
 from volery.simulation.world.body_specs import Multirotor
 from volery.simulation.world.dynamics import electrical_power, multirotor_slope, turn_rotors, volts_amps
 from volery.simulation.world.sensors import declared_sigma
@@ -132,7 +132,7 @@ def start() -> Array:
 def flown(method: Callable[..., Any], rate: int) -> tuple[Array, float]:
     """Return the row after the flight, and the processor time of the loop [s]."""
     row = start()
-    row[P_ROTOR_DECAY] = exponential(-0.5 / rate / SPEC.rotor_lag)
+    row[P_ROTOR_DECAY] = exp(-0.5 / rate / SPEC.rotor_lag)
     began = process_time()
     method(row, 1.0 / rate, round(SECONDS * rate))
     return row, process_time() - began

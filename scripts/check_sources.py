@@ -1,4 +1,4 @@
-"""Check import circles, upward includes, names, words, the mirror of tests, and what cannot be compiled.
+"""Check circles, upward includes, names, words, the tests' folders, what is compiled, and mathematics.
 
     python scripts/check_sources.py
 
@@ -218,6 +218,42 @@ def compiled_modules() -> Iterator[str]:
             yield f"src/volery/{name}:{line}: mypyc: {reason}"
 
 
+C_LIBRARY = re.compile(r"a?(sin|cos|tan)h?|atan2|cbrt|pow|exp\w*|log\w*")
+"""Functions of ``math`` whose last bit depends on the processor."""
+UNTRACED = (
+    *(f"src/volery/{name}/" for name in ("analysis", "calibration", "report", "testing")),
+    "src/volery/base/units.py",  # exact fractions
+    "src/volery/control/digital_twin.py",  # these two judge recordings
+    "src/volery/control/tuning.py",
+    "src/volery/cost/native/",  # measures this machine
+)
+"""Files whose results are not part of a trace."""
+
+
+def depends_on_processor(source: str) -> Iterator[tuple[int, str]]:
+    """Yield line and name of what the C library computes otherwise on another processor."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom) and node.module == "math":
+            yield from ((node.lineno, one.name) for one in node.names if C_LIBRARY.fullmatch(one.name))
+        elif isinstance(node, ast.Attribute) and ast.unparse(node.value) == "math":
+            if C_LIBRARY.fullmatch(node.attr):
+                yield node.lineno, node.attr
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+            whole = isinstance(node.left, ast.Constant) and isinstance(node.left.value, int)
+            if not whole:
+                yield node.lineno, "**"
+
+
+def processor_independence() -> Iterator[str]:
+    """Yield mathematics by the C library in modules whose results are part of a trace."""
+    for path in tracked("src/volery"):
+        name = str(path.relative_to(ROOT))
+        if path.suffix == ".py" and not name.startswith(UNTRACED):
+            for line, function in depends_on_processor(path.read_text(encoding="utf-8")):
+                remedy = "write a product" if function == "**" else f"take {function} of base.elementary"
+                yield f"{name}:{line}: {function} depends on the processor; {remedy}"
+
+
 def main() -> int:
     """Print all offenders; return 1 if there are any."""
     offenders = [line for check in CHECKS for line in check()]
@@ -225,7 +261,7 @@ def main() -> int:
     return 1 if offenders else 0
 
 
-CHECKS = (circles, upward_includes, file_names, words, mirror, compiled_modules)
+CHECKS = (circles, upward_includes, file_names, words, mirror, compiled_modules, processor_independence)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -14,7 +14,9 @@ costs up to about 1 m of height and, N / 6371 km, 0.16 m of distance where the g
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import atan2, cos, degrees, hypot, pi, radians, remainder, sin, sqrt
+from math import degrees, hypot, pi, radians, remainder, sqrt
+
+from volery.base.elementary import atan2, cos, sine_cosine
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -94,9 +96,9 @@ attitude_enu_to_ned = attitude_ned_to_enu
 
 def euler_to_quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Convert intrinsic yaw, pitch, roll (z, y', x'') in radians to a quaternion."""
-    cr, sr = cos(roll / 2), sin(roll / 2)
-    cp, sp = cos(pitch / 2), sin(pitch / 2)
-    cy, sy = cos(yaw / 2), sin(yaw / 2)
+    sr, cr = sine_cosine(roll / 2)
+    sp, cp = sine_cosine(pitch / 2)
+    sy, cy = sine_cosine(yaw / 2)
     return (
         cr * cp * cy + sr * sp * sy,
         sr * cp * cy - cr * sp * sy,
@@ -122,12 +124,13 @@ def quaternion_to_euler(q: Quaternion) -> Vector:
 
 def geodetic_to_ecef(latitude: float, longitude: float, height: float) -> Vector:
     """Convert WGS-84 degrees and metres to earth-centred, earth-fixed metres."""
-    sin_lat, cos_lat = sin(radians(latitude)), cos(radians(latitude))
+    sin_lat, cos_lat = sine_cosine(radians(latitude))
+    sin_lon, cos_lon = sine_cosine(radians(longitude))
     normal = EQUATOR_M / sqrt(1.0 - _E2 * sin_lat * sin_lat)
     across = (normal + height) * cos_lat
     return (
-        across * cos(radians(longitude)),
-        across * sin(radians(longitude)),
+        across * cos_lon,
+        across * sin_lon,
         (normal * (1.0 - _E2) + height) * sin_lat,
     )
 
@@ -139,19 +142,23 @@ def ecef_to_geodetic(ecef: Vector) -> Vector:
     above the ellipsoid.
     """
     x, y, z = ecef
-    across = hypot(x, y)
     polar = EQUATOR_M * (1.0 - FLATTENING)
-    reduced = atan2(EQUATOR_M * z, polar * across)
-    latitude = reduced
-    for _ in range(3):
-        latitude = atan2(
-            z + _E2 / (1.0 - _E2) * polar * sin(reduced) ** 3, across - _E2 * EQUATOR_M * cos(reduced) ** 3
-        )
-        reduced = atan2((1.0 - FLATTENING) * sin(latitude), cos(latitude))
-    sin_lat = sin(latitude)
-    curvature = sqrt(1.0 - _E2 * sin_lat * sin_lat)
-    height = across * cos(latitude) + z * sin_lat - EQUATOR_M * curvature
-    return degrees(latitude), degrees(atan2(y, x)), height
+    from_axis = sqrt(x * x + y * y)
+    up, across = z, from_axis
+    sine, cosine = _unit(EQUATOR_M * up, polar * across)  # of the reduced latitude
+    for _ in range(2):
+        up = z + _E2 / (1.0 - _E2) * polar * sine * sine * sine  # (across, up) has the slope of the latitude
+        across = from_axis - _E2 * EQUATOR_M * cosine * cosine * cosine
+        sine, cosine = _unit((1.0 - FLATTENING) * up, across)
+    sine, cosine = _unit(up, across)
+    height = from_axis * cosine + z * sine - EQUATOR_M * sqrt(1.0 - _E2 * sine * sine)
+    return degrees(atan2(up, across)), degrees(atan2(y, x)), height
+
+
+def _unit(sine: float, cosine: float) -> tuple[float, float]:
+    """Return sine and cosine of the direction of a vector; zeros of none."""
+    length = sqrt(sine * sine + cosine * cosine) or 1.0
+    return sine / length, cosine / length
 
 
 @dataclass(frozen=True)
@@ -173,11 +180,12 @@ class LocalFrame:
     def __post_init__(self) -> None:
         for name in ("latitude", "longitude", "amsl"):  # compiled, a float is one; plain, it may be an int
             object.__setattr__(self, name, float(getattr(self, name)))
-        lat, lon = radians(self.latitude), radians(self.longitude)
+        sin_lat, cos_lat = sine_cosine(radians(self.latitude))
+        sin_lon, cos_lon = sine_cosine(radians(self.longitude))
         axes = (
-            (-sin(lon), cos(lon), 0.0),
-            (-sin(lat) * cos(lon), -sin(lat) * sin(lon), cos(lat)),
-            (cos(lat) * cos(lon), cos(lat) * sin(lon), sin(lat)),
+            (-sin_lon, cos_lon, 0.0),
+            (-sin_lat * cos_lon, -sin_lat * sin_lon, cos_lat),
+            (cos_lat * cos_lon, cos_lat * sin_lon, sin_lat),
         )
         object.__setattr__(self, "_origin", geodetic_to_ecef(self.latitude, self.longitude, self.amsl))
         object.__setattr__(self, "_axes", axes)

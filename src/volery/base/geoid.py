@@ -80,9 +80,9 @@ class Egm96Grid:
 def _weights(f: float) -> tuple[float, float, float, float]:
     """Return the weights of four neighbours for a point at *f* (0..1) between the middle two."""
     return (
-        -0.5 * f * (1.0 - f) ** 2,
-        1.0 - 2.5 * f * f + 1.5 * f**3,
-        0.5 * f + 2.0 * f * f - 1.5 * f**3,
+        -0.5 * f * (1.0 - f) * (1.0 - f),
+        1.0 - 2.5 * f * f + 1.5 * f * f * f,
+        0.5 * f + 2.0 * f * f - 1.5 * f * f * f,
         0.5 * f * f * (f - 1.0),
     )
 

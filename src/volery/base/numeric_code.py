@@ -13,9 +13,11 @@ import ctypes
 import hashlib
 import platform
 import struct
+import sys
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
+from runpy import run_path
 from types import FunctionType
 from typing import Any, TypeVar, cast
 
@@ -26,14 +28,33 @@ from volery.base.errors import UsageError
 OBJECT_CODE = Path(__file__).parent / "object_code"
 """Folder of the object code of a wheel. In a checkout it is empty until the script has been run."""
 
+ELEMENTARY = Path(__file__).with_name("elementary.py")
+"""Functions that any entry point may call."""
+
 F = TypeVar("F", bound=Callable[..., Any])
-_numeric: set[Callable[..., Any]] = set()
+_numeric: set[tuple[str, str]] = set()
+"""Module and name of each numeric function."""
 
 
 def numeric(function: F) -> F:
     """Mark a function that machine code may call. It may use numbers, arrays and numeric functions only."""
-    _numeric.add(function)
+    _numeric.add((function.__module__, function.__name__))
     return function
+
+
+@cache
+def _source_of(module: str) -> dict[str, Any]:
+    """Return the names of a module that mypyc has compiled, from its source."""
+    library = Path(sys.modules[module].__file__ or "")
+    return run_path(str(library.with_name(module.rpartition(".")[2] + ".py")), run_name=module)
+
+
+def _as_python(value: Any) -> FunctionType | None:
+    """Return a numeric function in Python, also where a compiled one was imported; None for other values."""
+    name = (getattr(value, "__module__", ""), getattr(value, "__name__", ""))
+    if not callable(value) or name not in _numeric:
+        return None
+    return value if isinstance(value, FunctionType) else _source_of(name[0])[name[1]]
 
 
 def digest_of(files: Iterable[Path]) -> str:
@@ -52,7 +73,7 @@ class NumericCode:
         compose: Returns the Python function, given the digest of its sources. The function must use the
             digest as a free variable, because numba's cache sees only the source file of the function itself.
             It returns 1, or 0 where a result is not a finite number: a division by zero gives an infinity.
-        sources: Source files of everything that is compiled, constants included.
+        sources: Source files of what is compiled, constants included; those of ``base`` need not be named.
         arguments: Types of the arguments, in numba's notation, such as ``float64[:,::1]`` and ``int64``.
     """
 
@@ -65,7 +86,7 @@ class NumericCode:
     ) -> None:
         self.name = name
         self.arguments = tuple(arguments)
-        self._digest = digest_of([Path(__file__), *sources])
+        self._digest = digest_of([Path(__file__), ELEMENTARY, *sources])
         self._function = compose(self._digest)
 
     @property
@@ -123,8 +144,8 @@ def _linked(function: Callable[..., Any], known: dict[Any, Any], njit: Callable[
     source = cast("FunctionType", function)
     scope = dict(source.__globals__)
     for name in source.__code__.co_names:
-        value = scope.get(name)
-        if isinstance(value, FunctionType) and value in _numeric:
+        value = _as_python(scope.get(name))
+        if value is not None:
             if value not in known:
                 known[value] = njit(_linked(value, known, njit), error_model="numpy")
             scope[name] = known[value]

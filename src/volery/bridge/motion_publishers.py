@@ -25,10 +25,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from math import cos, isnan, radians, sin, sqrt
+from math import isnan, radians, sqrt
 from typing import Any, NamedTuple
 
 from volery.base import frames
+from volery.base.elementary import cos, sin
 from volery.base.time import Ns
 from volery.bridge.autopilot_link import AutopilotLink
 from volery.bridge.node_interface import (
@@ -245,7 +246,8 @@ class PosePublisher:
         message.status.service = 1
         horizontal, vertical = raw.get("eph", _UNKNOWN_U16), raw.get("epv", _UNKNOWN_U16)
         if _UNKNOWN_U16 not in (horizontal, vertical):
-            h2, v2 = (horizontal / 100.0) ** 2, (vertical / 100.0) ** 2
+            h, v = horizontal / 100.0, vertical / 100.0
+            h2, v2 = h * h, v * v
             message.position_covariance = [h2, 0.0, 0.0, 0.0, h2, 0.0, 0.0, 0.0, v2]
             message.position_covariance_type = 1
         return message

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import asinh, atan, copysign, cos, degrees, isnan, radians, sin, sinh, sqrt
+from math import copysign, degrees, isnan, radians, sqrt
 from typing import NamedTuple, Protocol
 
+from volery.base.elementary import atan, cos, exp, log, sin
 from volery.base.errors import UsageError
 from volery.control.laws import PidGains, PidLaw
 from volery.control.link_failsafes import BY_STICKS
@@ -115,7 +116,9 @@ def straighten(share: float, expo: float) -> float:
     if expo == 0.0:
         return share
     p = (1.0 - expo) / expo
-    return 2.0 * sqrt(p / 3.0) * sinh(asinh(1.5 * share / (expo * p) * sqrt(3.0 / p)) / 3.0)
+    middle = 1.5 * share / (expo * p) * sqrt(3.0 / p)
+    third = log(middle + sqrt(middle * middle + 1.0)) / 3.0  # of the area hyperbolic sine
+    return sqrt(p / 3.0) * (exp(third) - exp(-third))
 
 
 @dataclass(frozen=True)

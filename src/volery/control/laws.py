@@ -201,7 +201,7 @@ def _joint(gains: PidGains) -> Value:
     """Return the error from which the stated deceleration bounds the output: ``deceleration / kp^2``."""
     if np.all(np.isinf(gains.deceleration)) or not np.any(gains.kp):
         return np.inf
-    return gains.deceleration / np.maximum(gains.kp, 1e-12) ** 2
+    return gains.deceleration / np.square(np.maximum(gains.kp, 1e-12))
 
 
 def _proportional(gains: PidGains, error: Value) -> Value:

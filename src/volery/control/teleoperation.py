@@ -16,10 +16,11 @@ import tty
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from math import cos, radians, sin
+from math import radians
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from volery.base.elementary import cos, sin
 from volery.base.errors import UsageError, VehicleError
 from volery.base.time import MS, Ns, from_seconds, to_seconds
 from volery.control.actuation import Actuation, Command, Measured

@@ -60,7 +60,7 @@ class TurnPrediction:
         model = self._model
         if model is None:
             return
-        most, square = model.acceleration * STEP_S, model.frequency**2
+        most, square = model.acceleration * STEP_S, model.frequency * model.frequency
         for _ in range(max(1, round(sample_s / STEP_S))):
             self._rate += min(most, max(-most, rate - self._rate))
             self._commands.append(rate)

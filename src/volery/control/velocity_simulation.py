@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import atan2, cos, hypot, isfinite, sin
+from math import hypot, isfinite
 
+from volery.base.elementary import atan2, cos, sin
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns, to_seconds
 from volery.control.laws import PID_START, PidGains, PidState, per_sample, pid

@@ -19,11 +19,11 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from functools import cache
 from importlib.resources import files
-from math import exp, log
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from volery.base.elementary import exp, log
 from volery.cost.figures import WithProvenance
 from volery.cost.library_sizes import FEATURES, SIZES, call_feature, call_size, new_pages
 from volery.cost.python_operations import STEPS_PER_NS

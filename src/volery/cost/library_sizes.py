@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from functools import cache
+from math import sqrt
 from typing import Any
 
 Values = tuple[Any, ...]
@@ -70,6 +71,12 @@ def _squares(arguments: Values, result: Any) -> float:
     return float(_elements(arguments[0]) * (columns[0] if columns else 1)) if arguments else 1.0
 
 
+def _cube(arguments: Values, result: Any) -> float:
+    """Return the work of a product of square matrices: the elements of one to the power 3/2."""
+    elements = max(map(_elements, arguments), default=1)
+    return elements * sqrt(elements)
+
+
 def _texts(values: Values) -> list[str | bytes | bytearray]:
     return [one for one in values if isinstance(one, (str, bytes, bytearray))]
 
@@ -87,7 +94,7 @@ SIZES: Mapping[str, Callable[[Values, Any], float]] = {
     "elements": lambda arguments, result: max(map(_words, (*arguments, result))),
     "items": lambda arguments, result: max(map(_elements, (*arguments, result))),
     "products": _products,
-    "cube": lambda arguments, result: max(map(_elements, arguments), default=1) ** 1.5,
+    "cube": _cube,
     "squares": _squares,
     "text": _text,
     "fields": _fields,

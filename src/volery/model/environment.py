@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from itertools import pairwise
-from math import cos, hypot, inf, pi, sin
+from math import hypot, inf, pi
 from typing import Annotated, Any
 
+from volery.base.elementary import cos, sin
 from volery.base.errors import Location
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position

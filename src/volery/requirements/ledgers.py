@@ -206,7 +206,8 @@ class VehicleLedger:
     def _between(self, before: VehicleState, after: VehicleState) -> None:
         elapsed = after.at - before.at
         (x0, y0, z0), (x1, y1, z1) = before.where(), after.where()
-        moved = sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2 + (z1 - z0) ** 2)
+        x, y, z = x1 - x0, y1 - y0, z1 - z0
+        moved = sqrt(x * x + y * y + z * z)
         if not isnan(moved):
             self.distance += moved
         if before.armed:

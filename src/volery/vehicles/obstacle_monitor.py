@@ -6,8 +6,9 @@ not plan a way round: the vehicle stops, and the program decides.
 
 from __future__ import annotations
 
-from math import atan2, degrees, isfinite
+from math import degrees, isfinite
 
+from volery.base.elementary import atan2
 from volery.base.errors import ObstacleNear
 from volery.base.time import Ns, S, to_seconds
 from volery.vehicles.telemetry import Obstacle, Telemetry

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from math import cos, degrees, isfinite, radians, sin
+from math import degrees, isfinite, radians
 from typing import Any, ClassVar, NamedTuple
 
+from volery.base.elementary import cos, sin
 from volery.base.errors import CapabilityError, Refused, UsageError, choices
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.bridge.autopilot_link import DJI_ID, PAPARAZZI_ID, AutopilotType, mode_name

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import cos, radians, sin
+from math import radians
 from typing import Any, Protocol
 
+from volery.base.elementary import cos, sin
 from volery.base.errors import CapabilityError, ModelError
 from volery.base.time import Ns
 from volery.kernel.api import Handle, Kernel

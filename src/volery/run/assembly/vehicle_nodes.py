@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING
 
 from mypy_extensions import mypyc_attr
 
+from volery.base.elementary import exp, log
 from volery.base.errors import CapabilityError
 from volery.base.frames import LocalFrame
 from volery.base.seeds import stream
@@ -101,7 +102,7 @@ class GraphWire:
         faults, random = self._faults, self._random
         chances = [faults.drop, faults.burst, faults.truncate]
         if faults.flip:
-            chances.append(1.0 - (1.0 - faults.flip) ** octets)
+            chances.append(1.0 - exp(octets * log(1.0 - faults.flip)))
         drawn = [random.random() < chance for chance in chances if chance]
         return any(drawn) or faults.cut_at(self._kernel.now())
 

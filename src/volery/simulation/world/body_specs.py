@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import pi, radians, sqrt
 
+from volery.base.elementary import exp, sine_cosine
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
-from volery.simulation.world.arithmetic import exponential, sine_cosine
 from volery.simulation.world.dynamics import CELL_FULL_VOLTS, battery_current
 from volery.simulation.world.environment_models import GUST_EVERY, Terrain, Wind, magnetic_field
 from volery.simulation.world.sensors import fill_sensor_parameters, sensor_suite
@@ -208,7 +208,7 @@ class Multirotor:
     @property
     def torque_coefficient(self) -> float:
         """k_Q = k_T^1.5 / (FM sqrt(2 rho A)) [N m s^2]: see ``dynamics``."""
-        disc = pi * self.propeller_diameter**2 / 4.0
+        disc = pi * self.propeller_diameter * self.propeller_diameter / 4.0
         induced = sqrt(2.0 * AIR_DENSITY * disc)
         coefficient: float = (
             self.thrust_coefficient * sqrt(self.thrust_coefficient) / (self.figure_of_merit * induced)
@@ -223,7 +223,8 @@ class Multirotor:
     @property
     def hover_power(self) -> float:
         """Electrical power in hover, without payload [W]."""
-        return 4.0 * self.torque_coefficient * self.hover_speed**3 / self.efficiency + self.idle_power
+        speed = self.hover_speed
+        return 4.0 * self.torque_coefficient * speed * speed * speed / self.efficiency + self.idle_power
 
     @property
     def hover_current(self) -> float:
@@ -290,7 +291,7 @@ BodySpec = Multirotor | Rover
 
 def _decay_in_half_a_step(lag: float) -> float:
     """Return the factor on a distance from its target over half a step, of a quantity with a lag [s]."""
-    return exponential(-0.5 * STEP_S / lag)
+    return exp(-0.5 * STEP_S / lag)
 
 
 def _fill_multirotor(row: Array, spec: Multirotor) -> None:
@@ -344,7 +345,7 @@ def fill_parameters(row: Array, spec: BodySpec, frame: LocalFrame, wind: Wind) -
     row[P_RESISTANCE] = spec.battery.resistance_ohm
     row[P_FULL_VOLTS] = 0.0
     row[P_IDLE_POWER] = spec.idle_power
-    decay = exponential(-GUST_EVERY * STEP_S / wind.gust_time)
+    decay = exp(-GUST_EVERY * STEP_S / wind.gust_time)
     row[P_GUST_DECAY], row[P_GUST_GAIN] = decay, sqrt(1.0 - decay * decay)
     row[P_GRAVITY] = STANDARD_GRAVITY
     row[P_MAGNETIC_FIELD : P_MAGNETIC_FIELD + 3] = magnetic_field(frame)

@@ -39,8 +39,8 @@ from __future__ import annotations
 
 from math import sqrt
 
+from volery.base.elementary import sine_cosine
 from volery.base.numeric_code import numeric
-from volery.simulation.world.arithmetic import sine_cosine
 from volery.simulation.world.state_layout import (
     P_CAPACITY,
     P_CELLS,

@@ -22,10 +22,11 @@ from math import radians, sqrt
 
 import numpy as np
 
+from volery.base.elementary import exp, log, sine_cosine
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.base.numeric_code import numeric
-from volery.simulation.world.arithmetic import exponential, gaussian, logarithm, sine_cosine
+from volery.simulation.world.arithmetic import gaussian
 from volery.simulation.world.state_layout import P_GUST_DECAY, P_GUST_GAIN, S_GUST, U_GUST, Array
 
 # --- atmosphere ---
@@ -40,13 +41,13 @@ _EXPONENT = 5.255877  # g M / (R L)
 def pressure_at(amsl: float) -> float:
     """Return the pressure [Pa] at a height above mean sea level [m]: p0 (1 - L h / T0)^(g M / R L)."""
     warmth = 1.0 - _LAPSE * amsl / _SEA_LEVEL_K
-    return _SEA_LEVEL_PA * exponential(_EXPONENT * logarithm(warmth))
+    return _SEA_LEVEL_PA * exp(_EXPONENT * log(warmth))
 
 
 @numeric
 def altitude_at(pressure: float) -> float:
     """Return the height above mean sea level [m] at a pressure [Pa]: the inverse of ``pressure_at``."""
-    return _SEA_LEVEL_K / _LAPSE * (1.0 - exponential(logarithm(pressure / _SEA_LEVEL_PA) / _EXPONENT))
+    return _SEA_LEVEL_K / _LAPSE * (1.0 - exp(log(pressure / _SEA_LEVEL_PA) / _EXPONENT))
 
 
 # --- magnetic field ---
@@ -88,8 +89,8 @@ def _legendre(s: float, c: float) -> dict[tuple[int, int], tuple[float, float]]:
         for m in range(n):
             value, slope = table[n - 1, m]
             older, older_slope = table.get((n - 2, m), (0.0, 0.0))
-            weight = sqrt(max((n - 1) ** 2 - m**2, 0))
-            norm = sqrt(n**2 - m**2)
+            weight = sqrt(max((n - 1) * (n - 1) - m * m, 0))
+            norm = sqrt(n * n - m * m)
             table[n, m] = (
                 ((2 * n - 1) * c * value - weight * older) / norm,
                 ((2 * n - 1) * (c * slope - s * value) - weight * older_slope) / norm,

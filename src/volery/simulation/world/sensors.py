@@ -20,13 +20,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from volery.base.elementary import exp
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.frames import Quaternion, Vector
 from volery.base.installed import Registry
 from volery.base.numeric_code import numeric
 from volery.base.seeds import key
 from volery.base.time import Ns
-from volery.simulation.world.arithmetic import exponential, gaussian
+from volery.simulation.world.arithmetic import gaussian
 from volery.simulation.world.state_layout import (
     BIAS_DECAY,
     BIAS_GAIN,
@@ -114,7 +115,7 @@ class ErrorModel:
 
     def decay(self, period: float) -> float:
         """Return the factor on the bias over *period* [s]."""
-        return float(exponential(-period / self.correlation_time))
+        return float(exp(-period / self.correlation_time))
 
 
 @dataclass(frozen=True)

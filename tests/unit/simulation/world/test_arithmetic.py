@@ -4,14 +4,7 @@ import random
 import numpy as np
 import pytest
 
-from volery.simulation.world.arithmetic import (
-    arc_tangent2,
-    exponential,
-    gaussian,
-    logarithm,
-    sine_cosine,
-    wrap_angle,
-)
+from volery.simulation.world.arithmetic import gaussian, wrap_angle
 from volery.simulation.world.environment_models import altitude_at, pressure_at
 
 DRAW = random.Random(20)
@@ -21,28 +14,6 @@ DRAW = random.Random(20)
 def _hashes_wrap_around():
     with np.errstate(over="ignore"):
         yield
-
-
-def test_sine_and_cosine_agree_with_the_library_within_two_units_in_the_last_place():
-    for angle in [0.0, math.pi / 4, -math.pi / 4, math.pi, *(DRAW.uniform(-1e3, 1e3) for _ in range(2000))]:
-        sine, cosine = sine_cosine(angle)
-        assert sine == pytest.approx(math.sin(angle), abs=3e-13 if abs(angle) > 100 else 4e-16)
-        assert cosine == pytest.approx(math.cos(angle), abs=3e-13 if abs(angle) > 100 else 4e-16)
-
-
-def test_arc_tangent_covers_every_quadrant_and_the_axes():
-    for _ in range(2000):
-        y, x = DRAW.uniform(-5, 5), DRAW.uniform(-5, 5)
-        assert arc_tangent2(y, x) == pytest.approx(math.atan2(y, x), abs=1e-15)
-    for y, x in ((0.0, 1.0), (1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (0.0, 0.0)):
-        assert arc_tangent2(y, x) == pytest.approx(math.atan2(y, x), abs=1e-15)
-
-
-def test_exponential_and_logarithm_are_inverse_and_agree_with_the_library():
-    for _ in range(2000):
-        x = DRAW.uniform(-50, 50)
-        assert exponential(x) == pytest.approx(math.exp(x), rel=5e-16)
-        assert logarithm(exponential(x)) == pytest.approx(x, abs=1e-13)
 
 
 def test_angles_wrap_into_one_turn():

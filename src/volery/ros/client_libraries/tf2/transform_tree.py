@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from bisect import bisect_left, insort
 from collections.abc import Iterator
-from math import acos, sin, sqrt
+from math import sqrt
 from typing import Any, NamedTuple
 
+from volery.base.elementary import acos, sin
 from volery.base.frames import Quaternion, Vector, multiply
 from volery.base.time import Ns, S, to_seconds
 

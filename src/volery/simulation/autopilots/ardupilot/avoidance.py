@@ -11,9 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from math import atan2, cos, hypot, inf, pi, radians, sin, sqrt
+from math import hypot, inf, pi, radians, sqrt
 from typing import NamedTuple
 
+from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector
 from volery.base.time import MS, to_seconds
 from volery.simulation.autopilots.ardupilot.fence import CEILING, CIRCLE, POLYGON
@@ -89,7 +90,7 @@ class _Retreat:
 def _towards_edge(place: Level, start: Level, end: Level) -> Level:
     """Return the vector to the point of an edge that is closest to *place*."""
     along = (end[0] - start[0], end[1] - start[1])
-    length = along[0] ** 2 + along[1] ** 2
+    length = along[0] * along[0] + along[1] * along[1]
     share = 0.0
     if length > 0.0:
         share = ((place[0] - start[0]) * along[0] + (place[1] - start[1]) * along[1]) / length
@@ -172,7 +173,7 @@ def _to_circle(offset: Level, velocity: Level, radius: float) -> float:
     """Return the distance from a place along a velocity to a circle about the origin; infinite if none."""
     speed = hypot(*velocity)
     along = (offset[0] * velocity[0] + offset[1] * velocity[1]) / speed
-    root = along * along - offset[0] ** 2 - offset[1] ** 2 + radius * radius
+    root = along * along - offset[0] * offset[0] - offset[1] * offset[1] + radius * radius
     if root < 0.0:
         return inf
     near, far = -along - sqrt(root), -along + sqrt(root)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from functools import cache, partial
-from math import acos, cos, degrees, hypot, radians, sin
+from math import degrees, hypot, radians
 from typing import Any
 
+from volery.base.elementary import acos, cos, sin
 from volery.base.frames import Vector
 from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot import (

@@ -7,9 +7,10 @@ pymavlink, MAVExplorer and the log review of ground stations read by name.
 from __future__ import annotations
 
 import struct
-from math import atan2, degrees, hypot
+from math import degrees, hypot
 from typing import NamedTuple
 
+from volery.base.elementary import atan2
 from volery.base.time import S
 from volery.simulation.autopilots.mavlink.messages import EPOCH_US
 from volery.simulation.autopilots.onboard_log import FlightLog, LogSample

@@ -7,9 +7,10 @@ other vehicle plus a share of the distance, limited so that the copter can stop.
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, radians, sin
+from math import hypot, radians
 from typing import Any
 
+from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector, quaternion_to_euler
 from volery.base.time import Ns, S, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint

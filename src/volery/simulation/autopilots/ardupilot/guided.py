@@ -6,9 +6,10 @@ item NAV_GUIDED_ENABLE the messages are ignored.
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, isfinite, sin
+from math import hypot, isfinite
 from typing import Any, NamedTuple
 
+from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector
 from volery.simulation.autopilots.ardupilot.commands import FARTHEST_POINT
 from volery.simulation.autopilots.ardupilot.fence import fence_admits

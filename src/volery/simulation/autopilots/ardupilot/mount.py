@@ -7,8 +7,9 @@ vehicle. MNT1_TYPE counts from the next boot on.
 
 from __future__ import annotations
 
-from math import atan2, cos, degrees, hypot, nan, pi, radians, sin, tan
+from math import degrees, hypot, nan, pi, radians
 
+from volery.base.elementary import atan2, cos, sin, tan
 from volery.base.frames import Vector, euler_to_quaternion, wrap
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.ardupilot.failsafes import radio_lost

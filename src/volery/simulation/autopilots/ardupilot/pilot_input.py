@@ -8,9 +8,10 @@ three for a rover.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, dist, radians, sin
+from math import dist, radians
 from typing import Any
 
+from volery.base.elementary import cos, sin
 from volery.base.time import MS, Ns, from_seconds
 from volery.simulation.autopilots.ardupilot.failsafes import radio_lost
 from volery.simulation.autopilots.ardupilot.modes import arm, change_mode, disarm

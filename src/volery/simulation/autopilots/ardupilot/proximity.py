@@ -8,9 +8,10 @@ the next boot on.
 
 from __future__ import annotations
 
-from math import atan2, cos, degrees, hypot, inf, pi, radians, sin
+from math import degrees, hypot, inf, pi, radians
 from typing import Any
 
+from volery.base.elementary import atan2, cos, sin
 from volery.base.time import MS, S, to_seconds
 from volery.simulation.autopilots.ardupilot.fence_shapes import Level, shapes
 from volery.simulation.autopilots.ardupilot.modes import Check

@@ -5,9 +5,10 @@ A builder returns None while the firmware does not send its message.
 
 from __future__ import annotations
 
-from math import atan2, degrees, hypot, nan, pi
+from math import degrees, hypot, nan, pi
 from typing import NamedTuple
 
+from volery.base.elementary import atan2
 from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
 from volery.base.time import US, S
 from volery.simulation.autopilots.ardupilot import proximity
@@ -547,7 +548,7 @@ def ekf_status(vehicle: Vehicle) -> Fields | None:
     return {
         "flags": WITH_POSITION if vehicle.has_position else WITHOUT_POSITION,
         "velocity_variance": 0.007,
-        "pos_horiz_variance": min(1.0, abs(estimate.gps_innovation) / 5.0) ** 2,
+        "pos_horiz_variance": min(1.0, estimate.gps_innovation * estimate.gps_innovation / 25.0),
         "pos_vert_variance": 0.002,
         "compass_variance": min(1.0, abs(estimate.heading_error)),
     }

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from math import copysign, degrees, hypot, radians
 
+from volery.base.elementary import exp, log
 from volery.base.time import Ns, S, to_seconds
 from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
 from volery.simulation.autopilots.state_groups import NEVER, VaneState
@@ -23,8 +24,8 @@ USE_PITCH = 1
 """Bit of WVANE_OPTIONS."""
 WAITS: Ns = 2 * S
 """Time for which the conditions must hold before it turns."""
-KEPT_IN_A_SECOND = 0.98**400
-"""Share of the rate that is left after a second: 0.98 at each of 400 steps in the original."""
+DECAY = 400 * log(0.98)
+"""Logarithm of the share of the rate that is left after a second: 0.98 at each of 400 steps, as there."""
 INFO = 6
 """MAV_SEVERITY."""
 
@@ -54,7 +55,7 @@ def turn_into_wind(vehicle: Vehicle, period: Ns) -> None:
         vane.turning, vane.before = True, vehicle.commanded.yaw
         vane.heading = vehicle.estimate.attitude[2]
         vehicle.send_text(INFO, f"Weathervane Active: {WORDS[side]}")
-    kept = KEPT_IN_A_SECOND ** to_seconds(period)
+    kept = exp(DECAY * to_seconds(period))
     vane.rate = kept * vane.rate + (1.0 - kept) * vehicle.parameters["WVANE_GAIN"] * _rate(vehicle, side)
     vane.heading = wrap_angle(vane.heading + radians(vane.rate) * to_seconds(period))
     vehicle.commanded.yaw = vane.heading

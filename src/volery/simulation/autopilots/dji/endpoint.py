@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from math import cos, degrees, isfinite, radians
+from math import degrees, isfinite, radians
 from typing import Any, NamedTuple
 
+from volery.base.elementary import cos
 from volery.base.errors import UsageError
 from volery.base.frames import attitude_ned_to_enu, frd_to_flu, ned_to_enu
 from volery.base.time import MS, Ns, S

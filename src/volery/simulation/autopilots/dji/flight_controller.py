@@ -264,7 +264,8 @@ class FlightController:
         if size == 0.0 or not vehicle.has_position:
             return False
         here, velocity = vehicle.estimate.position, vehicle.estimate.velocity
-        reach = (BORDER_M + hypot(velocity[0], velocity[1]) ** 2 / (2.0 * vehicle.tuning.accel)) / size
+        square = velocity[0] * velocity[0] + velocity[1] * velocity[1]
+        reach = (BORDER_M + square / (2.0 * vehicle.tuning.accel)) / size
         ahead = here[0] + reach * north, here[1] + reach * east
         middle, radius = self._no_fly_zone()
         closer = dist(ahead, middle) < dist(here[:2], middle)

@@ -7,9 +7,10 @@ east-north-up or forward-left-up, anticlockwise, radians. Heights count from the
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, hypot, isfinite, pi, sin
+from math import hypot, isfinite, pi
 from typing import TYPE_CHECKING, Any
 
+from volery.base.elementary import cos, sin
 from volery.base.frames import Vector
 from volery.ros.messages.dji_constants import HORIZONTAL, MISSION_SPEEDS, SETPOINT_HEIGHTS, VERTICAL, Flag
 from volery.simulation.autopilots.dji.parameters import SDK_CLIMB, SDK_SPEED, SDK_TILT

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from volery.base.elementary import atan2, sine_cosine
 from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_ACCEL,
@@ -68,7 +69,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     STEER,
 )
 from volery.simulation.autopilots.flight_stack.guidance import GUIDE_S, approach, ramp
-from volery.simulation.world.arithmetic import arc_tangent2, clip, sine_cosine, wrap_angle
+from volery.simulation.world.arithmetic import clip, wrap_angle
 from volery.simulation.world.state_layout import (
     P_MAX_SPEED,
     P_MAX_STEERING,
@@ -269,7 +270,7 @@ def _steer_for(row: Array, rate: float, speed: float) -> float:
     if row[P_SKID_STEERED] > 0.5:
         return clip(rate / row[P_MAX_TURN_RATE], -1.0, 1.0)
     pace = speed if abs(speed) > 0.3 else (0.3 if speed >= 0.0 else -0.3)
-    angle = arc_tangent2(rate * row[P_WHEELBASE] * (1.0 if pace > 0.0 else -1.0), abs(pace))
+    angle = atan2(rate * row[P_WHEELBASE] * (1.0 if pace > 0.0 else -1.0), abs(pace))
     return clip(angle / row[P_MAX_STEERING], -1.0, 1.0)
 
 
@@ -298,7 +299,7 @@ def _to_point(row: Array) -> tuple[float, float]:
         row[K_TARGET + axis] = row[C_POSITION + axis] + row[K_ORIGIN + axis]
     if distance < _CLOSE:
         return 0.0, 0.0
-    error = wrap_angle(arc_tangent2(east, north) - row[K_EULER + 2])
+    error = wrap_angle(atan2(east, north) - row[K_EULER + 2])
     _, ahead = sine_cosine(error)
     speed = min(approach(distance, _POINT_GAIN, _BRAKE_SHARE * row[C_ACCEL]), row[C_SPEED])
     return speed * clip(ahead, 0.2, 1.0), clip(_TURN_GAIN * error, -1.5, 1.5)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from volery.base.elementary import atan2
 from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_AIDED,
@@ -36,7 +37,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_VELOCITY,
     W_DCM,
 )
-from volery.simulation.world.arithmetic import arc_tangent2, wrap_angle
+from volery.simulation.world.arithmetic import wrap_angle
 from volery.simulation.world.dynamics import rotation_matrix, write_quaternion
 from volery.simulation.world.sensors import RTK_FIX
 from volery.simulation.world.state_layout import (
@@ -87,9 +88,9 @@ def estimate_angles(row: Array) -> None:
     """Compute roll, pitch and yaw of the estimated quaternion."""
     w, x, y, z = row[K_ATTITUDE], row[K_ATTITUDE + 1], row[K_ATTITUDE + 2], row[K_ATTITUDE + 3]
     sine = min(max(2.0 * (w * y - z * x), -1.0), 1.0)
-    row[K_EULER] = arc_tangent2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    row[K_EULER + 1] = arc_tangent2(sine, sqrt(1.0 - sine * sine))
-    row[K_EULER + 2] = arc_tangent2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    row[K_EULER] = atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    row[K_EULER + 1] = atan2(sine, sqrt(1.0 - sine * sine))
+    row[K_EULER + 2] = atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 @numeric
@@ -297,8 +298,8 @@ def _fuse_heading(row: Array) -> None:
     """Correct the heading by the difference of the measured field's direction and the declination."""
     mx, my, mz = row[M_MAG], row[M_MAG + 1], row[M_MAG + 2]
     north, east = _horizontal(row, mx, my, mz)
-    declination = arc_tangent2(row[P_MAGNETIC_FIELD + 1], row[P_MAGNETIC_FIELD])
-    error = wrap_angle(arc_tangent2(east, north) - declination)
+    declination = atan2(row[P_MAGNETIC_FIELD + 1], row[P_MAGNETIC_FIELD])
+    error = wrap_angle(atan2(east, north) - declination)
     row[K_HEADING_ERROR] = error
     _correct_attitude(row, 0.0, 0.0, -_HEADING_GAIN * _FUSE_S * error, _HEADING_INTEGRAL / _HEADING_GAIN)
 
@@ -334,13 +335,13 @@ def _fuse(row: Array) -> None:
 def _align(row: Array) -> None:
     """Initialise the attitude: tilt from the accelerometer, heading from the magnetometer."""
     fx, fy, fz = row[M_ACCEL], row[M_ACCEL + 1], row[M_ACCEL + 2]
-    roll = arc_tangent2(-fy, -fz)
-    pitch = arc_tangent2(fx, sqrt(fy * fy + fz * fz))
+    roll = atan2(-fy, -fz)
+    pitch = atan2(fx, sqrt(fy * fy + fz * fz))
     write_quaternion(row, K_ATTITUDE, roll, pitch, 0.0)
     rotation_matrix(row, K_ATTITUDE, W_DCM)
     mx, my, mz = row[M_MAG], row[M_MAG + 1], row[M_MAG + 2]
     north, east = _horizontal(row, mx, my, mz)
-    yaw = arc_tangent2(row[P_MAGNETIC_FIELD + 1], row[P_MAGNETIC_FIELD]) - arc_tangent2(east, north)
+    yaw = atan2(row[P_MAGNETIC_FIELD + 1], row[P_MAGNETIC_FIELD]) - atan2(east, north)
     write_quaternion(row, K_ATTITUDE, roll, pitch, yaw)
     row[K_ALIGNED] = 1.0
 

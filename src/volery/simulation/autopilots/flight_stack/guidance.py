@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from math import pi, sqrt
 
+from volery.base.elementary import atan2, sine_cosine
 from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
     ATTITUDE,
@@ -67,7 +68,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     VELOCITY,
     VELOCITY_HEIGHT,
 )
-from volery.simulation.world.arithmetic import arc_tangent2, clip, sine_cosine, wrap_angle
+from volery.simulation.world.arithmetic import clip, wrap_angle
 from volery.simulation.world.dynamics import write_quaternion
 from volery.simulation.world.state_layout import Array
 
@@ -410,9 +411,9 @@ def _tilt_thrust(row: Array, north: float, east: float, lift: float) -> None:
     row[K_TILT_LIMITED + 1] = wanted_e if limited else 0.0
     forward = north * cy + east * sy
     right = east * cy - north * sy
-    pitch = arc_tangent2(-forward, max(lift, 3.0))
+    pitch = atan2(-forward, max(lift, 3.0))
     _, cp = sine_cosine(pitch)
-    roll = arc_tangent2(right * cp, max(lift, 3.0))
+    roll = atan2(right * cp, max(lift, 3.0))
     _set_target_angles(row, clip(roll, -most, most), clip(pitch, -most, most))
 
 
@@ -420,7 +421,8 @@ def _tilt_thrust(row: Array, north: float, east: float, lift: float) -> None:
 def _learn_hover_throttle(row: Array) -> None:
     """Adapt the hover throttle while the vehicle hardly accelerates."""
     steady = row[K_LANDED] < 0.5 and row[K_SPOOL] >= 1.0 and abs(row[K_VELOCITY + 2]) < 0.6
-    level = row[K_ATTITUDE + 1] ** 2 + row[K_ATTITUDE + 2] ** 2 < 0.002
+    x, y = row[K_ATTITUDE + 1], row[K_ATTITUDE + 2]
+    level = x * x + y * y < 0.002
     if steady and level and abs(row[K_ACCEL + 2]) < 1.0:
         learnt = row[K_HOVER_THROTTLE] + GUIDE_S / _LEARN_TIME * (row[K_THROTTLE] - row[K_HOVER_THROTTLE])
         learnt = clip(learnt, 0.125, 0.6875)

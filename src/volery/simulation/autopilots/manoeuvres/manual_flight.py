@@ -7,8 +7,9 @@ back along the points that were passed.
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, radians, sin, tan
+from math import hypot, radians
 
+from volery.base.elementary import atan2, cos, sin, tan
 from volery.base.frames import Vector
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
@@ -80,7 +81,7 @@ class Stabilize(ManualFlight):
             0.5 * throttle / middle if throttle < middle else 0.5 + 0.5 * (throttle - middle) / (1.0 - middle)
         )
         bend = min(1.0, max(-0.5, -(hover - 0.5) / 0.375))
-        return min(1.0, max(0.0, centred * (1.0 - bend) + bend * centred**3))
+        return min(1.0, max(0.0, centred * (1.0 - bend) + bend * centred * centred * centred))
 
 
 class ClimbByThrottle(ManualFlight):

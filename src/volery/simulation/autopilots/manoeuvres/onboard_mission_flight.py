@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import atan2, cos, hypot, pi, sin, sqrt
+from math import hypot, pi, sqrt
 
+from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector
 from volery.base.time import Ns, from_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, pi, sqrt
+from math import hypot, pi, sqrt
 
+from volery.base.elementary import cos
 from volery.base.frames import Vector, wrap
 from volery.base.time import Ns, S, from_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from math import atan2, dist, hypot, sqrt
+from math import dist, hypot, sqrt
 
 from mypy_extensions import mypyc_attr
 
+from volery.base.elementary import atan2
 from volery.base.frames import Vector
 from volery.base.time import Ns
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
@@ -38,7 +39,7 @@ def root_speed(distance: float, accel: float, gain: float = 1.0) -> float:
         accel: Deceleration [m/s^2].
         gain: Gain near the end [1/s].
     """
-    bend = accel / gain**2
+    bend = accel / (gain * gain)
     if distance <= bend:
         return max(0.0, distance) * gain
     return sqrt(2.0 * accel * (distance - bend / 2.0))
@@ -47,7 +48,7 @@ def root_speed(distance: float, accel: float, gain: float = 1.0) -> float:
 def stopping_distance(speed: float, accel: float, gain: float = 1.0) -> float:
     """Return the distance [m] in which a vehicle stops: the inverse of ``root_speed``."""
     bend = accel / gain
-    return speed / gain if speed <= bend else speed**2 / (2.0 * accel) + bend / (2.0 * gain)
+    return speed / gain if speed <= bend else speed * speed / (2.0 * accel) + bend / (2.0 * gain)
 
 
 def stopping_point(position: Vector, velocity: Vector, accel: float, accel_z: float) -> Vector:

@@ -46,7 +46,7 @@ class ZigZag(Loiter):
         """Return the point of the line through a stored point nearest to *here*, at the target height."""
         (an, ae, _), (bn, be, _) = self._stored["A"], self._stored["B"]
         along = bn - an, be - ae
-        square = along[0] ** 2 + along[1] ** 2
+        square = along[0] * along[0] + along[1] * along[1]
         if square == 0.0:
             return None
         share = ((here[0] - through[0]) * along[0] + (here[1] - through[1]) * along[1]) / square

@@ -19,7 +19,7 @@ Fields = dict[str, Any]
 EPOCH_US = 1_767_225_600_000_000
 """Satellite time at the start of a run: 2026-01-01 00:00 UTC [us]."""
 
-LARGEST = 2.0**31
+LARGEST = float(2**31)
 FARTHEST = 2.1e7
 """Largest distance of a point that is accepted [m]."""
 

@@ -6,8 +6,9 @@ Set-points of GUIDED are a position or a velocity for each axis, and never expir
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, isfinite, sin
+from math import isfinite
 
+from volery.base.elementary import cos, sin
 from volery.base.frames import Vector, enu_to_ned, wrap
 from volery.base.time import MS, Ns, from_seconds, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint

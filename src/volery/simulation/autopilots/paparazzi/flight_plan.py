@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from math import atan2, cos, dist, hypot, pi, radians, sin
+from math import dist, hypot, pi, radians
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector, ned_to_enu, wrap
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.vehicle_state import Vehicle

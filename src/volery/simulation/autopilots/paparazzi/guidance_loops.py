@@ -16,9 +16,10 @@ The response is a position and a velocity that the flight stack follows.
 
 from __future__ import annotations
 
-from math import cos, hypot, isfinite, radians, sin
+from math import hypot, isfinite, radians
 from typing import NamedTuple
 
+from volery.base.elementary import cos, sin
 from volery.base.frames import Vector
 
 SUBSTEP = 1.0 / 64.0
@@ -48,7 +49,7 @@ LEAN_OMEGA, LEAN_ZETA = radians(450.0), 0.9
 """Reference of the attitude: natural frequency [rad/s] and damping (STABILIZATION_ATTITUDE_REF_*)."""
 LEAN_LAG = 0.05
 """Lag of the estimated lean behind its reference, fitted to the recorded legs [s]."""
-ESTIMATE_GAIN, ESTIMATE_BIAS_GAIN = 2.0 * 0.9 * 0.063, 0.063**2
+ESTIMATE_GAIN, ESTIMATE_BIAS_GAIN = 2.0 * 0.9 * 0.063, 0.063 * 0.063
 """Pull of the attitude estimate towards the measured acceleration [1/s], and of its rate bias [1/s^2]:
 AHRS_ACCEL_OMEGA 0.063 rad/s, AHRS_ACCEL_ZETA 0.9."""
 HEURISTIC, LEAST_WEIGHT = 3.0, 0.15
@@ -113,7 +114,9 @@ class AxisLean:
         grown = self._integral + INTEGRAL_GAIN * error * SUBSTEP
         self._integral = _bounded(grown, MOST_LEAN) if in_flight else 0.0
         command = _bounded(_bounded(error, MOST_LEAN) + self._integral, MOST_LEAN_IN_ALL)
-        push = LEAN_OMEGA**2 * (command - self._reference) - 2.0 * LEAN_ZETA * LEAN_OMEGA * self._rate
+        push = (
+            LEAN_OMEGA * LEAN_OMEGA * (command - self._reference) - 2.0 * LEAN_ZETA * LEAN_OMEGA * self._rate
+        )
         self._rate += push * SUBSTEP
         self._reference += self._rate * SUBSTEP
         self.estimate += (self._reference - self.estimate) * SUBSTEP / LEAN_LAG
@@ -125,7 +128,7 @@ class AxisLean:
         """Move the error of the estimate; *unfelt* is the lean that the accelerometer does not show [rad]."""
         weight = max(LEAST_WEIGHT, 1.0 - HEURISTIC * abs(1.0 - 1.0 / cos(self.angle)))
         self._estimate_off += (ESTIMATE_GAIN * weight * unfelt + self._bias) * SUBSTEP
-        self._bias += ESTIMATE_BIAS_GAIN * weight**2 * unfelt * SUBSTEP
+        self._bias += ESTIMATE_BIAS_GAIN * weight * weight * unfelt * SUBSTEP
 
 
 class PlaneLoop:
@@ -269,7 +272,10 @@ class HeightLoop:
         if by_climb:
             push = (goal - climb) / HEIGHT_TAU
         else:
-            push = HEIGHT_OMEGA**2 * (goal - self._reference) - 2.0 * HEIGHT_ZETA * HEIGHT_OMEGA * climb
+            push = (
+                HEIGHT_OMEGA * HEIGHT_OMEGA * (goal - self._reference)
+                - 2.0 * HEIGHT_ZETA * HEIGHT_OMEGA * climb
+            )
         push = min(MOST_PUSH_UP, max(-MOST_PUSH_DOWN, push))
         moved = min(up, max(-down, climb + push * SUBSTEP))
         self._reference_climb = moved

@@ -7,9 +7,10 @@ Periods are those of the default rotorcraft telemetry. Scales: positions 2^-8 m,
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, radians, sin
+from math import radians
 from typing import Any, NamedTuple
 
+from volery.base.elementary import cos, sin
 from volery.base.frames import Vector, enu_to_ned, euler_to_quaternion, geodetic_to_ecef, ned_to_enu
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.links.paparazzi_aircraft import stock_aircraft

@@ -9,9 +9,10 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping
 from functools import cache, partial
-from math import atan2, hypot, isfinite, radians
+from math import hypot, isfinite, radians
 from types import MappingProxyType
 
+from volery.base.elementary import atan2
 from volery.base.frames import Vector
 from volery.base.time import MS, S
 from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter, Parameters, Tuning, load

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from math import atan2, cos, dist, hypot, inf, pi, sin
+from math import dist, hypot, inf, pi
 
+from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
@@ -248,7 +249,7 @@ STICK_SPEED_SHARE = 0.78
 
 def bend(share: float) -> float:
     """Return a share of a stick's way, -1..1, on the expo curve."""
-    return EXPO * share**3 + (1.0 - EXPO) * share
+    return EXPO * share * share * share + (1.0 - EXPO) * share
 
 
 def apply_expo(stick: float, dead: float) -> float:

@@ -6,9 +6,10 @@ parameters; no recording shows them.
 
 from __future__ import annotations
 
-from math import atan2, cos, hypot, radians, sin
+from math import hypot, radians
 from typing import Any
 
+from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector, wrap
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.mavlink.messages import FARTHEST, all_within, finite

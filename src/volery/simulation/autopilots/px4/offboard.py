@@ -11,9 +11,10 @@ MPC_XY_VEL_MAX.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import cos, hypot, isfinite, nan, sin
+from math import hypot, isfinite, nan
 from typing import Any, NamedTuple
 
+from volery.base.elementary import cos, sin
 from volery.base.frames import Quaternion, Vector, quaternion_to_euler
 from volery.base.time import MS, Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint

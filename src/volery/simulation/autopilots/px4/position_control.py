@@ -10,9 +10,10 @@ unwind. The loops see what EKF2 would state of that airframe, and the flight sta
 
 from __future__ import annotations
 
-from math import dist, hypot, inf, isfinite, sqrt, tan
+from math import dist, hypot, inf, isfinite, sqrt
 from typing import Final, NamedTuple
 
+from volery.base.elementary import tan
 from volery.base.frames import Vector
 from volery.base.time import Ns, from_seconds, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint

@@ -5,8 +5,9 @@ A builder returns None while the firmware does not send its message.
 
 from __future__ import annotations
 
-from math import atan2, degrees, hypot, nan
+from math import degrees, hypot, nan
 
+from volery.base.elementary import atan2
 from volery.base.frames import euler_to_quaternion, quaternion_to_euler
 from volery.base.time import MS, US, Ns, S
 from volery.simulation.autopilots.mavlink import messages
@@ -84,7 +85,7 @@ def odometry(vehicle: Vehicle) -> Fields:
     p, q, r = estimate.rates
     x, y, z = estimate.position
     vx, vy, vz = estimate.velocity
-    plane, height, speed, climb = (spread**2 for spread in estimate.sigmas)
+    plane, height, speed, climb = (spread * spread for spread in estimate.sigmas)
     return {
         "time_usec": boot_us(vehicle),
         "frame_id": 1,
@@ -423,7 +424,7 @@ def estimator_status(vehicle: Vehicle) -> Fields:
         "time_usec": boot_us(vehicle),
         "flags": WITH_POSITION if vehicle.has_position else WITHOUT_POSITION,
         "vel_ratio": 0.06,
-        "pos_horiz_ratio": min(1.0, abs(estimate.gps_innovation) / 5.0) ** 2,
+        "pos_horiz_ratio": min(1.0, estimate.gps_innovation * estimate.gps_innovation / 25.0),
         "pos_vert_ratio": 0.035,
         "mag_ratio": min(1.0, abs(estimate.heading_error)),
         "pos_horiz_accuracy": plane,

@@ -166,7 +166,7 @@ class SetpointStream:
         if target.speed is None:
             return POSITION_YAW, (east, north, target.height, target.yaw)
         away, carrot = hypot(east, north), target.speed * CARROT_S
-        if away > target.speed**2 / (2.0 * BRAKES_M_S2) + carrot:
+        if away > target.speed * target.speed / (2.0 * BRAKES_M_S2) + carrot:
             return self._at_speed(target, (east, north), target.speed)
         share = min(1.0, carrot / away) if away > 0.0 else 1.0
         return POSITION_YAW, (east * share, north * share, target.height, target.yaw)

@@ -7,9 +7,10 @@ sends eight sectors as DISTANCE_SENSOR, PX4 72 as OBSTACLE_DISTANCE.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import cos, isfinite, radians, sin
+from math import isfinite, radians
 from typing import Any
 
+from volery.base.elementary import cos, sin
 from volery.base.frames import Vector
 from volery.links.mavlink_messages import constant
 from volery.vehicles.telemetry import Telemetry

@@ -1,0 +1,64 @@
+"""The same seed gives the same trace on processors with and without fused multiplication and wide vectors.
+
+The C library and numpy choose their code by the processor; environment variables limit the choice. A run on
+this processor and one as on a processor of 2008 must write the same bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(900)]
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+OLD_PROCESSOR = {
+    "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-FMA_Usable,-AVX2_Usable",
+    "NPY_DISABLE_CPU_FEATURES": "AVX2,FMA3,AVX512F,AVX512CD,AVX512_SKX,AVX512_CLX,AVX512_CNL,AVX512_ICL",
+}
+SINES = "import math; print([math.sin(n / 7) for n in range(20_000)])"
+RUNS = """
+import sys
+from pathlib import Path
+import volery
+out, examples = map(Path, sys.argv[1:])
+sys.path.insert(0, str(examples))
+from mission import mission
+for url in ("sim:ardupilot", "sim:px4", "sim:paparazzi", "sim:dji"):
+    assert volery.fly(mission, url, volery.Options(seed=1, out=out / url.replace(":", "-"))).completed
+options = volery.Options(fidelity="code", seed=7, out=out / "pocket")
+volery.simulate(examples / "delivery", options, scenario="pocket")
+"""
+
+
+def _output(program: str, *arguments: str, **environment: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", program, *arguments],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def _traces(folder: Path, **environment: str) -> dict[str, str]:
+    _output(RUNS, str(folder), str(EXAMPLES), **environment)
+    return {
+        file.parent.name: hashlib.sha256(file.read_bytes()).hexdigest()
+        for file in sorted(folder.glob("*/trace.mcap"))
+    }
+
+
+def test_a_trace_does_not_depend_on_the_processor(tmp_path: Path) -> None:
+    if " fma " in Path("/proc/cpuinfo").read_text():  # else there is one sine only
+        assert _output(SINES) != _output(SINES, **OLD_PROCESSOR)
+    here = _traces(tmp_path / "here")
+    assert len(here) == 5
+    assert _traces(tmp_path / "old", **OLD_PROCESSOR) == here
