@@ -155,5 +155,10 @@ def acos(x: float) -> float:
     return atan2(sqrt((1.0 - x) * (1.0 + x)), x)
 
 
+def cbrt(x: float) -> float:
+    """Return the cube root of x >= 0."""
+    return exp(log(x) / 3.0) if x > 0.0 else 0.0
+
+
 for _function in (_sine_near_zero, _cosine_near_zero, _arc_tangent, sine_cosine, atan2, exp, log):
     numeric(_function)

@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from volery.base.elementary import acos, asin, atan, atan2, cos, exp, log, sin, sine_cosine, tan
+from volery.base.elementary import acos, asin, atan, atan2, cbrt, cos, exp, log, sin, sine_cosine, tan
 
 DRAW = random.Random(20)
 
@@ -41,6 +41,13 @@ def test_the_functions_of_one_argument_agree_with_the_library():
         assert atan(angle) == pytest.approx(math.atan(angle), abs=4e-16)
         assert asin(share) == pytest.approx(math.asin(share), abs=1e-15)
         assert acos(share) == pytest.approx(math.acos(share), abs=1e-15)
+
+
+def test_a_cube_root():
+    assert cbrt(0.0) == 0.0
+    for _ in range(500):
+        x = DRAW.uniform(0.0, 50.0)
+        assert cbrt(x) * cbrt(x) * cbrt(x) == pytest.approx(x, rel=4e-15)
 
 
 def test_ends_of_the_domain():

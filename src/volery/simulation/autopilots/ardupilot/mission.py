@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import dist, isinf, isnan
 
+from volery.base.elementary import cbrt
 from volery.base.time import from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot.camera import DIGICAM_CONTROL, TRIGGER_DISTANCE, act_on_camera
 from volery.simulation.autopilots.ardupilot.commands import HIGHEST, SET_REVERSE, change_speed, turn_to
@@ -259,7 +260,7 @@ def _not_before(leg: Leg, vehicle: Vehicle, length: float) -> Leg:
     equal parts of constant jerk.
     """
     jerk = max(LEAST_JERK, vehicle.parameters["WPNAV_JERK"])
-    earliest = vehicle.kernel.now() + from_seconds(4.0 * (length / (2.0 * jerk)) ** (1.0 / 3.0))
+    earliest = vehicle.kernel.now() + from_seconds(4.0 * cbrt(length / (2.0 * jerk)))
     done = leg.done
     return replace(leg, done=lambda: vehicle.kernel.now() >= earliest and done())
 

@@ -122,7 +122,8 @@ class PlacePayload(Manoeuvre):
 
     def _has_climbed(self) -> bool:
         tuning = self.vehicle.tuning
-        stops = 0.5 * (SLOW_SHARE * tuning.speed_up) ** 2 / tuning.accel_z
+        speed = SLOW_SHARE * tuning.speed_up
+        stops = 0.5 * speed * speed / tuning.accel_z
         return self.vehicle.estimate.target[2] <= self._start[2] + stops
 
     def step(self) -> None:

@@ -7,9 +7,10 @@ two aircraft is taken in centimetres beside rates in m/s.
 
 from __future__ import annotations
 
-from math import cos, hypot, radians, sin
+from math import hypot, radians
 from typing import Any
 
+from volery.base.elementary import cos, sin
 from volery.base.frames import Vector
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, Check, change_mode, disarm
@@ -146,7 +147,7 @@ def _nearest_level(vehicle: Vehicle, other: Aircraft, horizon: float) -> float:
     here, own = vehicle.estimate.position, vehicle.estimate.velocity
     gap = (here[0] - other.place[0], here[1] - other.place[1])
     path = ((other.velocity[0] - own[0]) * horizon, (other.velocity[1] - own[1]) * horizon)
-    length = path[0] ** 2 + path[1] ** 2
+    length = path[0] * path[0] + path[1] * path[1]
     share = min(1.0, max(0.0, (gap[0] * path[0] + gap[1] * path[1]) / length)) if length else 0.0
     return hypot(gap[0] - share * path[0], gap[1] - share * path[1])
 
@@ -238,7 +239,8 @@ def _escape(vehicle: Vehicle, threat: Aircraft, action: int) -> Vector | None:
     if hypot(*velocity) < SLOW:
         down *= 100.0
     else:
-        along = (north * velocity[0] + east * velocity[1] + down * velocity[2]) / hypot(*velocity) ** 2
+        square = velocity[0] * velocity[0] + velocity[1] * velocity[1] + velocity[2] * velocity[2]
+        along = (north * velocity[0] + east * velocity[1] + down * velocity[2]) / square
         north, east, down = (
             north - along * velocity[0],
             east - along * velocity[1],
