@@ -6,8 +6,9 @@ Stages, conditions and texts are those of ArduCopter's mode_throw.cpp, looked at
 from __future__ import annotations
 
 from enum import IntEnum
-from math import cos, dist, hypot
+from math import dist, hypot
 
+from volery.base.elementary import cos
 from volery.base.time import MS, Ns
 from volery.simulation.autopilots.ardupilot.modes import INFO, change_mode
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
