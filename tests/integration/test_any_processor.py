@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from rigs.requirements import lacking
+
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(900)]
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+ROOT = Path(__file__).parents[2]
 OLD_PROCESSOR = {
     "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-FMA_Usable,-AVX2_Usable",
     "NPY_DISABLE_CPU_FEATURES": "AVX2,FMA3,AVX512F,AVX512CD,AVX512_SKX,AVX512_CLX,AVX512_CNL,AVX512_ICL",
@@ -49,7 +52,7 @@ def _output(program: str, *arguments: str, **environment: str) -> str:
 
 
 def _traces(folder: Path, **environment: str) -> dict[str, str]:
-    _output(RUNS, str(folder), str(EXAMPLES), **environment)
+    _output(RUNS, str(folder), str(ROOT / "examples"), **environment)
     return {
         file.parent.name: hashlib.sha256(file.read_bytes()).hexdigest()
         for file in sorted(folder.glob("*/trace.mcap"))
@@ -62,3 +65,19 @@ def test_a_trace_does_not_depend_on_the_processor(tmp_path: Path) -> None:
     here = _traces(tmp_path / "here")
     assert len(here) == 5
     assert _traces(tmp_path / "old", **OLD_PROCESSOR) == here
+
+
+def test_c_code_of_a_wheel_fuses_nothing_on_aarch64(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clang = shutil.which("clang-19") or lacking("clang-19 is not installed")
+    monkeypatch.syspath_prepend(str(ROOT / "scripts"))
+    from compile_modules import FLAGS
+
+    source = tmp_path / "sum.c"
+    source.write_text("double f(double a, double b, double c) { return a * b + c; }")
+
+    def assembly(*flags: str) -> str:
+        options = ["--target=aarch64-linux-gnu", "-O2", "-S", "-o", "-", *flags, str(source)]
+        return subprocess.run([clang, *options], capture_output=True, text=True, check=True).stdout
+
+    assert "fmadd" in assembly()
+    assert "fmadd" not in assembly(*FLAGS.split())
