@@ -80,8 +80,19 @@ X86_64 = {
     "fp_root32": Snippet("sqrtss %%xmm0, %%xmm0", "sqrtss %%xmm0, %%xmm{0}"),
     "fp_root64": Snippet("sqrtsd %%xmm0, %%xmm0", "sqrtsd %%xmm0, %%xmm{0}"),
     "convert": Snippet(
-        "cvtps2pd %%xmm0, %%xmm0; cvtpd2ps %%xmm0, %%xmm0", "cvttsd2si %%xmm{0}, %%rax", links=2
+        "cvtps2pd %%xmm0, %%xmm0; cvtpd2ps %%xmm0, %%xmm0", "cvtps2pd %%xmm0, %%xmm{0}", links=2
     ),
+    "conditional": Snippet("cmovo %%rbx, %%rax", "cmovo %%rbx, %%r{0}"),
+    "convert_integer": Snippet(
+        "cvtsi2sd %%rax, %%xmm0; cvttsd2si %%xmm0, %%rax", "cvttsd2si %%xmm0, %%r{0}", links=2
+    ),
+    "fp_flags": Snippet(
+        "ucomisd %%xmm0, %%xmm1; setp %%cl; movq %%rcx, %%xmm0",
+        "ucomisd %%xmm0, %%xmm{0}",
+        less=("conditional", "transfer"),
+    ),
+    "vector_shift": Snippet("pslld $3, %%xmm0", "pslld $3, %%xmm{0}"),
+    "store_vector": Snippet("movsd %%xmm0, 256(%%rsi)", "movsd %%xmm0, 256+8*{0}(%%rsi)"),
 }
 """``rbx`` holds 3, ``rsi`` points to two numbers and zeros, ``rcx`` is 0, ``xmm1`` is a little above 1."""
 
@@ -90,7 +101,11 @@ SNIPPETS = {"x86_64": X86_64}
 FORWARD = {"x86_64": "addsd %%xmm1, %%xmm0; movsd %%xmm0, 256(%%rsi); movsd 256(%%rsi), %%xmm0"}
 """A sum through memory: its latency less that of the sum is that of store-to-load forwarding."""
 
-NOTHING = {"x86_64": "nop"}
+ACCESSES_OF = {"x86_64": "mov 16(%%rsi), %%r{0}; mov %%rbx, 256+8*{0}(%%rsi)"}
+"""A load and a store."""
+
+NOTHING = {"x86_64": "xor %%r{0}d, %%r{0}d"}
+"""An instruction that enters and executes nowhere. Cores fuse ``nop`` with its neighbours."""
 
 _CHANGED = ("rax", "rbx", "rcx", "rdx", *(f"r{n}" for n in range(8, 16)), *(f"xmm{n}" for n in range(16)))
 PROLOGUE = {
@@ -112,10 +127,11 @@ IF_ODD = {
 
 CHAIN, FREE, LIBRARY, DELAY, MEMORY = "chain_", "free_", "library_", "delay_", "memory_"
 RANDOM, NEVER, WIDTH, FORWARDED = "branches_random", "branches_never", "width", "forward"
+ACCESSES, ONE_TARGET, MANY_TARGETS = "accesses", "jumps_one", "jumps_many"
 SECOND, THIRD, BEHIND, ROW = "memory_second", "memory_third", "memory_behind", "memory_row"
 LARGEST_THIRD = 32 << 20
 """Largest third cache, bytes: a larger one is shared by many cores and counts as memory."""
-UNROLLED, PASSES = 240, 4
+UNROLLED, PASSES = 240, 40
 """Links of a chain in a loop, so that its jump is negligible, and passes of the loop."""
 BRANCHES = CALLS = LOADS = 64
 """Branches, calls and lines of memory in a pass of ``measure.c``."""
@@ -150,9 +166,7 @@ def isa() -> str:
 
 def build(folder: Path) -> Path:
     """Compile the program in ``folder``; raise ``UsageError`` if the compiler is missing."""
-    here = files("volery.calibration")
-    measure = _generated(isa()) + here.joinpath("measure.c").read_text(encoding="utf-8")
-    (folder / "measure.c").write_text(measure, encoding="utf-8")
+    (folder / "measure.c").write_text(source(), encoding="utf-8")
     (folder / "library.h").write_text(_library(), encoding="utf-8")
     out = folder / "measure"
     options = ["-x", "c", "-O1", "-fno-builtin", "-fno-math-errno", "-w"]
@@ -160,16 +174,22 @@ def build(folder: Path) -> Path:
     return out
 
 
+def source() -> str:
+    """Return the program."""
+    body = files("volery.calibration").joinpath("measure.c").read_text(encoding="utf-8")
+    return _generated(isa()) + body
+
+
 def snippet_names() -> tuple[str, ...]:
     """Return the names of all snippets."""
     library = (*(LIBRARY + name for name in _calls()), *(DELAY + name for name in _functions_of_x()))
-    memory = (SECOND, THIRD, BEHIND, ROW)
-    return (*(name for name, _, _ in _loops(isa()) if name != "tick"), RANDOM, NEVER, *memory, *library)
+    branches, memory = (RANDOM, NEVER, ONE_TARGET, MANY_TARGETS), (SECOND, THIRD, BEHIND, ROW)
+    return (*(name for name, _, _ in _loops(isa()) if name != "tick"), *branches, *memory, *library)
 
 
 def time_snippet(program: Path, name: str) -> Timing:
     """Time a snippet until its median is precise, for at most ``MOST_ROUNDS`` rounds."""
-    each = {RANDOM: BRANCHES, NEVER: BRANCHES}.get(name, UNROLLED * PASSES)
+    each = BRANCHES if name in (RANDOM, NEVER, ONE_TARGET, MANY_TARGETS) else UNROLLED * PASSES
     each = CALLS if name.startswith((LIBRARY, DELAY, MEMORY)) else each
     cycles: list[float] = []
     ticks: list[float] = []
@@ -199,11 +219,16 @@ def _loops(machine: str) -> list[tuple[str, str, int]]:
     loops = [("tick", SNIPPETS[machine]["alu"].chain, UNROLLED)]
     for name, snippet in SNIPPETS[machine].items():
         loops.append((CHAIN + name, snippet.chain, UNROLLED))
-        eight = ";".join(snippet.free.format(number) for number in range(8, 16))
-        loops.append((FREE + name, eight, UNROLLED // 8))
+        loops.append((FREE + name, _eight(snippet.free), UNROLLED // 8))
     loops.append((FORWARDED, FORWARD[machine], UNROLLED))
-    loops.append((WIDTH, NOTHING[machine], UNROLLED))
+    loops.append((ACCESSES, _eight(ACCESSES_OF[machine]), UNROLLED // 16))
+    loops.append((WIDTH, _eight(NOTHING[machine]), UNROLLED // 8))
     return loops
+
+
+def _eight(snippet: str) -> str:
+    """Return a snippet with each of eight registers."""
+    return ";".join(snippet.format(number) for number in range(8, 16))
 
 
 class CacheGeometry(NamedTuple):
@@ -319,9 +344,6 @@ TABLES, HISTORY = 12, 60
 
 LINE_BYTES = 64.0
 
-CONVERSIONS = {"lround": 1}
-"""Conversions in the chain of a call; calls with numbers of 32 bits (``…f``) have two."""
-
 SHARE_OF_REFILL = 2.0
 """Cycles of a misprediction in which the branch itself executes: the rest is the refill."""
 
@@ -349,7 +371,7 @@ def core_law(machine: Machine, isa: str, taken: Mapping[str, Timing], queues: Qu
         operations[name] = OperationTiming(
             latency=round(latency), per_cycle=_pipes(taken[FREE + name].cycles)
         )
-    for name in ("store", "branch"):  # no instruction depends on their end
+    for name in ("store", "store_vector", "branch"):  # no instruction depends on their end
         operations[name] = OperationTiming(latency=1.0, per_cycle=operations[name].per_cycle)
     operations["fp_fma"] = operations["fp_multiply"]
     mispredicted = 2.0 * (taken[RANDOM].cycles - taken[NEVER].cycles)
@@ -366,6 +388,8 @@ def core_law(machine: Machine, isa: str, taken: Mapping[str, Timing], queues: Qu
         width=_pipes(min(taken[WIDTH].cycles, taken[FREE + "increment"].cycles)),
         refill=round(max(1.0, mispredicted - SHARE_OF_REFILL), 1),
         forward=round(max(0.0, taken[FORWARDED].cycles - operations["fp_add"].latency)),
+        accesses=_accesses(taken[ACCESSES].cycles, operations),
+        computed=round(max(1.0, 1.0 + taken[MANY_TARGETS].cycles - taken[ONE_TARGET].cycles), 1),
         operations=operations,
         library=_library_law(taken, operations),
         memory=_memory(taken, operations["load"].latency, mhz),
@@ -374,6 +398,13 @@ def core_law(machine: Machine, isa: str, taken: Mapping[str, Timing], queues: Qu
         tables=TABLES,
         history=HISTORY,
     )
+
+
+def _accesses(cycles: float, operations: Mapping[str, OperationTiming]) -> float | None:
+    """Return how many loads and stores start in a cycle together; None if neither hinders the other."""
+    both = _pipes(cycles)
+    alone = 2.0 * min(operations[name].per_cycle for name in ("load", "store"))
+    return both if both < alone else None
 
 
 def _pipes(cycles: float) -> float:
@@ -411,7 +442,8 @@ def _library_law(taken: Mapping[str, Timing], operations: Mapping[str, Operation
     latencies = {}
     for name in _functions_of_x():
         beside = operations["fp_multiply"].latency + operations["fp_add"].latency
-        beside += operations["convert"].latency * CONVERSIONS.get(name, 2 * name.endswith("f"))
+        beside += operations["convert"].latency * 2 * name.endswith("f")
+        beside += operations["convert_integer"].latency * (name == "lround")
         latencies[name] = round(max(calls[name], taken[DELAY + name].cycles - beside), 1)
     both = calls.pop("malloc_free")
     calls |= {"malloc": round(both / 2.0, 1), "free": round(both / 2.0, 1)}

@@ -22,8 +22,10 @@ static uint64_t mixed(uint64_t x) {
     return x ^ x << 17;
 }
 
-/* One branch that is taken by the lowest bit: at random, or never. */
-static void branches(long passes, uint64_t state, uint64_t mask) {
+/* One branch that is taken by the lowest bit: at random, or never. No call repeats the numbers of one before:
+ * large predictors learn thousands of them. */
+static void branches(long passes, uint64_t mask) {
+    static uint64_t state = 88172645463325252ull;
     volatile long sink = 0;
     long taken = 0;
     for (long pass = 0; pass < passes; ++pass) {
@@ -36,8 +38,38 @@ static void branches(long passes, uint64_t state, uint64_t mask) {
     (void)sink;
 }
 
-static void branches_random(long passes) { branches(passes, 88172645463325252ull, ~0ull); }
-static void branches_never(long passes) { branches(passes, 88172645463325252ull, 0); }
+static void branches_random(long passes) { branches(passes, ~0ull); }
+static void branches_never(long passes) { branches(passes, 0); }
+
+/* Sixty-four computed jumps a pass, all to one target or to eight in an order that is easy to predict. */
+static void jumps(long passes, const unsigned char *order) {
+    static const void *const places[] = {&&a, &&b, &&c, &&d, &&e, &&f, &&g, &&h};
+    volatile long sink = 0;
+    long sum = 0, left = passes * 64;
+    while (left-- > 0) {
+        goto *places[order[left & 15]];
+    a: sum += 1; continue;
+    b: sum += 3; continue;
+    c: sum += 5; continue;
+    d: sum += 7; continue;
+    e: sum ^= 9; continue;
+    f: sum ^= 11; continue;
+    g: sum ^= 13; continue;
+    h: sum ^= 15; continue;
+    }
+    sink = sum;
+    (void)sink;
+}
+
+static void jumps_one(long passes) {
+    static const unsigned char order[16] = {0};
+    jumps(passes, order);
+}
+
+static void jumps_many(long passes) {
+    static const unsigned char order[16] = {3, 0, 6, 1, 7, 2, 2, 5, 4, 0, 3, 7, 1, 6, 5, 4};
+    jumps(passes, order);
+}
 
 /* Sixty-four dependent loads a pass, along a circular list of lines in random order. */
 enum { LINE = 64, EACH = LINE / sizeof(uint32_t) };
@@ -133,6 +165,7 @@ typedef struct {
 } Case;
 
 static const Case cases[] = {CASES{"branches_random", branches_random}, {"branches_never", branches_never},
+                             {"jumps_one", jumps_one}, {"jumps_many", jumps_many},
                              {"memory_second", memory_second}, {"memory_third", memory_third},
                              {"memory_behind", memory_behind}, {"memory_row", memory_row}};
 
@@ -158,7 +191,7 @@ int main(int count, char **words) {
             while (timed(cases[i].run, passes) * passes < 50e3)
                 passes *= 2;
             for (int round = atoi(words[word + 1]); round > 0; --round) {
-                double before = timed(tick, 100), took = timed(cases[i].run, passes), after = timed(tick, 100);
+                double before = timed(tick, 20), took = timed(cases[i].run, passes), after = timed(tick, 20);
                 printf("%s %.6f %.6f\n", cases[i].name, took, (before + after) / 2);
             }
         }

@@ -27,14 +27,18 @@ _INTEGER = tuple(f"add %%rcx, %%r{number}" for number in range(8, 12))
 _VECTOR = tuple(f"addsd %%xmm0, %%xmm{number}" for number in range(1, 5))
 _LOAD = ("mov (%%rdx,%%rax), %%r12",)
 FILLERS = {
-    WINDOW: ("nop",),
+    WINDOW: ("mov $1, %%r8d", "addsd %%xmm0, %%xmm1", "jc 1f; 1:", "mov $1, %%r9d"),
     INTEGER: _INTEGER,
     VECTOR: _VECTOR,
     LOADS: _LOAD,
     INTEGER_VECTOR: tuple(one for pair in zip(_INTEGER, _VECTOR, strict=True) for one in pair),
     INTEGER_LOADS: tuple(one for add in _INTEGER for one in (add, *_LOAD)),
 }
-"""Instructions between the two loads; all but ``nop`` depend on the first load by rcx, rax or xmm0."""
+"""Instructions between the two loads; those that fill a queue depend on the first load by rcx, rax or xmm0.
+
+Those that fill the reorder buffer execute at once, and no more of them write registers of one file than it
+has. A ``nop`` would do, but an AMD Zen 4 keeps two of them, or two zeros, in one entry.
+"""
 _TO_INTEGER, _TO_VECTOR = ("mov {0}, %%rcx",), ("movq {0}, %%xmm0",)
 _TO_ADDRESS = ("mov {0}, %%rax", "and $0, %%eax")
 LINKS: dict[str, tuple[str, ...]] = {

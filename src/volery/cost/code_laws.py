@@ -141,7 +141,10 @@ class CoreLaw(WithProvenance):
         window: Entries of the reorder buffer.
         queues: Issue queues; operations of a group of pipes without one never wait for a free entry.
         refill: Cycles from the end of a mispredicted branch to the next instruction.
+        accesses: Loads and stores that start in a cycle together, where that is fewer than both alone.
         forward: Cycles from a store to a load of the same address (store-to-load forwarding).
+        computed: Cycles from a computed jump to the instruction at its target, where the history predicted
+            another one than the usual.
         tables: Tagged tables of the branch predictor.
         history: Taken branches in the longest history of the branch predictor.
         error: Relative error band, None where it is not known.
@@ -157,6 +160,8 @@ class CoreLaw(WithProvenance):
     queues: tuple[IssueQueue, ...] = ()
     refill: float
     forward: float
+    accesses: float | None = None
+    computed: float = 1.0
     tables: int
     history: int
     error: float | None = None

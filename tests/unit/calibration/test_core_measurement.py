@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from volery.calibration.core_measurement import Timing, core_law, snippet_names
+from volery.calibration.core_measurement import (
+    Timing,
+    core_law,
+    snippet_names,
+)
+from volery.calibration.core_measurement import (
+    source as source_of_measurement,
+)
 from volery.calibration.host_machine import Machine
 from volery.calibration.queue_measurement import INTEGER, WINDOW, QueueSizes
 from volery.cost import CoreLaw, IssueQueue
@@ -27,6 +34,11 @@ CYCLES = {
     "delay_floor": 12.0,
     "branches_random": 12.0,
     "branches_never": 2.0,
+    "jumps_one": 3.0,
+    "jumps_many": 5.1,
+    "free_load": 0.34,
+    "free_store": 0.5,
+    "accesses": 0.335,  # two in 0.67 cycles
 }
 
 
@@ -65,3 +77,18 @@ def test_what_is_assumed_is_named(law: CoreLaw) -> None:
     assert law.window == 224
     assert law.queues == (IssueQueue(entries=97, pipes=("integer", "branch", "multiply", "divide")),)
     assert law.validity == "assumed: the prediction of branches"
+
+
+def test_loads_and_stores_that_share_pipes_are_fewer_together(law: CoreLaw) -> None:
+    assert (law.operations["load"].per_cycle, law.operations["store"].per_cycle) == (3, 2)
+    assert law.accesses == 3
+
+
+def test_a_computed_jump_to_another_target_takes_longer(law: CoreLaw) -> None:
+    assert law.computed == 3.1
+
+
+def test_no_figure_is_taken_of_what_cores_fuse_or_learn() -> None:
+    text = source_of_measurement()
+    assert "nop" not in text[text.index("static void width") :].split("}")[0]
+    assert "static uint64_t state = 88172645463325252ull;" in text  # random branches go on where they stopped

@@ -275,7 +275,7 @@ counters tell how often an edge was taken."""
 PROMOTE = "function(loop-mssa(licm))"
 """Pass after the insertion of counters: those of a loop stay in registers while it runs."""
 
-METHOD = "4"
+METHOD = "5"
 """Version of the method that finds costs; a new version makes kept costs invalid."""
 
 _RULE = "read.d"
@@ -302,7 +302,7 @@ class Program:
     @cached_property
     def assembly(self) -> str:
         """Assembly for the core."""
-        options = ["-O2", f"-mcpu={self.law.cpu}", "-relocation-model=pic"]
+        options = [*generator_options(self.law.isa), f"-mcpu={self.law.cpu}"]
         notation = ["-x86-asm-syntax=intel"] if self.law.isa == "x86_64" else []
         command = [llvm_toolchain().llc, *options, *notation, "-o"]
 
@@ -338,9 +338,18 @@ class Program:
 
     def _object(self, text: str, out: Path) -> None:
         here = retarget(text, *HOST_TARGET)
-        run_tool(
-            [llvm_toolchain().llc, "-O2", "-relocation-model=pic", "-filetype=obj", "-o", str(out)], here
-        )
+        options = generator_options(HOST_ISA)
+        run_tool([llvm_toolchain().llc, *options, "-filetype=obj", "-o", str(out)], here)
+
+
+def generator_options(isa: str) -> tuple[str, ...]:
+    """Return the options of the code generator.
+
+    A choice between two values stays a conditional move: it has no block in the trace, so the direction of a
+    branch in its place would not be known.
+    """
+    moves = ("-x86-cmov-converter=false",) if isa == "x86_64" else ()
+    return ("-O2", "-relocation-model=pic", "-disable-cgp-select2branch", *moves)
 
 
 def compile_program(sources: Sequence[Path], law: CoreLaw, flags: Sequence[str] = ()) -> Program:

@@ -5,7 +5,8 @@ of its pipes until its operands are available and a pipe is free, the oldest fir
 queue that the next instruction needs is full. Instructions retire in order. A store is identified by its
 address in the trace, or, where that is not known, by the text of the address and the versions of the
 registers in it: a load of the same address is forwarded from it, and a load of parts of several stores waits
-until they have retired. Computed jumps are predicted by their last target with the same history. After a
+until they have retired. After a taken branch nothing else enters in that cycle, after a
+computed jump to another target than its usual one not for ``computed`` cycles. After a
 misprediction nothing enters until the branch is done and ``refill`` cycles have passed. A library call
 occupies the front end for its cycles and the reorder buffer by the instructions of that time, and its result
 is available after its latency. An access hits the first cache, or is served by the level in the trace. Memory
@@ -16,7 +17,9 @@ Branches are predicted by a simplified TAGE (Seznec and Michaud, JILP 8, 2006): 
 and tagged tables by branch and by ever longer histories of taken branches. The longest history with an entry
 for the branch decides. A misprediction allocates an entry with a longer history. In the beginning the table
 by branch holds the direction that each branch takes more often, as after earlier activations; the tagged
-tables are empty, as if other code had evicted their entries.
+tables are empty, as if other code had evicted their entries. Computed jumps are predicted in the same way by
+tables of targets (ITTAGE; Seznec, JWAC-2, 2011): without an entry for a long history that for a shorter one
+decides, and in the end the usual target of the jump.
 """
 
 from __future__ import annotations
@@ -37,8 +40,12 @@ FOOTPRINT = 16
 """Bits by which a taken branch changes the history (Yavarzadeh et al., Half&Half, IEEE S&P 2023)."""
 RECORD = 1024
 
-# columns of an entry of a tagged table
+TARGETS = 512
+"""Entries of a table of targets."""
+
+# columns of an entry of a tagged table, and of a table of targets
 TAG, COUNTER, USEFUL = range(3)
+TARGET, CONFIDENCE = 1, 2
 
 
 def history_lengths(tables: int, longest: int) -> Array:
@@ -147,6 +154,60 @@ def predict_branch(
     return bool(predicted == taken)
 
 
+@numeric
+def _entry(entries: Array, folds: Array, place: int, table: int) -> Any:
+    """Return the entry of a computed jump for a history; table -1 is by the jump alone."""
+    mixed = place if table < 0 else place ^ folds[table, 0] ^ (table * 7)
+    return entries[table + 1, (mixed ^ mixed // TARGETS) % TARGETS]
+
+
+@numeric
+def _longest(entries: Array, folds: Array, place: int, below: int) -> int:
+    """Return the longest history below a number that has an entry for a computed jump, or -1."""
+    for table in range(below - 1, -1, -1):
+        if _entry(entries, folds, place, table)[TAG] == (place * 5 ^ folds[table, 1]) % (1 << TAG_BITS):
+            return table
+    return -1
+
+
+@numeric
+def predict_target(entries: Array, folds: Array, position: Array, place: int, target: int) -> bool:
+    """Return whether the target of the computed jump at ``place`` is predicted; train the tables.
+
+    The first table is by jump alone, the others are by the histories. An entry that was not right yet does
+    not decide.
+    """
+    tables = len(folds)
+    longest = _longest(entries, folds, place, tables)
+    decides = longest
+    while decides >= 0 and _entry(entries, folds, place, decides)[CONFIDENCE] == 0:
+        decides = _longest(entries, folds, place, decides)
+    right = _entry(entries, folds, place, decides)[TARGET] == target
+    for table in (decides, longest):
+        entry = _entry(entries, folds, place, table)
+        if entry[TARGET] == target:
+            entry[CONFIDENCE] = min(3, entry[CONFIDENCE] + 1)
+        elif entry[CONFIDENCE] > 0:
+            entry[CONFIDENCE] -= 1
+        else:
+            entry[TARGET] = target
+        if decides == longest:
+            break
+    if not right:
+        position[1] += 1
+        start = longest + 1
+        if position[1] % 2 == 0 and start < tables - 1:  # or two jumps would evict each other for ever
+            start += 1
+        for table in range(start, tables):
+            entry = _entry(entries, folds, place, table)
+            if entry[CONFIDENCE] == 0:
+                entry[TAG] = (place * 5 ^ folds[table, 1]) % (1 << TAG_BITS)
+                entry[TARGET] = target
+                break
+            entry[CONFIDENCE] -= 1
+    return bool(right)
+
+
 Array = np.ndarray[Any, np.dtype[Any]]
 
 REGISTERS = 64
@@ -168,9 +229,9 @@ COLUMNS = FIRST_BUMP + BUMPS
 PLAIN, CONDITIONAL, COMPUTED, LIBRARY, JUMP = range(5)
 
 # columns of the operation table
-LATENCY, KIND_OF, GROUP, QUEUE = range(4)
+LATENCY, KIND_OF, GROUP, QUEUE, OCCUPIES = range(5)
 # entries of the vector of the core's figures
-WIDTH, WINDOW, REFILL, FORWARD = range(4)
+WIDTH, WINDOW, REFILL, FORWARD, JUMPS = range(5)
 # columns of the table of cache misses
 STEP, ROW, LEVEL, AHEAD = range(4)
 IN_TRACE = np.int64(-1)
@@ -187,7 +248,7 @@ def _issue(used: Array, capacity: Array, operation: Array, ready: float, times: 
     own = _first_free(used, capacity, int(operation[KIND_OF]), ready, times)
     if operation[GROUP] == operation[KIND_OF]:
         return own
-    return _first_free(used, capacity, int(operation[GROUP]), own, times)
+    return _first_free(used, capacity, int(operation[GROUP]), own, times * operation[OCCUPIES])
 
 
 @numeric
@@ -364,9 +425,7 @@ def _predict(
     if kind == CONDITIONAL:
         right = predict_branch(predictor, histories, row, taken)
     elif kind == COMPUTED:
-        seen = (row ^ predictor[3][len(histories) // 2, 0]) % PLACES
-        right = targets[seen] == target
-        targets[seen] = target
+        right = predict_target(targets, predictor[3], predictor[4], row, target)
     if kind != CONDITIONAL or taken:
         record_taken(predictor, histories, row, target)
     return right
@@ -377,7 +436,7 @@ _ARGUMENTS = (
     "float64[::1]", "float64[:,::1]", "int64[::1]", "int64[:,::1]", "int64[::1]", "float64[::1]", "float64",
     "float64[::1]", "float64[::1]", "float64[:,::1]",
     "float64[::1]", "int64[::1]", "float64[:,:,::1]", "float64[::1]", "int64[:,::1]", "float64[:,::1]",
-    "int64[::1]", "int64[::1]", "int64[:,:,::1]", "int64[::1]", "int64[:,::1]", "int64[::1]",
+    "int64[:,:,::1]", "int64[::1]", "int64[:,:,::1]", "int64[::1]", "int64[:,::1]", "int64[::1]",
 )  # fmt: skip
 """Types of the arguments of ``execute_blocks``: those of ``run``, its results, and its working memory."""
 
@@ -394,7 +453,7 @@ def _compose(digest: str) -> Callable[..., int]:
         count = len(blocks)
         window = len(leaves)
         enters, resumes, retired, clock, number, entry, changes = 0.0, 0.0, 0.0, 0.0, 0, 0, 0
-        next_miss, free = 0, 0.0
+        next_miss, free, begins = 0, 0.0, 0.0
         for step in range(count):
             block = blocks[step]
             stalled[step] = max(0.0, resumes - clock)
@@ -454,6 +513,9 @@ def _compose(digest: str) -> Callable[..., int]:
                 if one[KIND] == PLAIN or one[KIND] == LIBRARY or step + 1 == count:
                     continue
                 target = blocks[step + 1]
+                if one[KIND] != CONDITIONAL or taken[step] == 1:
+                    other = one[KIND] == COMPUTED and _entry(targets, folds, row, -1)[TARGET] != target
+                    enters = begins = max(enters, begins + (core[JUMPS] if other else 1.0))
                 if not _predict(predictor, histories, targets, one[KIND], row, taken[step] == 1, target):
                     resumes = done + core[REFILL]
             finished = max(retired, enters)
@@ -470,6 +532,12 @@ def _empty_queues(entries: Array) -> Array:
     for queue, size in enumerate(entries):
         queues[queue, :size] = 0.0
     return queues
+
+
+def _empty_targets(tables: int) -> Array:
+    entries = np.full((tables + 1, TARGETS, 3), -1, dtype=np.int64)
+    entries[:, :, CONFIDENCE] = 0
+    return entries
 
 
 def _base_counters(blocks: Array, taken: Array, first: Array, table: Array) -> Array:
@@ -498,7 +566,7 @@ def run(
         table: Instructions.
         operations: Classes of operations.
         capacity: Capacity of the pipes per cycle.
-        core: Width, window, refill and forwarding.
+        core: Width, window, refill, forwarding and computed jumps.
         slots: Slots of the front end by row.
         library: Cycles and latency of a library call by row.
         histories: Lengths of the branch predictor's histories.
@@ -537,7 +605,7 @@ def run(
         np.zeros(REGISTERS), np.zeros(REGISTERS, dtype=np.int64),
         np.full((len(capacity), SLOT_CYCLES, 2), -1.0),
         np.zeros(int(core[WINDOW])),
-        np.zeros((PLACES, 2), dtype=np.int64), np.zeros((PLACES, 2)), np.full(PLACES, -1, dtype=np.int64),
+        np.zeros((PLACES, 2), dtype=np.int64), np.zeros((PLACES, 2)), _empty_targets(len(histories)),
         *new_predictor(len(histories), _base_counters(*arrays[:4])),
     )()  # fmt: skip
     return cost, stalled

@@ -11,25 +11,30 @@ import numpy as np
 from volery.cost.code_laws import CoreLaw
 from volery.cost.native import core_model, isa_aarch64, isa_x86_64
 from volery.cost.native.core_model import history_lengths
-from volery.cost.native.machine_code import OPERATION_CLASSES, Effect, End, Instruction, MachineBlock
+from volery.cost.native.machine_code import OPERATION_CLASSES, SIMILAR, Effect, End, Instruction, MachineBlock
 
 Array = np.ndarray[Any, np.dtype[Any]]
 
 _PIPES = {
-    "integer": ("alu", "move", "increment", "shift"),
+    "integer": ("alu", "move", "increment", "shift", "conditional"),
     "branch": ("branch",),
     "multiply": ("multiply", "shifted_alu"),
     "divide": ("divide32", "divide64"),
     "load": ("load", "load_vector"),
-    "store": ("store",),
+    "store": ("store", "store_vector"),
     "vector": (
         "fp_add", "fp_compare", "fp_multiply", "fp_fma", "convert", "transfer", "vector", "vector_move",
-        "vector_multiply", "shuffle",
+        "vector_multiply", "shuffle", "convert_integer", "fp_flags", "vector_shift",
     ),
     "slow": ("fp_divide32", "fp_divide64", "fp_root32", "fp_root64"),
 }  # fmt: skip
 GROUPS = {operation: group for group, operations in _PIPES.items() for operation in operations}
 """Group of pipes by class of operations: classes of one group share pipes."""
+
+SHARED = {"x86_64": {"multiply": "integer", "divide": "integer"}}
+"""Groups whose operations take a pipe of another one, by instruction set: on cores of Intel and AMD products
+and quotients begin in pipes of the integer operations (A. Fog, *The microarchitecture of Intel, AMD and VIA
+CPUs*)."""
 
 EFFECTS: dict[str, Callable[[Instruction], Effect]] = {
     "x86_64": isa_x86_64.effect,
@@ -49,7 +54,7 @@ class InstructionTables:
         library: Cycles and latency of a library call by instruction.
         operations: Classes of operations: latency, own pipes, group's pipes, issue queue.
         capacity: Operations that pipes start per cycle.
-        core: Width, window, refill and forwarding of the core.
+        core: Width, window, refill, forwarding and computed jumps of the core.
         histories: Lengths of the branch predictor's histories.
         levels: Latencies of the caches, from the first on.
         entries: Entries of each issue queue.
@@ -102,7 +107,7 @@ def instruction_tables(
             library.append(_library_cycles(block, defined, law, rows[-1]) if last else (0.0, 0.0))
             if last and block.end is End.BRANCH:
                 rows[-1][core_model.KIND] = core_model.CONDITIONAL
-            elif last and block.end is End.COMPUTED:
+            elif last and (block.end is End.COMPUTED or (block.end is End.CALL and not block.target)):
                 rows[-1][core_model.KIND] = core_model.COMPUTED
             elif last and block.end is not End.FALLS and rows[-1][core_model.KIND] == core_model.PLAIN:
                 rows[-1][core_model.KIND] = core_model.JUMP
@@ -110,7 +115,7 @@ def instruction_tables(
         first.append(len(rows))
     table = np.array(rows, dtype=np.int64).reshape(-1, core_model.COLUMNS)
     operations, capacity = _operation_table(law)
-    core = np.array([law.width, law.window, law.refill, law.forward], dtype=float)
+    core = np.array([law.width, law.window, law.refill, law.forward, law.computed], dtype=float)
     return InstructionTables(
         np.array(first),
         table,
@@ -149,24 +154,34 @@ def _row(effect: Effect, known: dict[str, int], places: dict[str, int]) -> list[
     place = places.setdefault(memory.place, len(places) + 1) if memory.place else 0
     return [
         memory.size, operation(effect.load), effect.loads, operation(effect.operation), effect.times,
-        operation("store" if effect.store else ""), place, core_model.PLAIN, memory.displacement,
+        operation(effect.store), place, core_model.PLAIN, memory.displacement,
         *numbers(effect.reads, core_model.READS), *numbers(memory.registers, core_model.ADDRESSES),
         *numbers(effect.writes, core_model.WRITES), *numbers(effect.bumps, core_model.BUMPS),
     ]  # fmt: skip
 
 
 def _operation_table(law: CoreLaw) -> tuple[Array, Array]:
-    """Return the classes of operations (latency, own pipes, group's, queue) and the pipes' capacity."""
+    """Return the classes of operations, with the columns of ``core_model``, and the pipes' capacity.
+
+    Quotients and roots of numbers are computed by one unit, which each occupies until the next may begin.
+    """
     groups = sorted(set(GROUPS.values()))
+    shared = dict(SHARED.get(law.isa, {}))
+    if law.accesses is not None:
+        shared["store"] = "load"
     queues: dict[str, int] = {group: number for number, one in enumerate(law.queues) for group in one.pipes}
     capacity = np.zeros(len(OPERATION_CLASSES) + len(groups))
-    table = np.zeros((len(OPERATION_CLASSES), 4))
+    table = np.zeros((len(OPERATION_CLASSES), 5))
     for number, name in enumerate(OPERATION_CLASSES):
-        operation = law.operations[name]
+        operation = law.operations.get(name) or law.operations[SIMILAR[name]]
         renamed = operation.latency < 0.5  # eliminated by register renaming: it takes no pipe
-        group = number if renamed else len(OPERATION_CLASSES) + groups.index(GROUPS[name])
+        pipes = shared.get(GROUPS[name], GROUPS[name])
+        group = number if renamed else len(OPERATION_CLASSES) + groups.index(pipes)
         capacity[number] = operation.per_cycle
-        capacity[group] = max(capacity[group], operation.per_cycle)
+        occupies = 1.0 / operation.per_cycle if GROUPS[name] == "slow" else 1.0
+        capacity[group] = max(capacity[group], operation.per_cycle * occupies)
         queue = -1 if renamed else queues.get(GROUPS[name], -1)
-        table[number] = (operation.latency, number, group, queue)
+        table[number] = (operation.latency, number, group, queue, occupies)
+    if law.accesses is not None:
+        capacity[len(OPERATION_CLASSES) + groups.index("load")] = law.accesses
     return table, capacity

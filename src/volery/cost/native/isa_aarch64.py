@@ -64,7 +64,7 @@ def _access(name: str, operands: tuple[str, ...], at: int) -> Effect:
     slots = (2.0 if bumps else 1.0) + (1.0 if pair and wide else 0.0)
     registers = _registers(moved)
     if name.startswith("st"):
-        return Effect(slots=slots, store=True, memory=memory, reads=registers, bumps=bumps)
+        return Effect(slots=slots, store="store", memory=memory, reads=registers, bumps=bumps)
     vector = bool(moved) and moved[0][:1] in "bhsdqv{"
     return Effect(
         slots=slots,

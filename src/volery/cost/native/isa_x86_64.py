@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from volery.cost.native.machine_code import NO_MEMORY, Effect, Instruction, MemoryOperand
 
@@ -32,9 +33,12 @@ _CONDITIONAL = re.compile(r"cmov|set|adc$|sbb$")
 _KEEPS_FLAGS = re.compile(r"mov|cmov|set|lea$|not$|bswap$|.*[sp][sd]$|v|cvt|p(?!opcnt|test)|[sr]h\wx$")
 
 _SCALAR = re.compile(r"v?(div|sqrt|mul|add|sub|min|max|cmp\w*|ucomi|comi)([sp])([sd])$")
-_ARITHMETIC = {"add": "fp_add", "sub": "fp_add", "mul": "fp_multiply"}
+_ARITHMETIC = {
+    "add": "fp_add", "sub": "fp_add", "mul": "fp_multiply", "ucomi": "fp_flags", "comi": "fp_flags",
+}  # fmt: skip
 _NAMED = (
     (re.compile(r"v?fn?m(?:add|sub)"), "fp_fma"),
+    (re.compile(r"v?cvt(?:t?s[sd]2si|si2s[sd])"), "convert_integer"),
     (re.compile(r"v?cvt"), "convert"),
     (
         re.compile(
@@ -42,7 +46,8 @@ _NAMED = (
         ),
         "shuffle",
     ),
-    (re.compile(r"v?pm(?:ul|add)"), "vector_multiply"),
+    (re.compile(r"v?p(?:mul|madd|sadbw)"), "vector_multiply"),
+    (re.compile(r"v?ps(?:ll|rl|ra)[wdq]$"), "vector_shift"),
     (re.compile(r"v?p?movmsk"), "transfer"),
 )
 
@@ -52,15 +57,24 @@ def effect(one: Instruction) -> Effect:
     name, operands = one.mnemonic, one.operands
     special = _SPECIAL.get(name)
     if special is not None:
-        return special
+        return _call(special, operands[0]) if name == "call" and operands else special
     if name in ("push", "pop"):
         registers = _registers(operands)
         return (
-            Effect(store=True, reads=registers) if name == "push" else Effect(load="load", writes=registers)
+            Effect(store="store", reads=registers)
+            if name == "push"
+            else Effect(load="load", writes=registers)
         )
     if name.startswith("j"):
         return Effect(operation="branch", reads=_registers(operands) if name == "jmp" else (FLAGS,))
     return _computing(name, operands)
+
+
+def _call(call: Effect, target: str) -> Effect:
+    """Return the effect of a call: the address of its target is in memory, in a register or in itself."""
+    if "[" in target:
+        return replace(call, load="load", store="", memory=_memory(target))  # one address an instruction
+    return replace(call, reads=_registers((target,)))
 
 
 def _computing(name: str, operands: tuple[str, ...]) -> Effect:
@@ -74,7 +88,7 @@ def _computing(name: str, operands: tuple[str, ...]) -> Effect:
 
 
 _SPECIAL = {
-    "call": Effect(operation="branch", store=True),
+    "call": Effect(operation="branch", store="store"),
     "ret": Effect(operation="branch", load="load"),
     "ud2": Effect(),
     "nop": Effect(),
@@ -103,7 +117,8 @@ def _move(name: str, operands: tuple[str, ...]) -> Effect:
     into, out = operands[0], operands[-1]
     vector = name not in ("mov", "movabs")
     if "[" in into:
-        return Effect(store=True, reads=_registers((out,)), memory=_memory(into))
+        store = "store_vector" if "mm" in out else "store"
+        return Effect(store=store, reads=_registers((out,)), memory=_memory(into))
     writes, reads = _registers((into,)), _registers((out,))
     if "[" in out:
         half = name in _HALVES
@@ -138,11 +153,11 @@ def _ordinary(name: str, operands: tuple[str, ...]) -> Effect:
     stores = bool(place) and operands[0] == place and not _COMPARES.match(name)
     vector = any("mm" in one for one in operands)
     return Effect(
-        slots=2.0 if stores or operation == "convert" else 1.0,
+        slots=2.0 if stores or operation in ("convert", "convert_integer") else 1.0,
         load=("load_vector" if vector else "load") if place and not name.startswith("set") else "",
         operation=operation,
         times=times,
-        store=stores,
+        store="store" if stores else "",
         memory=_memory(place),
         reads=reads,
         writes=writes,
@@ -171,6 +186,8 @@ def _integer_class(name: str, operands: tuple[str, ...]) -> tuple[str, int]:
         return "multiply", 1
     if name in ("inc", "dec") or (name in ("add", "sub") and operands[-1].lstrip("-").isdigit()):
         return ("increment" if "[" not in operands[0] else "alu"), 1
+    if _CONDITIONAL.match(name):
+        return "conditional", 1
     if name in ("shl", "shr", "sar", "sal", "rol", "ror", "shld", "shrd"):
         return "shift", 2 if operands[-1] == "cl" else 1
     if name == "lea" and operands[1].count("+") + operands[1].count("-") > 1 and "rip" not in operands[1]:

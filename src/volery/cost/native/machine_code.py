@@ -17,8 +17,15 @@ OPERATION_CLASSES = (
     "load", "load_vector", "store", "branch",
     "fp_add", "fp_compare", "fp_multiply", "fp_fma", "fp_divide32", "fp_divide64", "fp_root32", "fp_root64",
     "convert", "transfer", "vector", "vector_move", "vector_multiply", "shuffle",
+    "conditional", "convert_integer", "fp_flags", "vector_shift", "store_vector",
 )  # fmt: skip
 """Classes of operations, for which a ``CoreLaw`` has figures."""
+
+SIMILAR = {
+    "conditional": "alu", "convert_integer": "convert", "fp_flags": "fp_compare", "vector_shift": "vector",
+    "store_vector": "store",
+}  # fmt: skip
+"""Class whose figures hold for another one where a law does not distinguish them."""
 
 _OPENING, _CLOSING = frozenset("([{"), frozenset(")]}")
 _FUNCTION = re.compile(r'^("[^"]+"|[\w.$]+):\s+(?:#|//) @')
@@ -85,7 +92,7 @@ class Effect:
         loads: Number of loads.
         operation: Class of the operation, empty if there is none.
         times: Number of operations.
-        store: Whether a store follows.
+        store: Class of a store that follows, or empty.
         memory: Address of the loads or the store.
         reads: Registers that the operation reads.
         writes: Registers that are written when the operation is done.
@@ -97,7 +104,7 @@ class Effect:
     loads: int = 1
     operation: str = ""
     times: int = 1
-    store: bool = False
+    store: str = ""
     memory: MemoryOperand = NO_MEMORY
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = ()

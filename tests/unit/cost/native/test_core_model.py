@@ -142,6 +142,50 @@ def test_repeating_branches_are_predicted_and_random_ones_are_not():
     assert 0.4 < mispredicted(random) < 0.6
 
 
+def test_one_taken_branch_enters_a_cycle():
+    tables = instruction_tables([piece("jmp .LBB0_1", end=End.JUMP)], LAW, frozenset())
+    ran = ExecutionSequence(np.zeros(REPEATS, dtype=np.int64), np.ones(REPEATS, dtype=np.int8))
+    assert execute(tables, ran)[0].sum() / REPEATS == pytest.approx(1.0, rel=0.02)
+
+
+def test_quotients_and_roots_are_computed_by_one_unit():
+    each = [cycles(f"v{one}sd xmm1, xmm2, xmm3") for one in ("div", "sqrt")]
+    both = cycles("vdivsd xmm1, xmm2, xmm3", "vsqrtsd xmm4, xmm2, xmm3")
+    assert both == pytest.approx(sum(each), rel=0.02)
+
+
+def computed(ways: list[int], targets: list[int], computed_jumps: float = 1.0) -> tuple[float, int]:
+    """Cycles, and mispredictions in the second half, of a loop with a branch and a computed jump."""
+    loop = [
+        piece("test eax, eax", "jne .LBB0_1", end=End.BRANCH),
+        piece("jmp rax", end=End.COMPUTED),
+        *(piece("jmp .LBB0_1", end=End.JUMP) for _ in range(8)),
+    ]
+    ran = np.array([one for target in targets for one in (0, 1, 2 + target)], dtype=np.int64)
+    taken = np.array([one for way in ways for one in (way, 1, 1)], dtype=np.int8)
+    law = LAW.model_copy(update={"computed": computed_jumps})
+    took, stalled = execute(instruction_tables(loop, law, frozenset()), ExecutionSequence(ran, taken))
+    after = stalled[np.arange(len(ran)) % 3 == 2]
+    return float(took.sum()), int(np.count_nonzero(after[len(after) // 2 :]))
+
+
+def test_a_jump_to_one_target_is_predicted_whatever_was_before():
+    random = [int(one) for one in np.random.default_rng(1).integers(0, 2, 2000)]
+    assert computed(random, [3] * 2000)[1] < 20
+
+
+def test_targets_in_a_repeating_order_are_learnt_and_random_ones_are_not():
+    order = [int(one) for one in np.random.default_rng(2).integers(0, 8, 2000)]
+    assert computed([0] * 2000, order[:20] * 100)[1] < 20
+    assert computed([0] * 2000, order)[1] > 800
+
+
+def test_a_computed_jump_to_another_target_enters_later():
+    alternating = [0, 1] * 500  # half of them is the usual target
+    assert computed([0] * 1000, alternating, 4.0)[0] > computed([0] * 1000, alternating)[0] + 400
+    assert computed([0] * 1000, [1] * 1000, 4.0)[0] < computed([0] * 1000, [1] * 1000)[0] + 100
+
+
 def late(*lines: str, level: int, ahead: int = 0, memory: tuple[float, float] | None = None) -> float:
     """Cycles of one pass through a piece whose first instruction is always served by that level."""
     ran = np.zeros(REPEATS, dtype=np.int64)
