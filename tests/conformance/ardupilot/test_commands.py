@@ -209,7 +209,6 @@ def test_several_vehicles_have_their_own_system_ids(bench: Any) -> None:
     [
         (14, "FLIP", None),
         (15, "AUTOTUNE", None),
-        (18, "THROW", None),
         (22, "FLOWHOLD", None),
         (23, "FOLLOW", "Set FOLL_ENABLE = 1"),
         (25, "SYSTEMID", "No axis selected, SID_AXIS = 0"),

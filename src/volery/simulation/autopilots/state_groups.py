@@ -62,6 +62,10 @@ class GroundState:
     """Time in flight since boot, where the firmware counts it."""
     track: list[Vector] = field(default_factory=list)
     """Points passed since arming, north, east, down about the estimator's origin [m], where they are kept."""
+    track_lost_since: Ns = NEVER
+    """Since when an armed vehicle has had no position for its track."""
+    track_ended: bool = False
+    """Whether the track is given up until the vehicle is armed again."""
     lifted: bool = False
     """Whether the landed detector has reported flight since the motors came up."""
     takeoff_requested_at: Ns = NEVER
@@ -71,6 +75,7 @@ class GroundState:
         """Start to wait for a request to take off."""
         self.idle_since = now
         self.track.clear()
+        self.track_lost_since, self.track_ended = NEVER, False
         self.takeoff_requested_at = NEVER
 
     def leave(self, now: Ns) -> None:

@@ -12,10 +12,11 @@ from math import dist, radians
 from typing import Any
 
 from volery.base.elementary import cos, sin
-from volery.base.time import MS, Ns, from_seconds
+from volery.base.time import MS, Ns, S, from_seconds
 from volery.simulation.autopilots.ardupilot.failsafes import radio_lost
-from volery.simulation.autopilots.ardupilot.modes import arm, change_mode, disarm
+from volery.simulation.autopilots.ardupilot.modes import WARNING, arm, change_mode, disarm
 from volery.simulation.autopilots.manual_control import ChannelRange
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 IGNORE, RELEASE = 65_535, 65_534
@@ -141,8 +142,7 @@ def simulate_push(vehicle: Vehicle) -> None:
     lasts = round(parameters["SIM_SHOVE_TIME"]) * MS
     if lasts <= 0 or not vehicle.flies:
         return
-    forward, right, down = (parameters[f"SIM_SHOVE_{axis}"] for axis in "XYZ")
-    vehicle.flight.push(forward, -right, -down)
+    vehicle.flight.push(parameters["SIM_SHOVE_X"], -parameters["SIM_SHOVE_Y"], -parameters["SIM_SHOVE_Z"])
     if failsafes.pushed:
         return
     failsafes.pushed = True
@@ -204,6 +204,8 @@ SETTLED: Ns = 200 * MS
 FULL_RUDDER = 0.89
 TRACK_SPACING, TRACK_POINTS = 2.0, 300
 """SRTL_ACCURACY [m] and SRTL_POINTS."""
+TRACK_LOST: Ns = 15 * S
+"""Time without a position after which the track ends."""
 
 NEVER_AGAIN: Ns = 1 << 62
 
@@ -292,10 +294,25 @@ def read_rudder(
 
 
 def keep_track(vehicle: Vehicle) -> None:
-    """Add the position of an armed vehicle to its track; a point near an earlier one cuts the loop."""
-    if not vehicle.armed or not vehicle.has_position or vehicle.mode.name == "SMART_RTL":
+    """Add the position of an armed vehicle to its track; a point near an earlier one cuts the loop.
+
+    Without a position for 15 s the track ends, and SMART_RTL is refused until the next arming.
+    """
+    ground, now = vehicle.ground, vehicle.kernel.now()
+    if not vehicle.armed or ground.track_ended:
         return
-    here, track = vehicle.estimate.position, vehicle.ground.track
+    if not vehicle.has_position:
+        if ground.track_lost_since == NEVER:
+            ground.track_lost_since = now
+        elif now - ground.track_lost_since > TRACK_LOST:
+            ground.track.clear()
+            ground.track_ended = True
+            vehicle.send_text(WARNING, "SmartRTL deactivated: bad position")
+        return
+    ground.track_lost_since = NEVER
+    if vehicle.mode.name == "SMART_RTL":
+        return
+    here, track = vehicle.estimate.position, ground.track
     if track and dist(here, track[-1]) < TRACK_SPACING:
         return
     near = next((place for place, point in enumerate(track) if dist(here, point) < TRACK_SPACING), None)

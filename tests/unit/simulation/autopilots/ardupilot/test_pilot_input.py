@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from typing import Any
+
 from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
@@ -27,3 +29,22 @@ def test_sticks_are_read_again_after_a_channel_or_a_parameter_has_changed() -> N
     kernel.run(6 * S)
     assert vehicle.switches.mode == vehicle.switches.read
     assert sticks_rest(vehicle)
+
+
+def test_a_track_without_a_position_ends_and_smart_rtl_is_refused_until_the_next_arming(station: Any) -> None:
+    rig = station(parameters={"FS_EKF_THRESH": 0, "ARMING_CHECK": 0})
+    rig.run(0.5)
+    rig.command(176, 1, 4)
+    assert rig.command(400, 1) == 0
+    rig.command(22, 0, 0, 0, 0, 0, 0, 10.0)
+    rig.run(12.0)
+    rig.vehicle.set_parameter("SIM_GPS_DISABLE", 1.0)
+    rig.run_until(lambda: not rig.vehicle.has_position)
+    rig.run(14.0)
+    assert rig.vehicle.ground.track
+    rig.run(2.0)
+    assert rig.texts().count("SmartRTL deactivated: bad position") == 1
+    rig.vehicle.set_parameter("SIM_GPS_DISABLE", 0.0)
+    rig.run_until(lambda: rig.vehicle.has_position)
+    rig.run(5.0)
+    assert rig.command(176, 1, 21) == 4
