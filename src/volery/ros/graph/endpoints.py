@@ -185,9 +185,9 @@ class EmbeddedPublisher:
         with self.node.kernel:
             return len(self._connections)
 
-    def awaited(self) -> bool:
-        """Return whether a message is to be sent now; see ``QoS.spacing``."""
-        return self.node.kernel.now() >= self._due
+    def awaited_from(self) -> Ns:
+        """Return the time from which a message will be used; see ``QoS.spacing``."""
+        return self._due
 
     def close(self) -> None:
         """Stop publishing."""

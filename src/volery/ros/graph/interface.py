@@ -43,7 +43,7 @@ class QoS:
         reliability: ``reliable``, ``best_effort`` or ``best_available``.
         durability: ``volatile``, ``transient_local`` or ``best_available``.
         spacing: A subscription uses no more than one message in this time, ns. Nodes of ROS send all; a graph
-            that takes the place of a link leaves the others out (``Publisher.awaited``).
+            that takes the place of a link leaves the others out (``Publisher.awaited_from``).
     """
 
     depth: int | None = 10
@@ -138,8 +138,8 @@ class Publisher(Protocol):
     def subscribers(self) -> int:
         """Return the number of subscriptions it is connected to."""
 
-    def awaited(self) -> bool:
-        """Return whether a message is to be sent now; False only where no subscription would use it."""
+    def awaited_from(self) -> Ns:
+        """Return the time, ns, before which no subscription would use a message; 0 where each is used."""
 
     def close(self) -> None:
         """Stop publishing."""

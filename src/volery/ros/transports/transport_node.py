@@ -89,9 +89,9 @@ class TransportPublisher:
         with self.node.kernel:
             return self._publisher.connected() if self._open else 0
 
-    def awaited(self) -> bool:
-        """Return True: each message is sent."""
-        return True
+    def awaited_from(self) -> Ns:
+        """Return 0: each message is used."""
+        return 0
 
     def close(self) -> None:
         """Stop publishing."""

@@ -121,7 +121,7 @@ def test_where_a_graph_is_a_link_messages_that_no_subscription_uses_are_not_awai
         node = graph.node("talker")
         publisher = node.advertise("state", STRING)
         for _ in range(30):
-            if publisher.awaited():
+            if publisher.awaited_from() <= graph.kernel.now():
                 sent.append(graph.kernel.now() // MS)
                 publisher.publish(messages.new(STRING))
             node.sleep(10 * MS)

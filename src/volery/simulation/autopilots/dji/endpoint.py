@@ -242,6 +242,7 @@ class _TopicGroup:
         self._listed = listed
         self._subscribed: list[tuple[Topic, Publisher]] = []
         self._round = 0
+        self._rests_until: Ns = 0  # no topic is awaited before
 
     @property
     def wanted(self) -> bool:
@@ -252,16 +253,19 @@ class _TopicGroup:
         """Publish the topics that have subscribers, as a framework callback."""
         if self._round % self._check_every == 0:
             self._subscribed = [one for one in self._listed if one[1].subscribers()]
+            self._rests_until = 0
         self._round += 1
-        if not self._subscribed or not self._endpoint.is_active:
+        now = self._endpoint.now()
+        if not self._subscribed or now < self._rests_until or not self._endpoint.is_active:
             return
         stamp, controller = self._endpoint.stamp(), self._endpoint.controller
         built = [
             (publisher, topic.build(controller, stamp))
             for topic, publisher in self._subscribed
-            if publisher.awaited()
+            if publisher.awaited_from() <= now
         ]
         self._endpoint.publish([one for one in built if one[1] is not None])
+        self._rests_until = min(publisher.awaited_from() for _, publisher in self._subscribed)
 
 
 class DjiEndpoint:
@@ -290,6 +294,10 @@ class DjiEndpoint:
     def is_active(self) -> bool:
         """Whether the aircraft is on and has booted."""
         return self._on and self._vehicle.uptime() >= self._vehicle.rules.startup.ready_after
+
+    def now(self) -> Ns:
+        """Return the time of the kernel."""
+        return self._kernel.now()
 
     def stamp(self) -> Ns:
         """Return the present ROS time."""

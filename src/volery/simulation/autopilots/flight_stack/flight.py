@@ -21,8 +21,6 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_YAW_P,
     FLIGHT,
     HOLD_HEADING,
-    K_POSITION,
-    VISIBLE,
     YAW_ANGLE,
     YAW_ANGLE_AND_RATE,
     YAW_RATE,
@@ -37,11 +35,8 @@ from volery.simulation.world.dynamics import cell_voltage
 from volery.simulation.world.environment_models import Terrain, Wind
 from volery.simulation.world.sensors import Measurement, Sigma, declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
-    M_GYRO,
     P_CELLS,
-    S_AMPS,
     S_CHARGE,
-    SAMPLES_END,
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
     U_GPS_DRIFT,
@@ -153,6 +148,7 @@ class Flight:
         self.capacity_as = self.spec.battery.capacity_ah * 3600.0
         """Capacity of the battery [A s]."""
         self._airframe = Airframe(self.frame, self.flying, self.capacity_as, sensor_suite(self.spec.sensors))
+        self._row = memoryview(world.arrays.rows[body])
         self._latest: Estimate | None = None
 
     def estimate(self) -> Estimate:
@@ -161,13 +157,7 @@ class Flight:
         if latest is not None and latest.time <= now < latest.time + STEP:
             return latest
         time = self._world.advance_to_now(self._body) * STEP
-        row = self._world.arrays.rows[self._body]
-        rows = (
-            row[K_POSITION:VISIBLE].tolist(),
-            row[M_GYRO:SAMPLES_END].tolist(),
-            row[S_CHARGE : S_AMPS + 1].tolist(),
-        )
-        latest = self._latest = Estimate(self._airframe, time, rows)
+        latest = self._latest = Estimate(self._airframe, time, self._row.tobytes())
         return latest
 
     def drive(self, setpoint: Setpoint) -> None:

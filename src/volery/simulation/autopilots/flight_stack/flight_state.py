@@ -132,8 +132,6 @@ K_TARGET_VELOCITY = _add("K_TARGET_VELOCITY", "m/s", "shaped; rover: the first i
 K_TARGET_ACCEL = _add("K_TARGET_ACCEL", "m/s^2", "shaped", 3, NED)
 K_TARGET_EULER = _add("K_TARGET_EULER", "rad", "target of the attitude loop", 3, RPY)
 K_GPS_INNOVATION = _add("K_GPS_INNOVATION", "1", "last horizontal innovation of a fix, in sigmas")
-VISIBLE = FLIGHT_LAYOUT.end
-"""First column after the memory that ``Estimate`` shows."""
 
 # --- private memory ---
 K_GYRO_BIAS = _add("K_GYRO_BIAS", "rad/s", "estimated", 3, FRD)
@@ -222,25 +220,24 @@ def _satellites(fix_type: int) -> int:
     return 10 if fix_type else 0
 
 
-def _fix_of(about: Airframe, sensed: Sequence[float]) -> GpsFix:
-    """Return the receiver's sample as a fix; *sensed* are the measurements from ``M_GYRO`` on."""
-    north, east, down, *velocity = sensed[M_GPS - M_GYRO : M_GPS_VELOCITY - M_GYRO + 3]
-    latitude, longitude, amsl = about.frame.from_ned((north, east, down))
-    kind = int(sensed[M_GPS_FIX - M_GYRO])
+def _fix_of(about: Airframe, row: Sequence[float]) -> GpsFix:
+    """Return the receiver's last sample, of the columns of *row*, as a fix."""
+    latitude, longitude, amsl = about.frame.from_ned((row[M_GPS], row[M_GPS + 1], row[M_GPS + 2]))
+    kind = int(row[M_GPS_FIX])
     receiver = about.sensors.gps
     return GpsFix(
         fix_type=kind,
         latitude=latitude,
         longitude=longitude,
         amsl=amsl,
-        velocity=(velocity[0], velocity[1], velocity[2]),
+        velocity=(row[M_GPS_VELOCITY], row[M_GPS_VELOCITY + 1], row[M_GPS_VELOCITY + 2]),
         h_acc=sqrt(receiver.horizontal.variance) if kind else inf,
         v_acc=sqrt(receiver.vertical.variance) if kind else inf,
         speed_acc=sqrt(receiver.velocity.variance) if kind else inf,
         eph=_dilution(kind),
         epv=2.0 if kind else inf,
         satellites=_satellites(kind),
-        count=int(sensed[M_GPS_COUNT - M_GYRO]),
+        count=int(row[M_GPS_COUNT]),
     )
 
 
@@ -250,40 +247,33 @@ class Estimate:
     Args:
         about: Constants of the vehicle.
         time: Time of the grid step [ns].
-        rows: Columns from K_POSITION to VISIBLE, from M_GYRO to SAMPLES_END, and from S_CHARGE to S_AMPS.
+        row: The vehicle's row, as the bytes of its doubles; copying them is cheaper than making numbers.
     """
 
-    __slots__ = ("_about", "_fix", "_geodetic", "_memory", "_sensed", "_state", "time")
+    __slots__ = ("_about", "_fix", "_geodetic", "_row", "time")
 
-    def __init__(self, about: Airframe, time: Ns, rows: tuple[list[float], list[float], list[float]]) -> None:
+    def __init__(self, about: Airframe, time: Ns, row: bytes) -> None:
         self._about = about
         self.time = time
-        self._memory, self._sensed, self._state = rows
+        self._row: Sequence[float] = memoryview(row).cast("d")
         self._geodetic: Vector | None = None
         self._fix: GpsFix | None = None
 
-    def _value(self, column: int) -> float:
-        return self._memory[column - K_POSITION]
-
     def _vector(self, column: int) -> Vector:
-        at = column - K_POSITION
-        row = self._memory
-        return row[at], row[at + 1], row[at + 2]
+        row = self._row
+        return row[column], row[column + 1], row[column + 2]
 
     def _four(self, column: int) -> tuple[float, float, float, float]:
-        at = column - K_POSITION
-        row = self._memory
-        return row[at], row[at + 1], row[at + 2], row[at + 3]
-
-    def _sample(self, column: int) -> Vector:
-        at = column - M_GYRO
-        row = self._sensed
-        return row[at], row[at + 1], row[at + 2]
+        row = self._row
+        return row[column], row[column + 1], row[column + 2], row[column + 3]
 
     def _about_origin(self, column: int) -> Vector:
-        at, origin = column - K_POSITION, K_ORIGIN - K_POSITION
-        row = self._memory
-        return row[at] - row[origin], row[at + 1] - row[origin + 1], row[at + 2] - row[origin + 2]
+        row = self._row
+        return (
+            row[column] - row[K_ORIGIN],
+            row[column + 1] - row[K_ORIGIN + 1],
+            row[column + 2] - row[K_ORIGIN + 2],
+        )
 
     @property
     def position(self) -> Vector:
@@ -335,17 +325,17 @@ class Estimate:
     @property
     def attitude_ok(self) -> bool:
         """Whether tilt and heading are initialised."""
-        return self._value(K_ALIGNED) > 0.5
+        return self._row[K_ALIGNED] > 0.5
 
     @property
     def position_ok(self) -> bool:
         """Whether horizontal position and velocity are aided by satellites, or were within ten seconds."""
-        return self._value(K_AIDED) > 0.5 and self._value(K_GPS_AGE) < 10.0
+        return self._row[K_AIDED] > 0.5 and self._row[K_GPS_AGE] < 10.0
 
     @property
     def gps_age(self) -> float:
         """Time since the estimator last fused a fix [s]."""
-        return self._value(K_GPS_AGE)
+        return self._row[K_GPS_AGE]
 
     @property
     def sigmas(self) -> tuple[float, float, float, float]:
@@ -355,48 +345,48 @@ class Estimate:
     @property
     def heading_error(self) -> float:
         """Last magnetometer heading less the estimate [rad]."""
-        return self._value(K_HEADING_ERROR)
+        return self._row[K_HEADING_ERROR]
 
     @property
     def gps_innovation(self) -> float:
         """Last horizontal innovation of a fix, in its standard deviations."""
-        return self._value(K_GPS_INNOVATION)
+        return self._row[K_GPS_INNOVATION]
 
     @property
     def gyro(self) -> Vector:
         """Gyroscope sample, forward, right, down [rad/s]."""
-        return self._sample(M_GYRO)
+        return self._vector(M_GYRO)
 
     @property
     def accel(self) -> Vector:
         """Accelerometer sample, forward, right, down [m/s^2]; at rest (0, 0, -9.8)."""
-        return self._sample(M_ACCEL)
+        return self._vector(M_ACCEL)
 
     @property
     def mag(self) -> Vector:
         """Magnetometer sample, forward, right, down [gauss]."""
-        return self._sample(M_MAG)
+        return self._vector(M_MAG)
 
     @property
     def baro_altitude(self) -> float:
         """Barometer sample as height about the world's origin [m up]."""
-        return self._sensed[M_BARO - M_GYRO]
+        return self._row[M_BARO]
 
     @property
     def pressure(self) -> float:
         """Absolute pressure [hPa], by the standard atmosphere at the barometer's height AMSL."""
-        return float(pressure_at(self._about.frame.amsl + self._sensed[M_BARO - M_GYRO])) / 100.0
+        return float(pressure_at(self._about.frame.amsl + self._row[M_BARO])) / 100.0
 
     @property
     def rangefinder(self) -> float | None:
         """Distance to the ground along the body's down axis [m]; None out of range."""
-        distance = self._sensed[M_RANGE - M_GYRO]
+        distance = self._row[M_RANGE]
         return distance if distance >= 0.0 else None
 
     @property
     def fix_type(self) -> int:
         """MAVLink GPS_FIX_TYPE of the receiver's last sample."""
-        return int(self._sensed[M_GPS_FIX - M_GYRO])
+        return int(self._row[M_GPS_FIX])
 
     @property
     def satellites(self) -> int:
@@ -412,33 +402,33 @@ class Estimate:
     def gps(self) -> GpsFix:
         """The receiver's last fix."""
         if self._fix is None:
-            self._fix = _fix_of(self._about, self._sensed)
+            self._fix = _fix_of(self._about, self._row)
         return self._fix
 
     @property
     def battery_volts(self) -> float:
         """Battery voltage at the terminals [V]."""
-        return self._state[S_VOLTS - S_CHARGE]
+        return self._row[S_VOLTS]
 
     @property
     def battery_amps(self) -> float:
         """Battery current [A]."""
-        return self._state[S_AMPS - S_CHARGE]
+        return self._row[S_AMPS]
 
     @property
     def battery_used_mah(self) -> float:
         """Charge drawn since the battery was full [mAh]."""
-        return self._state[0] / 3.6
+        return self._row[S_CHARGE] / 3.6
 
     @property
     def battery_left(self) -> float:
         """Fraction of the battery charge left, 0..1."""
-        return max(0.0, 1.0 - self._state[0] / self._about.capacity_as)
+        return max(0.0, 1.0 - self._row[S_CHARGE] / self._about.capacity_as)
 
     @property
     def battery_energy_j(self) -> float:
         """Energy drawn from the battery since the start [J]."""
-        return self._state[S_ENERGY - S_CHARGE]
+        return self._row[S_ENERGY]
 
     @property
     def motors(self) -> tuple[float, float, float, float]:
@@ -457,17 +447,17 @@ class Estimate:
     @property
     def throttle(self) -> float:
         """Collective 0..1; rover: throttle -1..1."""
-        return self._value(K_THROTTLE)
+        return self._row[K_THROTTLE]
 
     @property
     def hover_throttle(self) -> float:
         """Learnt collective in hover, 0..1."""
-        return self._value(K_HOVER_THROTTLE)
+        return self._row[K_HOVER_THROTTLE]
 
     @property
     def landed(self) -> bool:
         """Whether the landed detector reports landed."""
-        return self._value(K_LANDED) > 0.5
+        return self._row[K_LANDED] > 0.5
 
     @property
     def target(self) -> Vector:

@@ -1,4 +1,4 @@
-"""What can be sent to an ArduPilot, over MAVLink and over MAVROS, and its telemetry decoder."""
+"""What can be sent to an ArduPilot, over MAVLink and over MAVROS."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from volery.links.mavlink_messages import constant
 from volery.ros.graph import Node
 from volery.ros.messages import new
 from volery.vehicles.driver import Acceleration, AttitudeTarget
+from volery.vehicles.drivers.ardupilot.decoder import ArduPilotDecoder
 from volery.vehicles.drivers.ardupilot.modes import (
     FENCE_PARAMETERS,
     LINK_LOSS_PARAMETERS,
     NUMBERS,
     RESTING,
-    mode_name,
 )
 from volery.vehicles.drivers.mavlink.backend import (
     INT_FRAMES,
@@ -33,7 +33,6 @@ from volery.vehicles.drivers.mavlink.backend import (
     acceleration_fields,
 )
 from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
-from volery.vehicles.drivers.mavlink.decoder import Fields, TelemetryDecoder
 from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Telemetry, Velocity
@@ -115,33 +114,6 @@ class ArduPilotBackend(Backend, Protocol):
 
     def start_mission(self) -> None:
         """Start the mission in AUTO, armed."""
-
-
-class ArduPilotDecoder(TelemetryDecoder):
-    """Decodes ArduPilot's mode names and its estimator's EKF_STATUS_REPORT."""
-
-    autopilot = "ArduPilot"
-    resting = RESTING
-
-    def __init__(self, kernel: Kernel, telemetry: Telemetry, *, record: bool = True) -> None:
-        super().__init__(kernel, telemetry, record=record)
-        self._handlers["EKF_STATUS_REPORT"] = self._estimator
-
-    def _global_position(self, fields: Fields) -> None:
-        """Decode the position if the estimator has one.
-
-        Without one it sends where it was last, and as altitude 0 or a height above home that is not one: in a
-        recording of ArduRover both jump by 584 m when the estimator takes over.
-        """
-        if self._estimates_position:
-            super()._global_position(fields)
-            return
-        if self._telemetry.kind == DRONE_KIND:
-            self._telemetry.above_home = fields["relative_alt"] / 1000.0
-        self._heading(fields["hdg"])
-
-    def _mode_name(self, number: int) -> str:
-        return mode_name(self._telemetry.kind, number)
 
 
 class ArduPilotMavlink(MavlinkClient):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rigs.recorded import Recorded
-from volery.vehicles.drivers.ardupilot.backend import ArduPilotDecoder
+from volery.vehicles.drivers.ardupilot.decoder import ArduPilotDecoder
 
 RECORDED = Recorded("ardupilot_telemetry", ArduPilotDecoder)
 replayed, changes = RECORDED.replayed, RECORDED.changes
