@@ -436,11 +436,9 @@ class Vehicle:
     # -- motors
 
     def drive(self, setpoint: Setpoint) -> None:
-        """Pass a set-point to the inner loops within the firmware's limits, unless it is in force already."""
-        setpoint = self.rules.limit(self, setpoint)
-        if setpoint != self._setpoint:
-            self._setpoint = setpoint
-            self.flight.drive(setpoint)
+        """Pass a set-point to the inner loops within the firmware's limits."""
+        self._setpoint = self.rules.limit(self, setpoint)
+        self.flight.drive(self._setpoint)
 
     @property
     def setpoint(self) -> Setpoint:

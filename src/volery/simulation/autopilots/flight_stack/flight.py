@@ -148,8 +148,9 @@ class Flight:
         self.capacity_as = self.spec.battery.capacity_ah * 3600.0
         """Capacity of the battery [A s]."""
         self._airframe = Airframe(self.frame, self.flying, self.capacity_as, sensor_suite(self.spec.sensors))
-        self._row = memoryview(world.arrays.rows[body])
+        self._row = world.rows[body]
         self._latest: Estimate | None = None
+        self._driven: tuple[float, ...] = ()
 
     def estimate(self) -> Estimate:
         """Return the estimate now; the same object until the next grid step."""
@@ -161,7 +162,7 @@ class Flight:
         return latest
 
     def drive(self, setpoint: Setpoint) -> None:
-        """Control to *setpoint* from the next grid step on.
+        """Control to *setpoint* from the next grid step on, unless it is in force already.
 
         Set-points never expire; time-outs belong to the modes.
 
@@ -171,7 +172,9 @@ class Flight:
         row = setpoint.row()
         if not isfinite(sum(row)):
             raise UsageError(f"a set-point must be of finite numbers: {setpoint}")
-        self._world.set_input(self._body, C_CONTROL, *row)
+        if row != self._driven:
+            self._driven = row
+            self._world.set_input(self._body, C_CONTROL, *row)
 
     def truth(self) -> Truth:
         """Return the true state, for recorders and requirements; an autopilot must not use it."""

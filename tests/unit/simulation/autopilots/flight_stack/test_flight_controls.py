@@ -192,6 +192,27 @@ def test_invalid_set_points_are_refused(drone):
         flight.weaken_motor(7, 0.5)
 
 
+def test_a_set_point_that_is_in_force_costs_no_stop_of_the_physics(drone):
+    flown = drone("perfect").ready()
+    advances = []
+    for down in (-5.0, -5.0, -6.0):
+        flown.drive(Control.POSITION, position=(0.0, 0.0, down))
+        before = flown.world.advances
+        flown.wait(0.05)
+        advances.append(flown.world.advances - before)
+    assert advances[0] == advances[2] == advances[1] + 1
+
+
+def test_an_estimate_keeps_its_values_while_the_vehicle_moves_on(drone):
+    flown = drone("perfect").ready()
+    flown.drive(Control.POSITION, position=(0.0, 0.0, -5.0))
+    _, first, _ = flown.wait(2)[-1]
+    kept = first.position, first.gps.velocity, first.battery_amps
+    _, last, _ = flown.wait(1)[-1]
+    assert last.position[2] < first.position[2]
+    assert (first.position, first.gps.velocity, first.battery_amps) == kept
+
+
 def test_an_estimate_is_the_same_object_until_the_next_grid_step(drone):
     flown = drone("perfect")
     first = flown.flight.estimate()
