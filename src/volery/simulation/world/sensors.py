@@ -229,11 +229,11 @@ SENSOR_SUITES: dict[str, SensorSuite] = {
     ),
     "sih": SensorSuite(
         "sih",
-        barometer=ErrorModel(0.1, 0.25, 5.0),
-        gps=GpsReceiver(
-            horizontal=ErrorModel(0.2, 0.1, 30.0),  # white part: SensorGpsSim.cpp
-            vertical=ErrorModel(0.5, 0.3, 30.0),
-            velocity=ErrorModel(0.07, 0.25, 5.0),
+        barometer=ErrorModel(0.1),  # SensorBaroSim.cpp: 1 Pa
+        gps=GpsReceiver(  # SensorGpsSim.cpp
+            horizontal=ErrorModel(0.2),
+            vertical=ErrorModel(0.5),
+            velocity=ErrorModel(0.07),
             rate=8.0,
         ),
     ),

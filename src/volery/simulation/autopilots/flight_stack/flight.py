@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite
 
+import numpy as np
+
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.base.time import Ns
@@ -21,6 +23,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_YAW_P,
     FLIGHT,
     HOLD_HEADING,
+    K_POSITION,
     YAW_ANGLE,
     YAW_ANGLE_AND_RATE,
     YAW_RATE,
@@ -30,6 +33,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     GpsFix,
 )
 from volery.simulation.autopilots.flight_stack.flight_step import advance_flights
+from volery.simulation.world.arithmetic import gaussian
 from volery.simulation.world.body_specs import BodySpec, Multirotor
 from volery.simulation.world.dynamics import cell_voltage
 from volery.simulation.world.environment_models import Terrain, Wind
@@ -49,6 +53,7 @@ from volery.simulation.world.world import STEP, Truth, World
 
 __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
+_FIRST_STREAM = 1000  # of a firmware's own noise
 _FAR = 1e6  # [m] beyond which a point is placed on an unrolled map
 TURNINGS = {
     (False, False): HOLD_HEADING,
@@ -151,6 +156,9 @@ class Flight:
         self._row = world.rows[body]
         self._latest: Estimate | None = None
         self._driven: tuple[float, ...] = ()
+        self.estimate_error: Sequence[float] = ()
+        """Error that the firmware's own estimator adds to the estimate, or empty: of the position [m], then
+        of the velocity [m/s], each north, east, down. The inner loops fly without it."""
 
     def estimate(self) -> Estimate:
         """Return the estimate now; the same object until the next grid step."""
@@ -158,7 +166,12 @@ class Flight:
         if latest is not None and latest.time <= now < latest.time + STEP:
             return latest
         time = self._world.advance_to_now(self._body) * STEP
-        latest = self._latest = Estimate(self._airframe, time, self._row.tobytes())
+        row = self._row.tobytes()
+        if self.estimate_error:
+            values = np.frombuffer(row).copy()
+            values[K_POSITION : K_POSITION + len(self.estimate_error)] += self.estimate_error
+            row = values.tobytes()
+        latest = self._latest = Estimate(self._airframe, time, row)
         return latest
 
     def drive(self, setpoint: Setpoint) -> None:
@@ -187,6 +200,16 @@ class Flight:
             UsageError: The vehicle has no such sensor.
         """
         return self._world.measurement(self._body, sensor)
+
+    def draw(self, stream: int, number: int) -> float:
+        """Return a draw of the firmware's own noise, of zero mean and unit variance.
+
+        Args:
+            stream: Number of the stream; those of the body's sensors are others.
+            number: Counter of the draw.
+        """
+        with np.errstate(over="ignore"):  # hashes wrap around
+            return float(gaussian(self._world.arrays.keys[self._body], _FIRST_STREAM + stream, number))
 
     def set_origin(self) -> None:
         """Use satellites from now on; the origin becomes the receiver's position."""

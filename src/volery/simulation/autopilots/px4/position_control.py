@@ -18,7 +18,15 @@ from volery.base.frames import Vector
 from volery.base.time import Ns, from_seconds, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.flight_stack.guidance import approach, shorten
-from volery.simulation.autopilots.px4.delay_error import STEP, DelayError
+from volery.simulation.autopilots.px4.estimate_error import (
+    GRAVITY,
+    QUIET,
+    STEP,
+    VERTICAL,
+    EstimateError,
+    Noise,
+    sih_noise,
+)
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 SUBSTEP: Final = STEP
@@ -33,8 +41,6 @@ THRUST_LAG: Final = 0.06
 
 HOVER_TIME: Final = 11.0
 """Time constant of the estimated hover thrust (MPC_USE_HTE) [s]."""
-
-GRAVITY: Final = 9.80665
 
 ACCEL_GAIN: Final = 20.0
 """Gain on a velocity error below which the trajectory's acceleration fades linearly [1/s]."""
@@ -166,6 +172,16 @@ def _straight(ahead: Vector, plane: float, along: float) -> Vector:
     return ahead[0] * sideways, ahead[1] * sideways, ahead[2] * upright
 
 
+Noises = tuple[Noise, Noise, Noise]
+Errors = tuple[EstimateError, EstimateError, EstimateError]
+SILENCE: Final[Noises] = (QUIET, QUIET, QUIET)
+
+
+def no_errors() -> Errors:
+    """Return the errors of an estimate that is right now, north, east, down."""
+    return EstimateError(), EstimateError(), EstimateError(VERTICAL)
+
+
 class Wanted(NamedTuple):
     """What the loops control, north, east, down [m, m/s, m/s^2]; NaN: not given."""
 
@@ -177,17 +193,18 @@ class Wanted(NamedTuple):
 class AirframeLoops:
     """Position and velocity loops that fly the recorded airframe.
 
-    Position and velocity are those that EKF2 states; they differ by ``DelayError`` from the flown ones.
+    Position and velocity are those that EKF2 states; they differ by ``EstimateError`` from the flown ones.
     """
 
-    def __init__(self, position: Vector, velocity: Vector) -> None:
+    def __init__(self, position: Vector, velocity: Vector, errors: Errors | None = None) -> None:
         self.position, self.velocity = list(position), list(velocity)
         self.moving = list(velocity)
         """Rate at which the stated position moves [m/s]."""
         self.accel = [0.0, 0.0, 0.0]
-        self._flown = list(velocity)
-        self._errors = DelayError(), DelayError()
-        self._thrust = [DRAG * v for v in velocity]
+        self.errors = errors or no_errors()
+        """Errors of the stated motion, north, east, down."""
+        self._flown = [stated - error.velocity for stated, error in zip(velocity, self.errors, strict=True)]
+        self._thrust = [DRAG * v for v in self._flown]
         self._integral = list(self._thrust)
         self._hover = 1.0
         """Estimated thrust that hovers, over the true one."""
@@ -198,11 +215,10 @@ class AirframeLoops:
         for axis in range(2):
             self.velocity[axis] = self.accel[axis] = self._thrust[axis] = self._integral[axis] = 0.0
             self._flown[axis] = self.moving[axis] = 0.0
-        self._errors = DelayError(), DelayError()
         self._hover = 1.0
 
-    def step(self, gains: Gains, wanted: Wanted, limits: Cruise) -> None:
-        """Fly one substep."""
+    def step(self, gains: Gains, wanted: Wanted, limits: Cruise, noise: Noises = SILENCE) -> None:
+        """Fly one substep; *noise* is that of the sensors, north, east, down."""
         speeds, push, free = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [False, False, False]
         for axis in range(3):
             place, speed, accel = wanted.position[axis], wanted.velocity[axis], wanted.accel[axis]
@@ -213,9 +229,16 @@ class AirframeLoops:
                 speeds[axis] += gains.place[axis] * (place - self.position[axis])
         north, east = shorten(speeds[0], speeds[1], limits.speed)
         down = max(-limits.up, min(limits.down, speeds[2]))
-        self._fly(gains, (north, east, down), push, free)
+        self._fly(gains, (north, east, down), push, free, noise)
 
-    def _fly(self, gains: Gains, speeds: Vector, push: list[float], free: list[bool]) -> None:
+    def _fly(
+        self,
+        gains: Gains,
+        speeds: Vector,
+        push: list[float],
+        free: list[bool],
+        noise: Noises,
+    ) -> None:
         """Fly velocities with accelerations fed forward; a free axis has no velocity loop."""
         miss, integral = [0.0, 0.0, 0.0], self._integral
         for axis in range(3):
@@ -235,23 +258,24 @@ class AirframeLoops:
             if not free[axis]:
                 integral[axis] += gains.integral[axis] * miss[axis] * SUBSTEP
         integral[2] = max(-GRAVITY, min(GRAVITY, integral[2]))
-        self._move(0, north, LEAN_LAG)
-        self._move(1, east, LEAN_LAG)
-        self._move(2, down, THRUST_LAG)
+        self._move(0, north, LEAN_LAG, noise[0])
+        self._move(1, east, LEAN_LAG, noise[1])
+        self._move(2, down, THRUST_LAG, noise[2])
         self._estimate_hover(given, push[2])
 
-    def _move(self, axis: int, wanted: float, lag: float) -> None:
+    def _move(self, axis: int, wanted: float, lag: float, noise: Noise) -> None:
         """Advance one axis by a substep under a commanded acceleration, which it follows with a lag [s]."""
-        before = self._flown[axis]
-        thrust = self._thrust[axis] + SUBSTEP / lag * (wanted - self._thrust[axis])
+        error, before = self.errors[axis], self._flown[axis]
+        thrust = self._thrust[axis] + SUBSTEP / lag * (wanted - error.tilt - self._thrust[axis])
         accel = thrust - DRAG * before
         speed = before + accel * SUBSTEP
-        self._thrust[axis], self.accel[axis], self._flown[axis] = thrust, accel, speed
+        self._thrust[axis], self.accel[axis], self._flown[axis] = thrust, accel + error.tilt, speed
         moving, stated = 0.5 * (before + speed), speed
         if axis < 2:
-            error = self._errors[axis]
-            error.step(speed, accel)
-            moving, stated = moving + error.rate, stated + error.velocity
+            error.step(speed, accel, noise)
+        elif noise is not QUIET:
+            error.step(0.0, 0.0, noise)
+        moving, stated = moving + error.rate, stated + error.velocity
         self.position[axis] += moving * SUBSTEP
         self.moving[axis], self.velocity[axis] = moving, stated
 
@@ -272,6 +296,9 @@ class PositionLoops:
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._vehicle = vehicle
+        self._noisy = vehicle.flight.spec.sensors == "sih"
+        """Whether the loops fly after the noise of gyroscope and accelerometer. That of the other sets is at
+        most a fortieth of SIH's, and left out."""
         self._loops: AirframeLoops | None = None
         self._trajectory: Trajectory | None = None
         self._last: Ns = 0
@@ -291,12 +318,13 @@ class PositionLoops:
             velocity = (0.0, 0.0, climb) if self._vehicle.landed else _vector(loops.velocity)
             trajectory = self._trajectory = Trajectory(_vector(loops.position), velocity)
         limits, gains = self._limits(), Gains(self._vehicle)
-        for _ in range(steps):
+        for number in range(-steps, 0):
             trajectory.step(gains, point, cruise, loops.position, SUBSTEP)
             loops.step(
                 gains,
                 Wanted(_vector(trajectory.position), _vector(trajectory.velocity), _vector(trajectory.accel)),
                 limits,
+                self._noise(number),
             )
         self._follow(loops, yaw, None)
 
@@ -312,9 +340,16 @@ class PositionLoops:
         loops, steps = self._advanced()
         self._trajectory = None
         limits, gains = self._limits()._replace(up=up), Gains(self._vehicle)
-        for _ in range(steps):
-            loops.step(gains, wanted, limits)
+        for number in range(-steps, 0):
+            loops.step(gains, wanted, limits, self._noise(number))
         self._follow(loops, yaw, yaw_rate)
+
+    def _noise(self, number: int) -> Noises:
+        """Return the noise of a substep, counted from the last one; sensors other than SIH's give none."""
+        if not self._noisy:
+            return SILENCE
+        flight, step = self._vehicle.flight, self._last // from_seconds(SUBSTEP) + number
+        return sih_noise(lambda stream: flight.draw(stream, step), self._vehicle.estimate.attitude[2])
 
     def _limits(self) -> Cruise:
         tuning = self._vehicle.tuning
@@ -325,10 +360,13 @@ class PositionLoops:
         vehicle, loops, now = self._vehicle, self._loops, self._vehicle.kernel.now()
         here = vehicle.estimate.position
         if loops is None or now - self._last > RESTART_AFTER or dist(loops.position, here) > ELSEWHERE:
-            loops = self._loops = AirframeLoops(here, vehicle.estimate.velocity)
+            errors = loops.errors if loops is not None and self._noisy else None
+            loops = self._loops = AirframeLoops(here, vehicle.estimate.velocity, errors)
             self._trajectory, self._last = None, now
         elif vehicle.landed:
             loops.stand(here)
+            if not self._noisy:
+                loops.errors = no_errors()
         steps = round(to_seconds(now - self._last) / SUBSTEP)
         self._last += from_seconds(steps * SUBSTEP)
         return loops, steps
@@ -336,9 +374,18 @@ class PositionLoops:
     def _follow(self, loops: AirframeLoops, yaw: float | None, yaw_rate: float | None) -> None:
         """Let the flight stack follow the airframe of the loops."""
         vehicle, here = self._vehicle, self._vehicle.estimate.position
+        moving, accel = list(loops.moving), list(loops.accel)
+        if self._noisy:
+            for axis, error in enumerate(loops.errors):
+                moving[axis] -= error.rate
+                accel[axis] -= error.tilt
+            vehicle.flight.estimate_error = (
+                *(error.position for error in loops.errors),
+                *(error.velocity for error in loops.errors),
+            )
         north, east, down = (
             v + FOLLOW_LEAD * a + FOLLOW_GAIN * (place - at)
-            for place, v, a, at in zip(loops.position, loops.moving, loops.accel, here, strict=True)
+            for place, v, a, at in zip(loops.position, moving, accel, here, strict=True)
         )
         vehicle.drive(
             Setpoint(

@@ -1,6 +1,7 @@
 """Estimates against the true state."""
 
 import math
+from statistics import fmean, pstdev
 
 import pytest
 
@@ -164,3 +165,23 @@ def test_fixes_arrive_at_the_declared_rate(drone):
         flown = drone(sensors)
         first = flown.wait(1)[-1][1].gps.count
         assert flown.wait(10)[-1][1].gps.count - first == 10 * rate
+
+
+def test_an_error_of_the_firmwares_estimator_is_in_the_estimate_alone(drone):
+    flown = drone("perfect").hover()
+    before, truth = flown.wait(0.05)[0][1:]
+    flown.flight.estimate_error = 0.5, -0.25, 0.1, 0.2, 0.3, -0.1
+    after, same = flown.wait(0.05)[0][1:]
+    pairs = zip(after.position + after.velocity, before.position + before.velocity, strict=True)
+    moved = [a - b for a, b in pairs]
+    assert moved == pytest.approx([0.5, -0.25, 0.1, 0.2, 0.3, -0.1], abs=1e-3)
+    assert same.position == pytest.approx(truth.position, abs=1e-3)
+
+
+def test_the_firmwares_own_noise_follows_from_seed_stream_and_number(drone):
+    first, second = drone(seed=1).flight, drone(seed=2).flight
+    draws = [first.draw(stream, number) for stream in range(4) for number in range(500)]
+    assert first.draw(1, 7) == draws[507]
+    assert second.draw(1, 7) != draws[507]
+    assert fmean(draws) == pytest.approx(0.0, abs=0.1)
+    assert pstdev(draws) == pytest.approx(1.0, abs=0.05)

@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from volery import Drone, Options, Position, fly, sleep
+from volery.simulation.autopilots.px4.estimate_error import QUIET, Noise
 from volery.simulation.autopilots.px4.position_control import (
     SUBSTEP,
     AirframeLoops,
@@ -30,7 +32,7 @@ PARAMETERS = {
     "MPC_Z_VEL_I_ACC": 2.0,
     "MPC_Z_VEL_D_ACC": 0.0,
 }
-LIMITS = Cruise(12.0, 3.0, 1.5)
+CRUISE = Cruise(12.0, 3.0, 1.5)
 
 
 def gains() -> Gains:
@@ -42,7 +44,7 @@ def flown(velocity: tuple[float, float, float], seconds: float) -> AirframeLoops
     nothing = float("nan")
     loops, wanted = AirframeLoops((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), Wanted(*[(nothing,) * 3] * 3)
     for _ in range(round(seconds / SUBSTEP)):
-        loops.step(gains(), wanted._replace(velocity=velocity), LIMITS)
+        loops.step(gains(), wanted._replace(velocity=velocity), CRUISE)
     return loops
 
 
@@ -73,4 +75,33 @@ def test_the_stated_position_is_ahead_of_the_flown_one() -> None:
     loops = flown((4.8, 0.0, 0.0), 60.0)
     assert loops.position[0] > 0.0
     assert loops.moving[0] == pytest.approx(4.8, abs=0.02)
-    assert loops._errors[0].position == pytest.approx(0.06 * 4.8, abs=0.01)
+    assert loops.errors[0].position == pytest.approx(0.06 * 4.8, abs=0.01)
+
+
+def test_what_is_wrong_with_the_tilt_pushes_the_aircraft_the_other_way() -> None:
+    """The attitude loops hold the estimated tilt: a gyroscope's error of 0.3 m/s^2 moves the aircraft."""
+    nothing = float("nan")
+    loops = AirframeLoops((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    wanted = Wanted(*[(nothing,) * 3] * 3)._replace(velocity=(0.0, 0.0, 0.0))
+    loops.step(gains(), wanted, CRUISE, (Noise(tilt=0.3), QUIET, QUIET))
+    for _ in range(50):
+        loops.step(gains(), wanted, CRUISE)
+    assert loops._flown[0] < -0.1
+    assert abs(loops.velocity[0]) < 0.05
+
+
+def test_the_noise_of_a_flight_follows_from_its_seed() -> None:
+    def hovered(seed: int) -> list[Position]:
+        places = []
+
+        def hover(drone: Drone) -> None:
+            drone.takeoff(5)
+            for _ in range(10):
+                sleep(1)
+                places.append(drone.position)
+
+        fly(hover, "sim:px4?start=warm&sensors=sih", Options(seed=seed))
+        return places
+
+    assert hovered(1) == hovered(1)
+    assert hovered(1) != hovered(2)
