@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from struct import Struct
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -55,9 +54,6 @@ from volery.simulation.world.state_layout import (
 
 STEP: Final[Ns] = 2 * MS
 """Grid step: 500 Hz."""
-
-STATE_VALUES: Final = Struct(f"{STATE}d")
-"""The state at the beginning of a row."""
 
 
 class Truth(NamedTuple):
@@ -169,8 +165,6 @@ class World:
         if not count:
             raise UsageError("a world without bodies; give at least one")
         self.arrays = _initial_arrays(self.specs, seed, frame, wind or Wind(), terrain or Terrain(), columns)
-        self.rows = [memoryview(row) for row in self.arrays.rows]
-        """Row of each body, to read after ``advance_to_now``; cheaper than through numpy."""
         self._reached = self.arrays.reached.data
         self._read = self.arrays.read.data
         self._span = self.arrays.span.data
@@ -218,15 +212,16 @@ class World:
     def truth(self, body: int) -> Truth:
         """Return the true state of *body* now."""
         step = self.advance_to_now(body)
-        row = STATE_VALUES.unpack_from(self.rows[body])
+        row = self.arrays.rows[body, :STATE].tolist()
+        capacity = float(self.arrays.rows[body, P_CAPACITY])
         return Truth(
             time=step * STEP,
-            position=row[S_POSITION : S_POSITION + 3],
-            velocity=row[S_VELOCITY : S_VELOCITY + 3],
-            attitude=row[S_ATTITUDE : S_ATTITUDE + 4],
-            rates=row[S_RATES : S_RATES + 3],
-            rotors=row[S_ROTORS : S_ROTORS + 4],
-            battery_left=max(0.0, 1.0 - row[S_CHARGE] / self.rows[body][P_CAPACITY]),
+            position=tuple(row[S_POSITION : S_POSITION + 3]),
+            velocity=tuple(row[S_VELOCITY : S_VELOCITY + 3]),
+            attitude=tuple(row[S_ATTITUDE : S_ATTITUDE + 4]),
+            rates=tuple(row[S_RATES : S_RATES + 3]),
+            rotors=tuple(row[S_ROTORS : S_ROTORS + 4]),
+            battery_left=max(0.0, 1.0 - row[S_CHARGE] / capacity),
             charge_as=row[S_CHARGE],
             energy_j=row[S_ENERGY],
             payload_j=row[S_PAYLOAD_ENERGY],

@@ -153,7 +153,7 @@ class Flight:
         self.capacity_as = self.spec.battery.capacity_ah * 3600.0
         """Capacity of the battery [A s]."""
         self._airframe = Airframe(self.frame, self.flying, self.capacity_as, sensor_suite(self.spec.sensors))
-        self._row = world.rows[body]
+        self._row = memoryview(world.arrays.rows[body])
         self._latest: Estimate | None = None
         self._driven: tuple[float, ...] = ()
         self.estimate_error: Sequence[float] = ()
