@@ -23,7 +23,7 @@ from greenlet import GreenletExit, getcurrent, greenlet
 from volery.base.errors import Deadlock, UsageError
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import PeriodicAction
-from volery.kernel.bell import Bell
+from volery.kernel.auto_reset_event import AutoResetEvent
 from volery.kernel.event_heap import EventHeap, heappop, heappush, heapreplace
 from volery.kernel.interrupts import LONGEST_WAIT_S, Interrupts, Watchdog
 from volery.kernel.task import Cancelled, ExecutionContext, Scope, Task
@@ -49,15 +49,15 @@ class Pacer:
             raise UsageError(f"a pace of {pace}: give seconds per second on the wall, above 0")
         self._pace = pace
         self._anchor: tuple[int, Ns] | None = None  # one instant in wall time and in virtual time
-        self._bell = Bell()
+        self._wake_up = AutoResetEvent()
 
     def rest(self) -> None:
         """Stop virtual time until the next ``wait``."""
         self._anchor = None
 
-    def ring(self) -> None:
+    def wake_up(self) -> None:
         """End the wait in progress, or else the next one; from any thread."""
-        self._bell.ring()
+        self._wake_up.set()
 
     def wait(self, now: Ns, when: Ns) -> Ns | None:
         """Wait for `when`, ns; return None if it has come, else the time after a wait, perhaps short."""
@@ -67,7 +67,7 @@ class Pacer:
         ahead = to_seconds(when - virtual) / self._pace - to_seconds(monotonic_ns() - wall)
         if ahead <= 0.0:
             return None
-        self._bell.wait(min(ahead, LONGEST_WAIT_S))
+        self._wake_up.wait(min(ahead, LONGEST_WAIT_S))
         passed = int((monotonic_ns() - wall) * self._pace)
         return max(now, min(virtual + passed, when))
 
@@ -164,7 +164,7 @@ class VirtualKernel:
         self._inbox.append(action)
         self._horizon = NEVER
         if self._pacer is not None:
-            self._pacer.ring()
+            self._pacer.wake_up()
 
     def spawn(self, body: Action, name: str, context: ExecutionContext, scope: Scope | None = None) -> Task:
         """Start a task at this instant, after what is already due."""

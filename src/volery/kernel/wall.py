@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Self
 from volery.base.errors import UsageError
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import PeriodicAction
-from volery.kernel.bell import Bell
+from volery.kernel.auto_reset_event import AutoResetEvent
 from volery.kernel.interrupts import LONGEST_WAIT_S, Interrupts
 from volery.kernel.task import MAX_SWALLOWED_CANCELLATIONS, Cancelled, ExecutionContext, Scope, Task
 from volery.trace.events import Record, ignore
@@ -72,7 +72,7 @@ class WallKernel:
         self._heap: list[tuple[Ns, int, Entry]] = []
         self._tickets = count(1)
         self._inbox: deque[Action] = deque()
-        self._bell = Bell()  # wakes the hub
+        self._wake_up = AutoResetEvent()  # wakes the hub
         self._local = threading.local()
         self._adopted: Task | None = None
         self._fault: BaseException | None = None
@@ -99,7 +99,7 @@ class WallKernel:
         with self._monitor:
             heappush(self._heap, (when, next(self._tickets), entry))
             if self._heap[0][2] is entry:
-                self._bell.ring()
+                self._wake_up.set()
         return entry
 
     def every(self, period: Ns, action: Action) -> PeriodicAction:
@@ -109,7 +109,7 @@ class WallKernel:
     def post(self, action: Action) -> None:
         """Execute a framework callback as soon as possible; from any thread, and from signal handlers."""
         self._inbox.append(action)
-        self._bell.ring()
+        self._wake_up.set()
 
     def spawn(self, body: Action, name: str, context: ExecutionContext, scope: Scope | None = None) -> Task:
         """Start a task; before the run has begun, the task waits for that."""
@@ -144,7 +144,7 @@ class WallKernel:
         with self._monitor:
             task.done = True
             task.scope.tasks.remove(task)
-            self._bell.ring()
+            self._wake_up.set()
             self._gone.notify_all()
 
     def _fail(self, error: BaseException) -> None:
@@ -155,7 +155,7 @@ class WallKernel:
                 self.wake(self._adopted)
             else:
                 self._fault = self._fault or error
-                self._bell.ring()
+                self._wake_up.set()
 
     def _raise_fault(self) -> None:
         fault, self._fault = self._fault, None
@@ -228,7 +228,7 @@ class WallKernel:
             scope.mark(why)
             for task in scope.all_tasks():
                 self.wake(task)
-            self._bell.ring()
+            self._wake_up.set()
 
     def _cancel_task(self, task: Task) -> None:
         task.deliver_cancellation()
@@ -285,7 +285,7 @@ class WallKernel:
         return True
 
     def _wait(self, due: Ns) -> None:
-        self._bell.wait(min(self._wall_seconds(due), LONGEST_WAIT_S))
+        self._wake_up.wait(min(self._wall_seconds(due), LONGEST_WAIT_S))
 
     def _begin(self) -> None:
         with self._monitor:
@@ -308,7 +308,7 @@ class WallKernel:
     def _stop(self) -> None:
         if self._hub is not None:
             self._stopping = True
-            self._bell.ring()
+            self._wake_up.set()
             self._hub.join()
             self._hub = None
 
@@ -415,7 +415,7 @@ class FollowingKernel(WallKernel):
             self._now += max(0, by)
             for task in self.root.all_tasks():
                 task.flow.woken.notify()  # it checks itself whether its deadline has passed
-            self._bell.ring()
+            self._wake_up.set()
 
     def _wall_seconds(self, until: Ns) -> float:
         return 0.0 if until <= self._now else LONGEST_WAIT_S

@@ -274,7 +274,7 @@ def test_a_pacer_lets_pass_what_passes_on_the_wall_and_makes_nothing_good(
     pacer = Pacer(2.0)
 
     def cut_short(now: int, when: int) -> int | None:
-        pacer.ring()
+        pacer.wake_up()
         return pacer.wait(now, when)
 
     assert cut_short(0, 10 * S) == 0
