@@ -42,8 +42,8 @@ receiver states 0.75 m/s and 1.78 m; of the barometer the filter believes 3.5 m 
 
 Gains = tuple[tuple[float, float, float], tuple[float, float, float]]
 
-LEVEL: Final[Gains] = (FROM_VELOCITY, FROM_POSITION)
-VERTICAL: Final[Gains] = (FROM_CLIMB, FROM_HEIGHT)
+LEVEL: Gains = (FROM_VELOCITY, FROM_POSITION)
+VERTICAL: Gains = (FROM_CLIMB, FROM_HEIGHT)
 
 PREDICTOR_LAG: Final = 0.25
 """EKF2_TAU_VEL, EKF2_TAU_POS [s]."""
