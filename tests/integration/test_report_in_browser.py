@@ -147,6 +147,12 @@ def test_the_slider_moves_the_vehicles_and_tells_the_time(open_page: Any, folder
     assert page.evaluate("stage.now") > 100
 
 
+def test_what_rounds_to_zero_has_no_sign(open_page: Any, folders: list[Path]) -> None:
+    page = open_page(folders[0] / "report.html")
+    shown = page.evaluate("[-0.04, 0.04, -0.06, -10].map(stage.tenths)")
+    assert shown == ["0.0", "0.0", "-0.1", "-10.0"]
+
+
 def test_a_vehicle_can_be_followed_and_the_map_zoomed(open_page: Any, folders: list[Path]) -> None:
     page = open_page(folders[0] / "report.html")
     whole = picture(page, "#map")

@@ -1,6 +1,6 @@
 // Curves over time and processor load, with the time that is shown as a line through all of them.
 (() => {
-  const { data, at, before, colour, series, clock, element: make } = stage;
+  const { data, at, before, tenths, colour, series, clock, element: make } = stage;
   const margin = { left: 46, right: 10, top: 8, bottom: 22 };
 
   function niceStep(span, count) {
@@ -97,7 +97,7 @@
       ink: series(index),
       value: (time) => {
         const found = at(vehicle[key].t, vehicle[key].v, time);
-        return Number.isNaN(found) ? "" : found.toFixed(1);
+        return Number.isNaN(found) ? "" : tenths(found);
       },
     }));
     frame(holder, name, [low, high], unit, (context, place) => {

@@ -1,6 +1,6 @@
 // The slider, the play button, and what stands beside the map.
 (() => {
-  const { data, at, current, clock, series, element: make } = stage;
+  const { data, at, tenths, current, clock, series, element: make } = stage;
   const slider = document.getElementById("time");
   if (!slider) return;
   const rate = document.getElementById("rate");
@@ -42,9 +42,9 @@
       mode.textContent = entry ? entry[1] + (entry[2] ? "" : " · disarmed") : "not yet seen";
       const words = [];
       if (vehicle.kind !== "rover" && vehicle.height.t.length) {
-        words.push(at(vehicle.height.t, vehicle.height.v, time).toFixed(1) + " m");
+        words.push(tenths(at(vehicle.height.t, vehicle.height.v, time)) + " m");
       }
-      if (vehicle.speed.t.length) words.push(at(vehicle.speed.t, vehicle.speed.v, time).toFixed(1) + " m/s");
+      if (vehicle.speed.t.length) words.push(tenths(at(vehicle.speed.t, vehicle.speed.v, time)) + " m/s");
       if (vehicle.battery.t.length) words.push(Math.round(at(vehicle.battery.t, vehicle.battery.v, time)) + " %");
       numbers.textContent = words.join("  ·  ");
     }

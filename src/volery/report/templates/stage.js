@@ -24,6 +24,9 @@ const stage = (() => {
     return values[index] + share * (values[index + 1] - values[index]);
   }
 
+  // A number with one decimal, without the sign of what is rounded to zero.
+  const tenths = (value) => value.toFixed(1).replace(/^-0\.0$/, "0.0");
+
   // The last entry of a list of [time, ...] that has begun by `time`.
   function current(entries, time, timeOf) {
     let found = null;
@@ -70,7 +73,7 @@ const stage = (() => {
   dark.addEventListener("change", () => redraws.forEach((redraw) => redraw()));
 
   return {
-    data, before, at, current, colour, series, clock, canvas,
+    data, before, at, tenths, current, colour, series, clock, canvas,
     element(tag, classes, text) {
       const made = document.createElement(tag);
       if (classes) made.className = classes;
