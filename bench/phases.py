@@ -4,7 +4,8 @@ The reference is what was recorded of ArduCopter 4.5.6 (SITL), PX4 1.14 (SIH, me
 Paparazzi after v6.2 (NPS, `ardrone2`, mean of four), with the same mission file and without wind. The ratio
 is simulated over recorded; PX4's is the mean of 24 seeds, with the noise of SIH's sensors. A figure
 marked with * is more than 5 per cent (times) or 10 per cent (others) off. PX4's figures are computed from the
-traces that `volery fly` wrote of the firmware, by the functions that compute the simulated ones.
+traces that `volery fly` wrote of the firmware, by the functions that compute the simulated ones. The
+simulated PX4 is recorded as a real vehicle is: armed since the heartbeat that says so, up to a second late.
 
     python bench/phases.py [ardupilot|px4|paparazzi ...]
 """
@@ -15,7 +16,7 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from math import dist, hypot, nan
+from math import dist, hypot, isnan, nan
 from pathlib import Path
 from statistics import fmean
 from typing import NamedTuple
@@ -23,6 +24,7 @@ from typing import NamedTuple
 import volery
 from volery import AboveHome, Position
 from volery.base.frames import LocalFrame
+from volery.run.assembly.vehicles import ObservedVehicles
 from volery.trace.events import Operation, VehicleState
 from volery.trace.reader import Reading
 
@@ -37,8 +39,11 @@ FLIGHTS = {"px4": tuple(range(1, 25))}
 """Seeds of the flights whose mean is compared; else one flight with seed 1. The noise of SIH's sensors makes
 times of single flights differ by some seconds."""
 
-RATE = 10
-"""States a second."""
+OBSERVED = frozenset({"px4"})
+"""Autopilots whose recorded figures were computed from what telemetry reported."""
+
+WINDOW = 10
+"""States over which a velocity is taken."""
 
 NEAR_M = 1.0
 LIFTED_M, NEARLY_UP_M = 0.3, 9.5
@@ -81,7 +86,7 @@ def level_leg(drone: volery.Drone) -> None:
 
 
 class Flight:
-    """A simulated flight: operations, and the states that the autopilot reports, 10 Hz, metres about home."""
+    """A simulated flight: operations, and the states that the autopilot reports, 5 Hz, metres about home."""
 
     def __init__(
         self, autopilot: str, seed: int = 1, flown: Callable[[volery.Drone], None] = mission
@@ -89,17 +94,28 @@ class Flight:
         sensors = SENSORS.get(autopilot, "consumer")
         url = f"sim:{autopilot}?start=warm&sensors={sensors}"
         with tempfile.TemporaryDirectory() as folder:
-            run = volery.fly(flown, url, volery.Options(seed=seed, out=Path(folder)))
+            observed, origin = autopilot in OBSERVED, [HOME]
+
+            def recorded(drone: volery.Drone) -> None:
+                if observed:
+                    drone.wait_ready()
+                    ObservedVehicles(drone.kernel, [drone]).sample()
+                    origin.append(drone.position)
+                flown(drone)
+
+            run = volery.fly(recorded, url, volery.Options(seed=seed, out=Path(folder)))
             assert run.completed, run.record.outcome.reason
             with Reading(Path(folder) / "trace.mcap") as reading:
                 events = list(reading.events())
         (self.record,) = run.record.vehicles.values()
         self.operations = [one for one in events if isinstance(one, Operation)]
-        states = as_estimated([one for one in events if isinstance(one, VehicleState)])
+        states = as_estimated(
+            [one for one in events if isinstance(one, VehicleState) and isnan(one.x) == observed]
+        )
         first = next(number for number, one in enumerate(states) if one.armed)
         last = max(number for number, one in enumerate(states) if one.armed)
         self.states = states[first : last + 2]
-        frame = LocalFrame(HOME.latitude, HOME.longitude, HOME.altitude.metres)
+        frame = LocalFrame(origin[-1].latitude, origin[-1].longitude, origin[-1].altitude.metres)
         self.goals = [
             frame.to_enu(latitude, longitude, amsl)
             for latitude, longitude, amsl in (
@@ -169,14 +185,14 @@ class Flight:
 
 
 def as_estimated(states: Sequence[VehicleState]) -> Sequence[VehicleState]:
-    """Return states with the positions that the autopilot reports and their velocity over a second."""
+    """Return states with the positions that the autopilot reports and their velocity over ``WINDOW``."""
     reported = [one._replace(x=one.estimated_x, y=one.estimated_y, z=one.estimated_z) for one in states]
-    seconds = RATE * (states[1].at - states[0].at) / 1e9
-    moved = zip(reported, reported[RATE:], reported[RATE // 2 :], strict=False)
+    seconds = WINDOW * (states[1].at - states[0].at) / 1e9
+    moved = zip(reported, reported[WINDOW:], reported[WINDOW // 2 :], strict=False)
     return [
         now._replace(vx=(b.x - a.x) / seconds, vy=(b.y - a.y) / seconds, vz=(b.z - a.z) / seconds)
         for a, b, now in moved
-    ] + reported[-RATE // 2 :]
+    ] + reported[-WINDOW // 2 :]
 
 
 def speed(one: VehicleState) -> float:
