@@ -1,6 +1,6 @@
 """ROS calls, estimated and measured on this machine: the paper's Tables III and IV for other nodes.
 
-Ten rounds. In each, a probe of roscpp and one of rospy measure what calls cost (calibration), while eight
+Ten rounds. In each, a probe of roscpp and one of rospy measure what calls cost (calibration), while the
 nodes of each library run on a real master and are measured from outside: both see the same machine, whatever
 else it does. What is estimated is a simulation of the
 same models, priced with the medians of the calibration. The nodes stand in bench/ros_nodes and were written

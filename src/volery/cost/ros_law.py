@@ -45,7 +45,18 @@ NOT_COUNTED = (
 )
 """What the law leaves out, as phrases for a report."""
 
-BACKGROUND_EVENTS = ("receive", "connect", "accept", "wait")
+WARMER_CALLS = {
+    f"{call}{ending}": f"{call}{than}"
+    for call in ("publish", "receive")
+    for ending, than in (("_next", ""), ("_often", ""), ("_next_often", "_next"))
+}
+"""Calls shortly after the library has sent or received (``next``), when its threads are awake, and in loops
+of some 20 ms (``often``), where caches are warmer; each with the call whose price holds where a law does not
+distinguish them."""
+
+BACKGROUND_EVENTS = (
+    "receive", "receive_next", "receive_often", "receive_next_often", "connect", "accept", "wait"
+)  # fmt: skip
 """Events beside calls, which cost nothing where a law has no figure.
 
 A message is received; a subscription connects to a publisher; a publisher accepts a subscription's
@@ -55,16 +66,6 @@ connection; x microseconds pass in ``spin``.
 SERVICE_CALLS = ("call_service", "serve")
 """A request, for its caller and for its server: they cost nothing where a law has no figure."""
 
-WARMER_CALLS = {
-    "publish_next": "publish",
-    "publish_often": "publish",
-    "publish_next_often": "publish_next",
-}
-"""Calls shortly after the library has sent or received (``next``), when its threads are awake, and in loops
-of some 20 ms (``often``), where caches are warmer; each with the call whose price holds where a law does not
-distinguish them."""
-
-_DEPENDENT = ("publish", *WARMER_CALLS, "sleep", "wait")
 _SPIN = {1.0: "spin_once_first", 0.0: "spin_once_next"}
 _MAX_CACHED = 4096
 """Prices that a tariff keeps; sleeps of many different lengths must not fill the memory."""
@@ -186,17 +187,17 @@ class Tariff:
 
     def _compute(self, call: str, x: float) -> Price:
         name = _SPIN.get(x, call) if call == "spin_once" else call
-        if name in (*BACKGROUND_EVENTS, *SERVICE_CALLS) and name not in self._parts:
-            return self._keep(call, x, NO_PRICE)
         while name not in self._parts and name in WARMER_CALLS:
             name = WARMER_CALLS[name]
+        if name in (*BACKGROUND_EVENTS, *SERVICE_CALLS) and name not in self._parts:
+            return self._keep(call, x, NO_PRICE)
         if name not in self._parts:
             raise EstimateError(
                 f"no figure for the ROS call {name!r} of {self.law.client} on {self.law.processor}; "
                 f"there is {choices(self._parts)}"
             )
         constant, per_x = self._parts[name]
-        variable = per_x * x if name in _DEPENDENT else 0.0
+        variable = per_x * x
         if constant < 0.0 or variable < 0.0:
             raise EstimateError(
                 f"the {self.law.client} figures of {self.law.processor} give a negative time for {name!r} at "
@@ -218,7 +219,7 @@ class Tariff:
             return Price(0, whole, flags)
         if name in self._callers:
             fixed, per_x = self._callers[name]
-            caller = min(whole, max(0, round(fixed + (per_x * x if name in _DEPENDENT else 0.0))))
+            caller = min(whole, max(0, round(fixed + per_x * x)))
             return Price(caller, whole - caller, flags)
         return Price(round(constant), round(variable), flags)
 

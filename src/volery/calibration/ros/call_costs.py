@@ -96,6 +96,8 @@ class _RoundAnalysis:
         self._by_name: Mapping[str, list[Sample]] = _grouped(samples)
         nothing = self._by_name.get("nothing", [])
         self._own = median([one.each(clock) for one in nothing]) if nothing else 0.0
+        waiting = self._by_name.get("wait", [])
+        self._wait = median([getattr(one, clock) / one.waited_ns for one in waiting]) if waiting else 0.0
         settling = self._by_name.get("settle", [])
         waited = sum(one.waited_ns for one in settling)
         spent = sum(one.each(clock) - self._own for one in settling)
@@ -144,26 +146,38 @@ class _RoundAnalysis:
     def hearing(self) -> Iterable[Point]:
         """Cycles that publish and spin, minus those that publish; waiting with messages, minus without."""
         both, spinning = self._by_name.get("publish_both", []), self._by_name.get("spin_once", [])
-        for without, one in zip(both, spinning, strict=False):
-            yield "spin_once_next", 0.0, one.each(self._clock) - without.each(self._clock)
-        waiting, receiving = self._by_name.get("wait", []), self._by_name.get("receive", [])
-        for quiet, one in zip(waiting, receiving, strict=False):
-            anyway = getattr(quiet, self._clock) * one.waited_ns / quiet.waited_ns
-            yield "receive", 0.0, (getattr(one, self._clock) - anyway) / one.cycles
+        spins = [
+            one.each(self._clock) - without.each(self._clock)
+            for without, one in zip(both, spinning, strict=False)
+        ]
+        yield from (("spin_once_next", 0.0, value) for value in spins)
+        spin = median(spins) if spins else 0.0  # priced when the callback begins
+        first: dict[str, list[float]] = {}
+        for one in self._by_name.get("receive", []):
+            first.setdefault(_by_period(one), []).append(self._received(one) - spin)
+        for often, values in first.items():
+            yield from ((f"receive{often}", 0.0, value) for value in values)
+        for one in self._by_name.get("receive_burst", []):
+            often = _by_period(one, one.x)
+            following = (self._received(one) - spin) * one.x - median(first[often])
+            yield f"receive_next{often}", 0.0, following / (one.x - 1.0)
 
     def services(self) -> Iterable[Point]:
         """Yield cycles with a request minus idle ones, and waiting with requests minus without."""
         idle, calling = self._by_name.get("idle_before_call", []), self._by_name.get("call_service", [])
         for without, whole in zip(idle, calling, strict=False):
             yield "call_service", 0.0, whole.each(self._clock) - without.each(self._clock)
-        for quiet, one in zip(self._by_name.get("wait", []), self._by_name.get("serve", []), strict=False):
-            anyway = getattr(quiet, self._clock) * one.waited_ns / quiet.waited_ns
-            yield "serve", 0.0, (getattr(one, self._clock) - anyway) / one.cycles
+        for one in self._by_name.get("serve", []):
+            yield "serve", 0.0, self._received(one)
+
+    def _received(self, one: Sample) -> float:
+        """Return the time of one message or request that was received while the process waited, ns."""
+        return one.each(self._clock) - self._wait * one.waited_ns / one.cycles
 
 
-def _by_period(one: Sample) -> str:
-    """Return the ending of the names of calls in cycles as short as these."""
-    return "_often" if one.waited_ns < OFTEN_NS * one.cycles else ""
+def _by_period(one: Sample, topics: float = 1.0) -> str:
+    """Return the ending of the names of calls in cycles as short as these, of one message of each topic."""
+    return "_often" if one.waited_ns * topics < OFTEN_NS * one.cycles else ""
 
 
 def _grouped(samples: Round) -> dict[str, list[Sample]]:

@@ -139,6 +139,12 @@ def uncertain_costs(rounds: Iterable[Round], within: float) -> tuple[CallCost, .
 CALLBACK = ("spin_once_first", "spin_once_next")
 """Calls that the embedded graph prices when a callback begins."""
 
+NO_SPIN = CallFigures(
+    provenance="calculated",
+    source="rospy has no spinOnce: a message has its whole price where it is received",
+    constant=Line(offset=0.0),
+)
+
 _PUBLICATIONS = (("publish", "publish_next"), ("publish_often", "publish_next_often"))
 _UNITS = {
     **{call: "subscriber" for pair in _PUBLICATIONS for call in pair},
@@ -150,11 +156,8 @@ _UNITS = {
 def ros_law(costs: Mapping[str, CallCost], under: Conditions) -> RosLaw:
     """Return the law at the frequency of a campaign."""
     calls = {call: _figures(cost) for call, cost in _with_slope(costs).items()}
-    if CALLBACK[1] not in calls and "receive" in calls:  # rospy: its threads call back as messages come
-        received = calls.pop("receive").model_copy(
-            update={"note": "rospy has no spinOnce: this is what a message takes until its callback begins"}
-        )
-        calls.update(dict.fromkeys(CALLBACK, received))
+    if CALLBACK[1] not in calls:
+        calls.update(dict.fromkeys(CALLBACK, NO_SPIN))
     rounds = max((len(values) for cost in costs.values() for values in cost.points.values()), default=0)
     return RosLaw(
         client=under.client,

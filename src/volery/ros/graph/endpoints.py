@@ -226,9 +226,7 @@ class EmbeddedSubscription:
         now = kernel.now()
         if not node.graph.unrecorded:
             kernel.record(Message(sent, now, self.topic, publisher, node.name, size))
-        if node.processor is not None:
-            node.note_traffic(now)
-            node.charge_background("receive")
+        node.charge_background("receive")
         queue = self._queue
         if len(queue) == self.qos.depth:
             queue.popleft()  # its turn in the group goes to the next oldest

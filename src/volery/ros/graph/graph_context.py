@@ -245,7 +245,7 @@ class NodeContext:
         if call == "sleep":
             self._slept += x
         elif call == "publish":
-            priced = self._publication(now)
+            priced = self._by_rest(call, now)
         caller = background = 0
         if self._tariff is not None:
             cost = self._tariff(priced, x)
@@ -270,7 +270,7 @@ class NodeContext:
             return now
         caller = background = 0
         for connections in subscribers:
-            priced = self._publication(at)
+            priced = self._by_rest("publish", at)
             if tariff is not None:
                 cost = tariff(priced, float(connections))
                 caller += cost.caller
@@ -281,19 +281,15 @@ class NodeContext:
             kernel.record(Charge(now, self.id.component, self.id.processor, kind, caller, background, 0.0))
         return self._execute(now, caller, background)
 
-    def note_traffic(self, at: Ns) -> bool:
-        """Record that the node sends or receives at ``at``; return whether it rested before."""
+    def _by_rest(self, call: str, at: Ns) -> str:
+        """Return the name by which a law prices a message that is sent or received at ``at``."""
         rest = at - self._last_traffic
         self._last_traffic = at
         if rest < WARM:
-            return False
-        self._rest = rest
-        return True
-
-    def _publication(self, at: Ns) -> str:
-        """Return the name by which a law prices a publication at ``at``."""
-        name = "publish" if self.note_traffic(at) else "publish_next"
-        return name if self._rest >= REST else f"{name}_often"
+            call += "_next"
+        else:
+            self._rest = rest
+        return call if self._rest >= REST else call + "_often"
 
     def _execute(self, now: Ns, caller: Ns, background: Ns) -> Ns:
         """Execute what has been charged at *now*; return the time at which the caller's part has been."""
@@ -318,7 +314,7 @@ class NodeContext:
         processor = self.processor
         if processor is None or self._tariff is None:
             return
-        cost = self._tariff(what, x)
+        cost = self._tariff(self._by_rest(what, self.kernel.now()) if what == "receive" else what, x)
         background = cost.caller + cost.background
         if not background:
             return

@@ -90,11 +90,12 @@ class Cost(Protocol):
 Tariff = Callable[[str, float], Cost]
 """``tariff(call, x)``: the cost of one call of a node. The calls are ``init``, ``node_handle``,
 ``advertise``, ``subscribe``, ``advertise_service``, ``service_client``, ``publish`` (x = subscribers of the
-topic), ``publish_next`` (a ``publish`` less than a millisecond after the node has sent or received),
-``publish_often`` and ``publish_next_often`` (the same where the node rested for less than 32 ms before),
-``sleep`` (x = microseconds slept) and ``spin_once`` (x = 1 for the first of a group, 0 after it). Costs
-beside the calls are ``receive`` (a message arrives), ``connect`` (a subscription is connected to a
-publisher), ``accept`` (a publisher to a subscription) and ``wait`` (x = microseconds without sleep)."""
+topic), ``sleep`` (x = microseconds slept) and ``spin_once`` (x = 1 for the first of a group, 0 after it).
+Costs beside the calls are ``receive`` (a message arrives), ``connect`` (a subscription is connected to a
+publisher), ``accept`` (a publisher to a subscription) and ``wait`` (x = microseconds without sleep).
+``publish`` and ``receive`` become ``publish_next`` and ``receive_next`` less than a millisecond after the
+node has sent or received, and any of the four gets the ending ``_often`` where the node rested for less than
+32 ms before."""
 
 Tariffs = Callable[[NodeId], Tariff | None]
 """``tariffs(node)``: the tariff of a node, requested once when it joins; None where calls take no time."""

@@ -19,7 +19,7 @@ ONCE = {
 }
 PUBLISH, PER_SUBSCRIBER, AGAIN = 75_000.0, 18_000.0, 40_000.0
 SLEEP, PER_US = 14_000.0, 1.05
-ACCEPT, SPIN, RECEIVE = 480_000.0, 5_000.0, 90_000.0
+ACCEPT, SPIN, RECEIVE, RECEIVE_NEXT = 480_000.0, 5_000.0, 90_000.0, 30_000.0
 PERIOD_US = 50_000.0
 WARMER = 0.75
 """Cost of a publication in cycles of less than 32 ms, relative to longer ones."""
@@ -65,5 +65,9 @@ class Probe:
             samples.append(self._sample("spin_once_first", 0, 1, 20_000.0))
             samples.append(self._sample("spin_once", 0, CYCLES, both + SPIN))
         samples.append(self._sample("wait", 0, 1, 2e6, 1e9))
-        samples.append(self._sample("receive", 0, 20, 1e5 + RECEIVE, 1e9))
+        for messages, warm in ((20, 1.0), (50, WARMER)):  # in a second
+            idle, burst = 2e6 / messages, warm * (RECEIVE + 4 * RECEIVE_NEXT)
+            spin = SPIN if self._spins else 0.0
+            samples.append(self._sample("receive", 1, messages, idle + warm * RECEIVE + spin, 1e9))
+            samples.append(self._sample("receive_burst", 5, 5 * messages, (idle + burst) / 5 + spin, 1e9))
         return tuple(samples)

@@ -14,6 +14,7 @@ from .ros_rounds import (
     PER_US,
     PUBLISH,
     RECEIVE,
+    RECEIVE_NEXT,
     SLEEP,
     SPIN,
     WARMER,
@@ -42,6 +43,13 @@ def test_publications_in_short_cycles_have_figures_of_their_own() -> None:
     ):
         assert found[call].typical == pytest.approx(cost, rel=1e-3)
         assert found[f"{call}_often"].typical == pytest.approx(WARMER * cost, rel=1e-3)
+
+
+def test_messages_that_follow_each_other_or_come_often_have_figures_of_their_own() -> None:
+    found = call_costs([Probe().round() for _ in range(3)])
+    for ending, warm in (("", 1.0), ("_often", WARMER)):
+        assert found[f"receive{ending}"].typical == pytest.approx(warm * RECEIVE, rel=1e-3)
+        assert found[f"receive_next{ending}"].typical == pytest.approx(warm * RECEIVE_NEXT, rel=1e-3)
 
 
 def test_exact_points_leave_no_residual_and_are_tight() -> None:

@@ -9,7 +9,7 @@ from volery.calibration.ros.call_costs import call_costs
 from volery.calibration.ros.campaign import Conditions, format_line, plot_svg, ros_law, write_entry
 from volery.cost import RosLaw, load_catalogue
 
-from .ros_rounds import AGAIN, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, SLEEP, Probe
+from .ros_rounds import AGAIN, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, RECEIVE_NEXT, SLEEP, WARMER, Probe
 
 MACHINE = Machine("my-computer", "A Processor of Mine", 2, 2600.0)
 
@@ -71,12 +71,12 @@ def test_a_second_frequency_makes_lines_of_points(tmp_path: Path) -> None:
     assert "1300 to 2600 MHz" in entry.ros["roscpp"].validity
 
 
-def test_messages_are_charged_to_callbacks_of_rospy(tmp_path: Path) -> None:
+def test_callbacks_of_rospy_are_priced_where_their_message_arrives(tmp_path: Path) -> None:
     write_entry(tmp_path / "all.yaml", MACHINE, law("rospy", spins=False))
     prices = load_catalogue(tmp_path / "all.yaml").processor("my-computer").ros_law("rospy").at(2600)
-    callback = prices("spin_once", 0)
-    assert callback.caller + callback.background == pytest.approx(RECEIVE, rel=1e-3)
-    assert prices("receive") == (0, 0, ())
+    assert prices("spin_once", 1.0)[:2] == prices("spin_once", 0.0)[:2] == (0, 0)
+    assert prices("receive").background == pytest.approx(RECEIVE, rel=1e-3)
+    assert prices("receive_next_often").background == pytest.approx(WARMER * RECEIVE_NEXT, rel=1e-3)
 
 
 def test_other_entries_of_the_file_are_kept(tmp_path: Path) -> None:

@@ -206,6 +206,28 @@ def test_publications_of_a_fast_loop_are_priced_as_often(rig: Any) -> None:
     assert calls == [*slow, *fast, *fast, *slow]
 
 
+def test_messages_that_arrive_together_or_often_are_priced_as_such(rig: Any) -> None:
+    def talker() -> None:
+        node = rig.graph.node("talker")
+        publishers = [node.advertise(topic, STRING) for topic in ("chat", "talk")]
+        for pause in (50, 20, 50):
+            rig.kernel.sleep_until(rig.kernel.now() + pause * MS)
+            for publisher in publishers:
+                publisher.publish(messages.new(STRING))
+
+    def hearer() -> None:
+        node = rig.graph.node("hearer")
+        for topic in ("chat", "talk"):
+            node.subscribe(topic, STRING, lambda message: None)
+
+    rig.task(hearer, "hearer", on_processor=True)
+    rig.task(talker, "talker", on_processor=True)
+    rig.kernel.run(S)
+    calls = [call for name, call, _ in rig.asked if name == "/hearer" and call.startswith("receive")]
+    slow = ["receive", "receive_next"]
+    assert calls == [*slow, "receive_often", "receive_next_often", *slow]
+
+
 @pytest.mark.parametrize("priced", [True, False])
 def test_a_request_costs_its_caller_and_its_server_what_the_law_says(rig: Any, priced: bool) -> None:
     if priced:

@@ -15,7 +15,9 @@ from typing import Any, NamedTuple, Protocol
 
 CONNECT_S, SETTLE_S, GLANCE_S = 10.0, 0.1, 0.05
 SPIN_BLOCKS = 2.5
-"""Blocks of receiving, which are longer since messages are rarer than cycles."""
+"""Blocks of waiting and of receiving every 50 ms, which are longer since messages are rarer than cycles."""
+FEEDS_MS, FEED_TOPICS = (50, 20), 5
+"""Periods of the peers' topics, and how many of each are published at once."""
 HALF_S = 0.5
 FEW, MANY = 2.0, 8.0
 """Subscribers of topics that are published just after another."""
@@ -372,33 +374,42 @@ class Probe:
         self._block("call_service", 0, self._periods_s[0], call)
 
     def serving(self) -> None:
-        """Measure waiting with requests; waiting without is measured before each reception."""
+        """Measure waiting with requests."""
         end = self._client.serve()
-        wait, none = self._client.wait, received[0]
-        _until(lambda: (wait(GLANCE_S), received[0] > none)[1])
-        wait(SETTLE_S)
-        before = received[0]
-        measured = Measured()
-        wait(SPIN_BLOCKS * self._block_s)
-        measured.report("serve", 0, max(1, received[0] - before))
+        self._receive("serve", SPIN_BLOCKS, 1)
         end()
 
     def receiving(self) -> None:
-        """Measure waiting for messages without and with messages."""
+        """Measure waiting without messages, with those of one topic, and of several published at once."""
         wait = self._client.wait
         time.sleep(SETTLE_S)
         measured = Measured()
         wait(SPIN_BLOCKS * self._block_s)
         measured.report("wait", 0, 1)
-        feed = self._client.subscribe("calibration/feed")
-        none = received[0]
+        for period_ms in FEEDS_MS:
+            blocks = SPIN_BLOCKS * period_ms / FEEDS_MS[0]
+            feeds = [self._feed(period_ms, 0)]
+            self._receive("receive", blocks, 1)
+            feeds += [self._feed(period_ms, number) for number in range(1, FEED_TOPICS)]
+            self._receive("receive_burst", blocks, FEED_TOPICS)
+            for feed in feeds:
+                feed.close()
+
+    def _feed(self, period_ms: int, number: int) -> Ends:
+        """Subscribe to one of the peers' topics; return when it is connected."""
+        feed = self._client.subscribe(f"calibration/feed_{period_ms}_{number}")
+        _until(lambda: feed.peers() > 0)
+        return feed
+
+    def _receive(self, what: str, blocks: float, topics: int) -> None:
+        """Measure waiting with messages of so many topics."""
+        wait, none = self._client.wait, received[0]
         _until(lambda: (wait(GLANCE_S), received[0] > none)[1])
         wait(SETTLE_S)
         before = received[0]
         measured = Measured()
-        wait(SPIN_BLOCKS * self._block_s)
-        measured.report("receive", 0, max(1, received[0] - before))
-        feed.close()
+        wait(blocks * self._block_s)
+        measured.report(what, topics, max(1, received[0] - before))
 
 
 def _numbers(text: str) -> list[float]:

@@ -27,6 +27,8 @@ const int kSettleMs = 100;
 const int kFew = 2, kMany = 8;  // subscribers of topics that are published just after another
 const int kFollowing = 4;       // and how many topics, for a difference above the noise
 const double kSpinBlocks = 2.5;  // messages are rarer than cycles
+const int kFeedsMs[] = {50, 20};  // periods of the peers' topics
+const int kFeedTopics = 5;        // and how many of each are published at once
 
 long received = 0;
 
@@ -190,29 +192,8 @@ void spin_for(double ms) {
   while (ns(CLOCK_MONOTONIC) < end) ros::getGlobalCallbackQueue()->callAvailable(ros::WallDuration(0.1));
 }
 
-void receiving(ros::NodeHandle& node, double block_ms) {
-  pause(kSettleMs);
-  Measured waiting;
-  spin_for(kSpinBlocks * block_ms);
-  waiting.report("wait", 0, 1);
-  ros::Subscriber feed = node.subscribe("calibration/feed", 10, onMessage);
-  const long none = received;
-  until([none] {
-    ros::spinOnce();
-    return received > none;
-  });
-  pause(kSettleMs);
-  ros::spinOnce();
-  const long before = received;
-  Measured measured;
-  spin_for(kSpinBlocks * block_ms);
-  measured.report("receive", 0, std::max(1L, received - before));
-  feed.shutdown();
-}
-
-// Measures waiting with requests; waiting without is measured before each reception.
-void serving(ros::NodeHandle& node, double block_ms) {
-  ros::ServiceServer server = node.advertiseService("calibration/answer", onRequest);
+// Measures waiting with messages or requests, from the first one on.
+void receive(const char* what, double x, double blocks, double block_ms) {
   const long none = received;
   until([none] {
     ros::spinOnce();
@@ -221,8 +202,34 @@ void serving(ros::NodeHandle& node, double block_ms) {
   spin_for(kSettleMs);
   const long before = received;
   Measured measured;
+  spin_for(blocks * block_ms);
+  measured.report(what, x, std::max(1L, received - before));
+}
+
+// Measures waiting without messages, with those of one topic, and of several published at once.
+void receiving(ros::NodeHandle& node, double block_ms) {
+  pause(kSettleMs);
+  Measured waiting;
   spin_for(kSpinBlocks * block_ms);
-  measured.report("serve", 0, std::max(1L, received - before));
+  waiting.report("wait", 0, 1);
+  for (int period_ms : kFeedsMs) {
+    const double blocks = kSpinBlocks * period_ms / kFeedsMs[0];
+    const std::string name = "calibration/feed_" + std::to_string(period_ms) + "_";
+    std::vector<ros::Subscriber> feeds;
+    const auto add = [&] {
+      feeds.push_back(node.subscribe(name + std::to_string(feeds.size()), 10, onMessage));
+      until([&] { return feeds.back().getNumPublishers() > 0; });
+    };
+    add();
+    receive("receive", 1, blocks, block_ms);
+    while (feeds.size() < kFeedTopics) add();
+    receive("receive_burst", kFeedTopics, blocks, block_ms);
+  }
+}
+
+void serving(ros::NodeHandle& node, double block_ms) {
+  ros::ServiceServer server = node.advertiseService("calibration/answer", onRequest);
+  receive("serve", 1, kSpinBlocks, block_ms);
 }
 }  // namespace
 

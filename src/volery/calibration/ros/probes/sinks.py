@@ -2,8 +2,9 @@
 
 ``sinks.py rospy`` or ``sinks.py rclpy``: eight nodes in one process. Topic ``calibration/to_N`` has N
 subscribers, and so has ``calibration/next_K_N`` for each K; ``calibration/quiet`` has a publisher that never
-publishes, ``calibration/feed`` one that publishes twenty times a second. Service ``calibration/served``
-answers; ``calibration/answer``, a service of the probe, is called twenty times a second while it is there.
+publishes, ``calibration/feed_MS_K`` for each K one that publishes every 20 or 50 ms, all K at once. Service
+``calibration/served`` answers; ``calibration/answer``, a service of the probe, is called twenty times a
+second while it is there.
 For rclpy it does not import volery: that runs in the Python that has rclpy.
 """
 
@@ -17,7 +18,9 @@ from typing import Any
 MOST = 8
 FOLLOWING, COUNTS = 4, (2, 8)
 """Topics that probes publish just after another, and their numbers of subscribers."""
-FEED_S, ABSENT_S = 0.05, 0.25
+FEEDS_MS, FEED_TOPICS = (20, 50), 5
+"""Periods of the topics that are fed, and how many topics of each are published at once."""
+REQUEST_S, ABSENT_S = 0.05, 0.25
 
 
 def _ignore(message: Any) -> None:
@@ -46,6 +49,11 @@ def _topics(number: int) -> list[str]:
     return [*(f"calibration/to_{count}" for count in range(number, MOST + 1)), *after]
 
 
+def _feed(period_ms: int) -> list[str]:
+    """Return the topics that are published at once with one period."""
+    return [f"calibration/feed_{period_ms}_{number}" for number in range(FEED_TOPICS)]
+
+
 def _rospy_node(number: int) -> Any:
     rospy = import_module("volery.ros.transports.ros1.rospy_copy").rospy_copy()
     rospy.init_node(f"calibration_sink_{number}", disable_signals=True)
@@ -59,24 +67,30 @@ def run_rospy() -> None:
     message: Any = import_module("std_msgs.msg").Float64MultiArray
     nodes = [_rospy_node(number) for number in range(1, MOST + 1)]
     quiet = nodes[0].Publisher("calibration/quiet", message, queue_size=10)
-    feed = nodes[0].Publisher("calibration/feed", message, queue_size=10)
     trigger: Any = import_module("std_srvs.srv")
     nodes[1].Service("calibration/served", trigger.Trigger, lambda request: trigger.TriggerResponse())
     call = nodes[1].ServiceProxy("calibration/answer", trigger.Trigger)
     over = _over()
 
     def request() -> None:
-        wait = FEED_S
+        wait = REQUEST_S
         while not over.wait(wait):
             try:
                 call()
-                wait = FEED_S
+                wait = REQUEST_S
             except Exception:  # rospy's own errors, of each copy of rospy: the probe does not serve now
                 wait = ABSENT_S
 
+    def feed(period_ms: int) -> None:
+        topics = [nodes[0].Publisher(topic, message, queue_size=10) for topic in _feed(period_ms)]
+        while not over.wait(period_ms / 1e3):
+            for topic in topics:
+                topic.publish(message(data=[0.0] * 4))
+
     threading.Thread(target=request, daemon=True).start()
-    while not over.wait(FEED_S):
-        feed.publish(message(data=[0.0] * 4))
+    for period_ms in FEEDS_MS:
+        threading.Thread(target=feed, args=(period_ms,), daemon=True).start()
+    over.wait()
     del quiet
     for rospy in nodes:
         rospy.signal_shutdown("the campaign is over")
@@ -94,12 +108,19 @@ def run_rclpy() -> None:
         for topic in _topics(number):
             node.create_subscription(kind, topic, _ignore, 10)
     quiet = nodes[0].create_publisher(kind, "calibration/quiet", 10)
-    feed = nodes[0].create_publisher(kind, "calibration/feed", 10)
-    nodes[0].create_timer(FEED_S, lambda: feed.publish(kind(data=[0.0] * 4)))
+
+    def feed(period_ms: int) -> None:
+        topics = [nodes[0].create_publisher(kind, topic, 10) for topic in _feed(period_ms)]
+        publish = lambda: [topic.publish(kind(data=[0.0] * 4)) for topic in topics]  # noqa: E731 - a callback
+        nodes[0].create_timer(period_ms / 1e3, publish)
+
+    for period_ms in FEEDS_MS:
+        feed(period_ms)
     trigger: Any = import_module("std_srvs.srv").Trigger
     nodes[1].create_service(trigger, "calibration/served", lambda request, response: response)
     caller = nodes[1].create_client(trigger, "calibration/answer")
-    nodes[1].create_timer(FEED_S, lambda: caller.service_is_ready() and caller.call_async(trigger.Request()))
+    request = lambda: caller.service_is_ready() and caller.call_async(trigger.Request())  # noqa: E731 - a callback
+    nodes[1].create_timer(REQUEST_S, request)
     over = _over()
     while not over.is_set():
         executor.spin_once(timeout_sec=0.5)
