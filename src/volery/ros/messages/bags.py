@@ -10,7 +10,7 @@ import bz2
 import shutil
 import struct
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from io import BytesIO
@@ -36,14 +36,14 @@ from rosbags.rosbag2 import ReaderError as Reader2Error
 from rosbags.rosbag2 import StoragePlugin, storage_mcap
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.rosbag2 import WriterError as Writer2Error
-from rosbags.typesys import get_types_from_idl, get_types_from_msg
+from rosbags.typesys import get_types_from_idl
 from rosbags.typesys.base import TypesysError
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, S
 from volery.ros.messages.encodings import from_cdr, from_ros1, our_name, ros1_type, to_cdr, to_ros1
 from volery.ros.messages.message import Message
-from volery.ros.messages.store import message_class, message_name, store
+from volery.ros.messages.store import message_class, message_name, parse_messages, store
 
 _LENGTH = struct.Struct("<I")
 _STAMP = struct.Struct("<II")
@@ -405,9 +405,8 @@ def _learn(topic: str, name: str, text: str, unreadable: dict[str, str], *, idl:
     """Define unknown types from the recording's definitions."""
     if name in store().fielddefs:
         return
-    parse: Callable[..., Any] = get_types_from_idl if idl else get_types_from_msg
     try:
-        parsed = parse(text) if idl else parse(text, name)
+        parsed = get_types_from_idl(text) if idl else parse_messages(name, text)
         store().register({key: what for key, what in parsed.items() if key not in store().fielddefs})
     except (RecursionError, SyntaxError, *DAMAGE) as error:  # classes are made of source code
         problem = str(error)

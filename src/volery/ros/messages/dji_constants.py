@@ -50,6 +50,12 @@ def aircraft_of(hardware: str) -> str:
     return next((name for start, name in _NAMES_OF_HARDWARE.items() if hardware.startswith(start)), hardware)
 
 
+DRONE_TYPES: Mapping[int, str] = {0: M100, 1: M210, 2: M300, 3: M600}
+"""Aircraft by the number that ``get_drone_type`` of the vehicle node of 4.1 returns."""
+OTHER_DRONE_TYPE = 255
+"""Number of an aircraft that has none."""
+
+
 class DisplayMode(IntEnum):
     """Flight modes in ``display_mode``."""
 
@@ -212,6 +218,23 @@ class MissionAck(IntEnum):
     POINTS_TOO_CLOSE = 0xE5
     POINTS_TOO_FAR_APART = 0xE6
     BUSY = 0xF0
+
+
+class WaypointType(IntEnum):
+    """Ways to a waypoint of the second kind, in ``waypointType``."""
+
+    CURVE = 0
+    CURVE_AND_STOP = 1
+    STRAIGHT_AND_STOP = 2
+    COORDINATED = 3
+
+
+class HeadingMode(IntEnum):
+    """Headings on the way to a waypoint of the second kind, in ``headingMode``."""
+
+    AUTO = 0
+    FIXED = 1
+    BY_WAYPOINT = 3
 
 
 NO_CODE = 255

@@ -6,6 +6,7 @@ types serve the comparison with rclpy's classes.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
@@ -16,6 +17,8 @@ from volery.ros.messages import lazy_rosbags as rosbags
 from volery.ros.messages.message import DurationValue, Field, Header, Message, Nothing, TimeValue, make_class
 
 _ID = "unique_identifier_msgs/UUID goal_id\n"
+_CONSTANT = re.compile(r"^([ \t]*\w+[ \t]+)([A-Za-z]\w*)(?=[ \t]*=)", re.MULTILINE)
+_CAPITALS = re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*")
 
 
 def interface_messages(name: str, text: str) -> dict[str, str]:
@@ -84,13 +87,42 @@ def store() -> rosbags.Typestore:
     return humble
 
 
+def parse_messages(name: str, text: str) -> dict[str, Any]:
+    """Return the constants and fields of the messages that a definition has, by name, as rosbags states them.
+
+    rosbags takes names of constants in capitals only, as ROS 2 demands; ROS 1 takes any, and they are part of
+    a type's checksum. Other names are replaced while the definition is parsed.
+
+    Args:
+        name: Name of the message.
+        text: Its definition; others may follow it, as in a rosbag.
+
+    Raises:
+        TypesysError: The definition is none. The error is of rosbags.
+    """
+    names: dict[str, str] = {}
+
+    def with_capitals(found: re.Match[str]) -> str:
+        if _CAPITALS.fullmatch(found[2]):
+            return found[0]
+        substitute = f"SUBSTITUTE_{len(names)}"
+        names[substitute] = found[2]
+        return found[1] + substitute
+
+    parsed = rosbags.get_types_from_msg(_CONSTANT.sub(with_capitals, text), name)
+    return {
+        full: ([(names.get(one, one), *rest) for one, *rest in constants], fields)
+        for full, (constants, fields) in parsed.items()
+    }
+
+
 def _register(into: rosbags.Typestore, texts: dict[str, str]) -> None:
     parsed = {}
     for name, text in texts.items():
         try:
             # a service's halves read as messages, so that unqualified types are looked for among them
             read_as = name.replace("/srv/", "/msg/").replace("/action/", "/msg/")
-            [parsed[name]] = rosbags.get_types_from_msg(text, read_as).values()
+            [parsed[name]] = parse_messages(read_as, text).values()
         except rosbags.TypesysError as error:
             raise UsageError(f"{name}: not a ROS message definition: {error}") from error
     for name, (_, fields) in parsed.items():

@@ -81,7 +81,7 @@ def test_unknown_types_are_defined_from_the_recording(tmp_path: Path) -> None:
     path = tmp_path / "odd.bag"
     with Writer(path) as writer:
         connection = writer.add_connection(
-            "/odd", "odd_msgs/msg/Pair", msgdef="int32 one\nint32 two\n", md5sum="0" * 32
+            "/odd", "odd_msgs/msg/Pair", msgdef="int32 kOne=1\nint32 one\nint32 two\n", md5sum="0" * 32
         )
         writer.write(connection, 5, b"\1\0\0\0\2\0\0\0")
     (read,) = open_bag(path).messages()

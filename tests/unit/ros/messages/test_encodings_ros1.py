@@ -25,6 +25,9 @@ SERVICES = {
     "std_srvs/SetBool": "09fb03525b03e7ea1fd3992bafd87e16",
     "std_srvs/Trigger": "937c9679a518e3a18d831e57125ea522",
     "mavros_msgs/CommandBool": "e09abbb4e5bae6b558e5010966eb6e9e",
+    "dji_osdk_ros/GetDroneType": "87cc5c5bc9c0355af48cf3dac961c235",
+    "dji_osdk_ros/InitWaypointV2Setting": "f07b42d879472cc58a4d50076253c8e6",
+    "dji_osdk_ros/DownloadWaypointV2Mission": "4b9a6e8c58bda1e8d747c69006bbc940",
 }
 DIFFERENT = {
     "shape_msgs/msg/SolidPrimitive",

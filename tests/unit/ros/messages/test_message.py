@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -127,6 +129,12 @@ def test_own_types_can_be_defined() -> None:
     kind = messages.service("parcel_msgs/Order")
     asked = kind.request(messages.new("parcel_msgs/Parcel", good="blood", flags=1))
     assert messages.from_cdr(asked.__msgtype__, messages.to_cdr(asked)).parcel.good == "blood"
+
+
+def test_constants_may_have_small_letters_as_in_ros_1() -> None:
+    messages.define("mixed_msgs/msg/Mode", "uint8 kManual = 3\nuint8 A__B=4\nstring Name=a = b\nuint8 mode\n")
+    kind: Any = messages.message_class("mixed_msgs/msg/Mode")
+    assert (kind.kManual, kind.A__B, kind.Name, kind.__match_args__) == (3, 4, "a = b", ("mode",))
 
 
 def test_a_definition_holds_the_types_it_is_made_of() -> None:

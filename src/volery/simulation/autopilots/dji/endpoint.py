@@ -34,6 +34,7 @@ from volery.ros.messages.dji_constants import (
 )
 from volery.simulation.autopilots.dji.flight_controller import FlightController, controller_of
 from volery.simulation.autopilots.dji.sdk_services import Answer, Services
+from volery.simulation.autopilots.dji.waypoint_v2 import WaypointV2Services
 from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import Text
 
@@ -335,7 +336,8 @@ class DjiEndpoint:
         self._listen(node, package)
         services = Services(self.controller, self._publish_reference)
         group = node.group(self._start_next if package == NEW_NAMES else self._start)
-        for served in services.table(package):
+        second_kind = WaypointV2Services(self.controller).table() if package == NEW_NAMES else ()
+        for served in (*services.table(package), *second_kind):
             node.serve(served.name, served.type, partial(self._answer, served.answer), group)
         if self._on:
             self.start()

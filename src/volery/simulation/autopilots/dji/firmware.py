@@ -238,7 +238,8 @@ DOCUMENTED: Mapping[str, Source] = {
     "low battery": Source("goes home after 10 s; critical: lands at once; both override the program", GUIDES),
     "missions": Source(
         f"{MIN_WAYPOINTS} to {MAX_WAYPOINTS} waypoints, {LONGEST_PATH_M / 1000:g} km; action {STAY_ACTION} "
-        "stays for milliseconds; the upload takes 1 s and 1 s for each waypoint; an M300 takes none",
+        "stays for milliseconds; the upload takes 1 s and 1 s for each waypoint. An M300 takes those of a "
+        "second kind only (`waypointV2_…`), in radians, without a stay",
         f"{GUIDES}; nodes 3.8 and 4.1",
     ),
     "vehicle node of 4.1": Source(

@@ -32,6 +32,7 @@ from volery.simulation.autopilots.dji.sdk_commands import (
     GO_HOME_AT_END,
     LAND_AT_END,
     LONGEST_PATH_M,
+    MAX_WAYPOINTS,
     NO_ACTION,
     NO_EXIT,
     YAW_BY_WAYPOINT,
@@ -407,11 +408,11 @@ class FlightController:
 
     # -- missions
 
-    def upload(self, task: Any) -> int:
-        """Replace the mission if it is valid."""
+    def upload(self, task: Any, most: int = MAX_WAYPOINTS) -> int:
+        """Replace the mission if it is valid and has at most so many waypoints."""
         if not self.has_authority:
             return MissionAck.NEEDS_AUTHORITY
-        found = mission_refusal(task)
+        found = mission_refusal(task, most)
         code = NO_CODE if found else self._place_refusal(task)
         if code:
             why = found or MissionAck(code).name.lower().replace("_", " ")

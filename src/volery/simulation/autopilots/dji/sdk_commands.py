@@ -233,12 +233,12 @@ STOP_S = 0.1
 """Stop at each waypoint, unless turns are coordinated [s]."""
 
 
-def mission_refusal(task: Any) -> str:
-    """Return why a mission is refused, or an empty text."""
+def mission_refusal(task: Any, most: int) -> str:
+    """Return why a mission is refused, or an empty text; ``most`` is its greatest number of waypoints."""
     points = task.mission_waypoint
     low, high = MISSION_SPEEDS
-    if not MIN_WAYPOINTS <= len(points) <= MAX_WAYPOINTS:
-        return f"{len(points)} waypoints; {MIN_WAYPOINTS} to {MAX_WAYPOINTS}"
+    if not MIN_WAYPOINTS <= len(points) <= most:
+        return f"{len(points)} waypoints; {MIN_WAYPOINTS} to {most}"
     if not (low <= task.velocity_range <= high and low <= task.idle_velocity <= task.velocity_range):
         return f"speeds {task.idle_velocity:g} and {task.velocity_range:g} m/s; {low:g} to {high:g}"
     for number, point in enumerate(points, start=1):

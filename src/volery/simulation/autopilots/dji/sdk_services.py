@@ -15,6 +15,7 @@ from volery.base.frames import heading_to_yaw
 from volery.base.time import Ns, S
 from volery.ros.messages import message_class
 from volery.ros.messages.dji_constants import (
+    DRONE_TYPES,
     GO_HOME_ALTITUDES,
     HARDWARE,
     HORIZONTAL,
@@ -24,6 +25,7 @@ from volery.ros.messages.dji_constants import (
     NEW_NAMES,
     NO_CODE,
     OLD_NAMES,
+    OTHER_DRONE_TYPE,
     TAKE_PICTURE,
     AuthorityAck,
     DisplayMode,
@@ -83,7 +85,7 @@ Row = tuple[str, str, Callable[[Any], int]]
 """Name, type and handler, which returns the code of the aircraft."""
 
 
-def _accepting(prefix: str, package: str, *rows: Row) -> tuple[Served, ...]:
+def accepting(prefix: str, package: str, *rows: Row) -> tuple[Served, ...]:
     """Return services that answer whether a request is accepted: its code is 0."""
 
     def served(name: str, kind: str, handle: Callable[[Any], int]) -> Served:
@@ -130,7 +132,7 @@ class Services:
     def _services_3_8(self) -> tuple[Served, ...]:
         controller = self._controller
         return (
-            *_accepting(
+            *accepting(
                 f"{OLD_NAMES}/",
                 OLD_NAMES,
                 ("activation", "Activation", lambda _: _plain(controller.activate())),
@@ -143,7 +145,7 @@ class Services:
             ),
             Served(f"{OLD_NAMES}/sdk_control_authority", _AUTHORITY, self._authority),
             Served(f"{OLD_NAMES}/drone_task_control", _TASK, self._task),
-            *_accepting(f"{OLD_NAMES}/", OLD_NAMES, ("camera_action", "CameraAction", self._camera_action)),
+            *accepting(f"{OLD_NAMES}/", OLD_NAMES, ("camera_action", "CameraAction", self._camera_action)),
             Served(f"{OLD_NAMES}/query_drone_version", f"{OLD_NAMES}/srv/QueryDroneVersion", self._version),
         )
 
@@ -183,11 +185,12 @@ class Services:
         controller = self._controller
         controller.activate_at_power_on()
         return (
+            Served("get_drone_type", f"{NEW_NAMES}/srv/GetDroneType", self._drone_type),
             Served("flight_task_control", _FLIGHT_TASK, self._flight_task),
             Served("gimbal_task_control", _GIMBAL_TASK, self._gimbal_task),
             _failing(NEW_NAMES, "obtain_release_control_authority", "ObtainControlAuthority", self._obtain),
             _failing(NEW_NAMES, "kill_switch", "KillSwitch", self._kill),
-            *_accepting(
+            *accepting(
                 "",
                 NEW_NAMES,
                 ("emergency_brake", "EmergencyBrake", lambda _: _plain(controller.brake())),
@@ -211,6 +214,11 @@ class Services:
                 ("set_home_point", "SetHomePoint", lambda request: _plain(self._home_point(request))),
             ),
         )
+
+    def _drone_type(self, _request: Any) -> Reply:
+        aircraft = self._controller.aircraft
+        number = next((one for one, name in DRONE_TYPES.items() if name == aircraft), OTHER_DRONE_TYPE)
+        return Reply(message_class(f"{NEW_NAMES}/srv/GetDroneType_Response")(number))
 
     def _obtain(self, request: Any) -> bool:
         code = self._controller.set_authority(request.enable_obtain)
@@ -311,7 +319,7 @@ class Services:
             response = message_class(f"{package}/srv/{kind}_Response")
             return Served(prefix + name, f"{package}/srv/{kind}", lambda _: Reply(response(*values())))
 
-        action, set_speed = _accepting(
+        action, set_speed = accepting(
             prefix,
             package,
             ("mission_waypoint_action", "MissionWpAction", self._mission_action),

@@ -27,7 +27,6 @@ from volery.ros.messages.dji_constants import (
     MissionAck,
     TaskAck,
     ack_name,
-    aircraft_of,
 )
 from volery.trace.events import LinkState
 from volery.vehicles.drivers.dji.decoder import DjiDecoder
@@ -51,8 +50,6 @@ STATE = replace(AS_OFFERED, spacing=100 * MS)
 KEPT = 1000
 """Messages that may wait to be processed; older ones are dropped."""
 
-NOT_M100 = "aircraft of OSDK 4"
-
 
 class Ack:
     """Keys of acknowledgements in ``Telemetry.answers``."""
@@ -71,7 +68,7 @@ def _time_for(key: str) -> Ns:
     return {Ack.TASK: TASK_ANSWERED_WITHIN, Ack.MISSION: UPLOADED_WITHIN}.get(key, ANSWERED_WITHIN)
 
 
-def _nothing() -> None:
+def nothing() -> None:
     """Do nothing."""
 
 
@@ -202,8 +199,10 @@ class DjiBackend:
 
     def _identify(self) -> None:
         """Request the type of aircraft, on which the meaning of its numbers depends."""
+        if self.interface.activation() is None:
+            self.decoder.activate()
         ask = self.interface.version()
-        while ask is not None and not self._closed:
+        while not self._closed:
             if ask.client.wait(S):
                 try:
                     response = ask.client.call(ask.request, within=S)
@@ -211,18 +210,15 @@ class DjiBackend:
                     self._wrong = str(error)
                 else:
                     self._wrong = ""
-                    self.decoder.aircraft = aircraft_of(response.hardware) or "aircraft"
+                    self.decoder.aircraft = self.interface.aircraft(response)
                     break
                 sleep(self._kernel, S)
-        if ask is None:
-            self.decoder.aircraft = NOT_M100
-            self.decoder.activate()
         with self._kernel.guard:
             self._update()
 
     # -- requests
 
-    def request(self, key: str, ask: ServiceRequest | None, accepted: Action = _nothing) -> None:
+    def request(self, key: str, ask: ServiceRequest | None, accepted: Action = nothing) -> None:
         """Call a service without blocking; the answer arrives in the telemetry.
 
         Args:

@@ -1,30 +1,49 @@
-"""Missions of DJI aircraft: waypoints above the place of take-off, one speed, one final action."""
+"""Missions of DJI aircraft: waypoints above the place of take-off, one speed, one final action.
+
+An M300 takes missions of a second kind only, whose places are in radians and whose waypoints have no stay.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import isnan
+from functools import partial
+from math import isnan, radians
 from typing import Any, NamedTuple
 
 from volery.base.errors import Refused, UsageError
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import Ns, S
 from volery.ros.messages import message_class
-from volery.ros.messages.dji_constants import MISSION_SPEEDS, DisplayMode
+from volery.ros.messages.dji_constants import (
+    M300,
+    MISSION_SPEEDS,
+    NEW_NAMES,
+    DisplayMode,
+    HeadingMode,
+    WaypointType,
+)
 from volery.vehicles.driver import ChangeSpeed, Land, MissionItem, ReturnHome, Step, TakeOff, Waypoint
-from volery.vehicles.drivers.dji.backend import Ack
-from volery.vehicles.drivers.dji.node_interfaces import START_MISSION
+from volery.vehicles.drivers.dji.backend import Ack, nothing
+from volery.vehicles.drivers.dji.node_interfaces import SECOND_KIND
 from volery.vehicles.drivers.dji.sequences import LANDING_MODES, RESEND_PERIOD, SDK, WAITS, DjiSteps, DjiTasks
 from volery.vehicles.drivers.steps import ANSWERED_WITHIN, arrived_at, send_nothing
 from volery.vehicles.telemetry import Telemetry
 
-FEWEST, MOST = 2, 99
+FEWEST, MOST, MOST_OF_SECOND_KIND = 2, 99, 65_535
 USUAL_SPEED = 5.0
 STAY = 0
 NO_ACTION, GO_HOME, LAND = 0, 1, 2
 YAW_AUTO, YAW_BY_WAYPOINT = 0, 3
 GO_ON_WITHOUT_RC = 1
 DAMPING_M = 0.2
+
+
+class Route(NamedTuple):
+    """A mission as an aircraft of either kind flies it: waypoints, speed in m/s, and the final action."""
+
+    points: Sequence[Waypoint]
+    speed: float
+    finish: int
 
 
 class Plan(NamedTuple):
@@ -41,7 +60,15 @@ class Plan(NamedTuple):
     end: Position | None
 
 
-def plan_of(name: str, package: str, mission: Sequence[MissionItem], home: Position, here: Position) -> Plan:
+def plan_of(
+    name: str,
+    package: str,
+    mission: Sequence[MissionItem],
+    home: Position,
+    here: Position,
+    *,
+    second_kind: bool = False,
+) -> Plan:
     """Return the mission as messages of *package*; a take-off becomes a waypoint above the present place.
 
     Args:
@@ -50,18 +77,34 @@ def plan_of(name: str, package: str, mission: Sequence[MissionItem], home: Posit
         mission: items of the mission.
         home: home position, AMSL.
         here: present position, AMSL.
+        second_kind: whether the aircraft takes missions of the second kind.
 
     Raises:
-        UsageError: the speed changes on the way, or it lands or returns before the end.
+        UsageError: the speed changes on the way, it lands or returns before the end, it has too few or too
+            many waypoints, or stays at one of the second kind.
     """
     items = list(mission)
     takeoff = items.pop(0).height if isinstance(items[0], TakeOff) else None  # type: ignore[union-attr]
-    points: list[Waypoint] = []
-    if takeoff is not None:
-        points.append(Waypoint(Position(here.latitude, here.longitude, AboveHome(takeoff))))
+    above = [] if takeoff is None else [Waypoint(Position(here.latitude, here.longitude, AboveHome(takeoff)))]
+    route = _route(name, above, items)
+    points = route.points
+    most = MOST_OF_SECOND_KIND if second_kind else MOST
+    if not FEWEST <= len(points) <= most:
+        raise UsageError(
+            f"{name}: a DJI mission has {FEWEST} to {most} waypoints; this one has {len(points)}"
+        )
+    if second_kind and any(point.stay_s > 0.0 for point in points):
+        raise UsageError(f"{name}: a mission of an M300 does not stay at waypoints; goto() and hold() do")
+    task = _settings(route, home) if second_kind else _task(package, route, home)
+    return Plan(task, takeoff, points[-1].position if route.finish == NO_ACTION else None)
+
+
+def _route(name: str, above: Sequence[Waypoint], items: Sequence[MissionItem]) -> Route:
+    """Return the route through the waypoint *above* the place of take-off, if there is one, and *items*."""
+    points = list(above)
     speeds: set[float] = set()
     finish = NO_ACTION
-    for number, item in enumerate(items, start=1 if takeoff is None else 2):
+    for number, item in enumerate(items, start=1 + len(above)):
         if finish != NO_ACTION:
             raise UsageError(f"{name}: mission item {number}: a DJI mission ends with landing or going home")
         if isinstance(item, Waypoint):
@@ -77,12 +120,7 @@ def plan_of(name: str, package: str, mission: Sequence[MissionItem], home: Posit
             raise UsageError(f"{name}: mission item {number}: a DJI mission takes off first or not at all")
     if len(speeds) > 1:
         raise UsageError(f"{name}: a DJI mission has one speed; this one states {sorted(speeds)}")
-    if not FEWEST <= len(points) <= MOST:
-        raise UsageError(
-            f"{name}: a DJI mission has {FEWEST} to {MOST} waypoints; this one has {len(points)}"
-        )
-    task = _task(package, points, home, _speed(name, speeds), finish)
-    return Plan(task, takeoff, points[-1].position if finish == NO_ACTION else None)
+    return Route(points, _speed(name, speeds), finish)
 
 
 def _over(item: Land, points: Sequence[Waypoint]) -> Position | None:
@@ -100,14 +138,14 @@ def _speed(name: str, speeds: set[float]) -> float:
     return speed
 
 
-def _task(package: str, points: Sequence[Waypoint], home: Position, speed: float, finish: int) -> Any:
-    turns = any(not isnan(point.heading) for point in points)
+def _task(package: str, route: Route, home: Position) -> Any:
+    turns = any(not isnan(point.heading) for point in route.points)
     made: Any = message_class(f"{package}/msg/MissionWaypointTask")()
-    made.velocity_range, made.idle_velocity = MISSION_SPEEDS.highest, speed
-    made.action_on_finish, made.mission_exec_times = finish, 1
+    made.velocity_range, made.idle_velocity = MISSION_SPEEDS.highest, route.speed
+    made.action_on_finish, made.mission_exec_times = route.finish, 1
     made.yaw_mode = YAW_BY_WAYPOINT if turns else YAW_AUTO
     made.action_on_rc_lost = GO_ON_WITHOUT_RC
-    made.mission_waypoint = [_waypoint(package, point, home) for point in points]
+    made.mission_waypoint = [_waypoint(package, point, home) for point in route.points]
     return made
 
 
@@ -117,13 +155,36 @@ def _waypoint(package: str, point: Waypoint, home: Position) -> Any:
     made.altitude = above_home(point.position, home)
     made.damping_distance = DAMPING_M
     if not isnan(point.heading):
-        made.target_yaw = round((point.heading + 180.0) % 360.0 - 180.0)
+        made.target_yaw = round(_yaw(point))
     if point.stay_s > 0.0:
         made.has_action, made.action_time_limit = 1, min(65_535, round(point.stay_s) + 60)
         action = made.waypoint_action
         action.action_repeat = 0x11
         action.command_list[0] = STAY
         action.command_parameter[0] = min(65_535, round(point.stay_s * 1000.0))
+    return made
+
+
+def _yaw(point: Waypoint) -> float:
+    """Return the heading at a waypoint, degrees from -180 to 180."""
+    return (point.heading + 180.0) % 360.0 - 180.0
+
+
+def _settings(route: Route, home: Position) -> Any:
+    """Return the mission as one of the second kind, whose final actions have the same numbers."""
+    made: Any = message_class(SECOND_KIND)()
+    made.missTotalLen, made.finishedAction = len(route.points), route.finish
+    made.maxFlightSpeed, made.autoFlightSpeed = MISSION_SPEEDS.highest, route.speed
+    for point in route.points:
+        one: Any = message_class(f"{NEW_NAMES}/msg/WaypointV2")()
+        one.latitude, one.longitude = radians(point.position.latitude), radians(point.position.longitude)
+        one.relativeHeight = above_home(point.position, home)
+        one.waypointType = WaypointType.STRAIGHT_AND_STOP
+        one.dampingDistance = round(100.0 * DAMPING_M)
+        one.maxFlightSpeed, one.autoFlightSpeed = made.maxFlightSpeed, route.speed
+        if not isnan(point.heading):
+            one.headingMode, one.heading = HeadingMode.BY_WAYPOINT, _yaw(point)
+        made.mission.append(one)
     return made
 
 
@@ -174,21 +235,27 @@ class MissionRunner:
         for item in mission:
             if isinstance(item, Waypoint):
                 check_amsl(item.position, "upload a mission", self._telemetry)
-        plan = plan_of(self._steps.name, self._backend.interface.package, mission, home, here)
+        interface = self._backend.interface
+        second_kind = interface.package == NEW_NAMES and self._backend.decoder.aircraft == M300
+        plan = plan_of(self._steps.name, interface.package, mission, home, here, second_kind=second_kind)
 
         def keep() -> None:
             self._plan = plan
 
-        step = Step(
-            ask=f"take a mission of {len(plan.task.mission_waypoint)} waypoints",
-            send=lambda: self._backend.request(Ack.MISSION, self._backend.interface.mission(plan.task), keep),
-            done=lambda seen: self._steps.accepted(Ack.MISSION),
-            within=30 * S + len(plan.task.mission_waypoint) * 2 * S,
-            answer=Ack.MISSION,
-            again=5 * S,
-            advice="an M300 takes no missions of this kind" if self._backend.interface.blocks else "",
-        )
-        return (self._steps.activated(), self._steps.authority(), step)
+        count = len(plan.task.mission if second_kind else plan.task.mission_waypoint)
+        *before, last = interface.mission(plan.task)
+        uploads = [
+            Step(
+                ask=f"take a mission of {count} waypoints",
+                send=partial(self._backend.request, Ack.MISSION, ask, accepted),
+                done=lambda seen: self._steps.accepted(Ack.MISSION),
+                within=30 * S + count * 2 * S,
+                answer=Ack.MISSION,
+                again=5 * S,
+            )
+            for ask, accepted in (*((one, nothing) for one in before), (last, keep))
+        ]
+        return (self._steps.activated(), self._steps.authority(), *uploads)
 
     def start(self, within: Ns) -> Sequence[Step]:
         """Return steps that take off, start the mission, and wait for its end."""
@@ -203,7 +270,7 @@ class MissionRunner:
             lift = self._tasks.takeoff(plan.takeoff, within)
         begin = Step(
             ask="start the mission",
-            send=self._begin,
+            send=partial(self._begin, plan),
             done=lambda seen: self._steps.accepted(Ack.START),
             within=ANSWERED_WITHIN,
             answer=Ack.START,
@@ -214,10 +281,10 @@ class MissionRunner:
         )
         return (*lift, self._steps.authority(), self._steps.quiet(), begin, self._over(plan, within))
 
-    def _begin(self) -> None:
+    def _begin(self, plan: Plan) -> None:
         self._steps.stream.stop()
         self._steps.decoder.commanded = FLYING
-        self._backend.request(Ack.START, self._backend.interface.mission_action(START_MISSION))
+        self._backend.request(Ack.START, self._backend.interface.start_mission(plan.task))
 
     def _over(self, plan: Plan, within: Ns) -> Step:
         """Return a step that ends when disarmed, or at rest at an end in the air."""

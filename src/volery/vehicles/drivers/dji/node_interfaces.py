@@ -2,8 +2,7 @@
 
 ``dji_sdk`` 3.8 takes set-points on topics, in the conventions of ROS. The vehicle node of ``dji_osdk_ros``
 4.1 takes them by a service, in those of the flight controller: north and east, or forward and right;
-clockwise; degrees. It needs no request for the type of aircraft: 4.x does not support the M100, whose numbers
-differ.
+clockwise; degrees. Its missions are of a second kind where it serves an M300.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from volery.base.frames import yaw_to_heading
 from volery.ros.graph import Client, Node, Publisher
 from volery.ros.messages import message_class, request
 from volery.ros.messages.dji_constants import (
+    DRONE_TYPES,
     HORIZONTAL,
     NEW_NAMES,
     OLD_NAMES,
@@ -25,6 +25,7 @@ from volery.ros.messages.dji_constants import (
     TAKE_PICTURE,
     Flag,
     GimbalMode,
+    aircraft_of,
 )
 
 GO_HOME, TAKE_OFF, LAND = 1, 4, 6
@@ -40,6 +41,8 @@ GIMBAL_TURNS_S = 1
 """Time in which a gimbal turns to an angle, s."""
 
 JOY = "sensor_msgs/msg/Joy"
+SECOND_KIND = f"{NEW_NAMES}/msg/WaypointV2InitSetting"
+"""Type of a mission of the second kind."""
 
 
 class ServiceRequest(NamedTuple):
@@ -58,8 +61,11 @@ class NodeInterface(Protocol):
     blocks: bool
     """Whether it answers nothing while a take-off or a landing is in progress."""
 
-    def version(self) -> ServiceRequest | None:
-        """Request the type of aircraft; the response has ``hardware``."""
+    def version(self) -> ServiceRequest:
+        """Request the type of aircraft, on which the meaning of its numbers depends."""
+
+    def aircraft(self, response: Any) -> str:
+        """Return the type of aircraft that a response to ``version`` states."""
 
     def activation(self) -> ServiceRequest | None:
         """Activate the SDK."""
@@ -82,11 +88,11 @@ class NodeInterface(Protocol):
     def reference(self) -> ServiceRequest:
         """Set the local reference."""
 
-    def mission(self, task: Any) -> ServiceRequest:
-        """Upload a mission."""
+    def mission(self, task: Any) -> tuple[ServiceRequest, ...]:
+        """Upload a mission by requests, one after another."""
 
-    def mission_action(self, action: int) -> ServiceRequest:
-        """Start or stop the mission."""
+    def start_mission(self, task: Any) -> ServiceRequest:
+        """Start the mission that was uploaded."""
 
     def gimbal(self, pitch: float, yaw: float) -> ServiceRequest | None:
         """Point the gimbal, degrees; ``None`` means that it was commanded on a topic."""
@@ -115,13 +121,13 @@ class _CommonInterface:
     def _make_request(self, client: Client, **fields: Any) -> ServiceRequest:
         return ServiceRequest(client, request(client.type, **fields))
 
-    def mission(self, task: Any) -> ServiceRequest:
+    def mission(self, task: Any) -> tuple[ServiceRequest, ...]:
         """Return a request to ``mission_waypoint_upload``."""
-        return self._make_request(self._upload, waypoint_task=task)
+        return (self._make_request(self._upload, waypoint_task=task),)
 
-    def mission_action(self, action: int) -> ServiceRequest:
+    def start_mission(self, task: Any) -> ServiceRequest:
         """Return a request to ``mission_waypoint_action``."""
-        return self._make_request(self._action, action=action)
+        return self._make_request(self._action, action=START_MISSION)
 
 
 class DjiSdkInterface(_CommonInterface):
@@ -148,6 +154,10 @@ class DjiSdkInterface(_CommonInterface):
     def version(self) -> ServiceRequest:
         """Return a request to ``query_drone_version``."""
         return self._make_request(self._version)
+
+    def aircraft(self, response: Any) -> str:
+        """Return the type of the aircraft with this hardware."""
+        return aircraft_of(response.hardware) or "aircraft"
 
     def activation(self) -> ServiceRequest:
         """Return a request to ``activation``; the key is among the node's parameters."""
@@ -214,6 +224,7 @@ class OsdkRosInterface(_CommonInterface):
     def __init__(self, node: Node, namespace: str) -> None:
         super().__init__(node, namespace)
         beside = self._beside = namespace.rpartition("/")[0] + "/"
+        self._version = self._client(f"{beside}get_drone_type", "GetDroneType")
         self._task = self._client(f"{beside}flight_task_control", "FlightTaskControl")
         self._authority = self._client(f"{beside}obtain_release_control_authority", "ObtainControlAuthority")
         self._kill = self._client(f"{beside}kill_switch", "KillSwitch")
@@ -222,8 +233,13 @@ class OsdkRosInterface(_CommonInterface):
         self._joystick = self._client(f"{beside}joystick_action", "JoystickAction")
         self._flag = -1
 
-    def version(self) -> None:
-        """Return ``None``: see the module's docstring."""
+    def version(self) -> ServiceRequest:
+        """Return a request to ``get_drone_type``."""
+        return self._make_request(self._version)
+
+    def aircraft(self, response: Any) -> str:
+        """Return the type of aircraft with this number; it has none for an A3 and an N3."""
+        return DRONE_TYPES.get(response.drone_type, "aircraft of OSDK 4")
 
     def activation(self) -> None:
         """Return ``None``: the node activates when it starts."""
@@ -251,6 +267,36 @@ class OsdkRosInterface(_CommonInterface):
     def reference(self) -> ServiceRequest:
         """Return a request to ``set_local_pos_reference``."""
         return self._make_request(self._reference)
+
+    def _second_kind(self, name: str, kind: str) -> Client:
+        return self._client(f"{self.namespace}/waypointV2_{name}", kind)
+
+    @cached_property
+    def _settings(self) -> Client:
+        return self._second_kind("initSetting", "InitWaypointV2Setting")
+
+    @cached_property
+    def _upload_settings(self) -> Client:
+        return self._second_kind("uploadMission", "UploadWaypointV2Mission")
+
+    @cached_property
+    def _start(self) -> Client:
+        return self._second_kind("startMission", "StartWaypointV2Mission")
+
+    def mission(self, task: Any) -> tuple[ServiceRequest, ...]:
+        """Return requests that state the settings of a mission of the second kind and upload it."""
+        if task.__msgtype__ != SECOND_KIND:
+            return super().mission(task)
+        return (
+            self._make_request(self._settings, waypointV2InitSettings=task),
+            self._make_request(self._upload_settings),
+        )
+
+    def start_mission(self, task: Any) -> ServiceRequest:
+        """Return a request to ``waypointV2_startMission`` for a mission of the second kind."""
+        if task.__msgtype__ != SECOND_KIND:
+            return super().start_mission(task)
+        return self._make_request(self._start)
 
     @cached_property
     def _gimbal(self) -> Client:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from rigs.missions import carried_out
-from volery.base.errors import Failsafe, NotArrived, Overridden, Refused, VehicleError
+from volery.base.errors import Failsafe, NotArrived, Overridden, Refused, UsageError, VehicleError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MS, S
@@ -305,6 +305,23 @@ def test_a_mission_on_board() -> None:
         drone.wait_ready()
         route = [TakeOff(6.0), Waypoint(at(0.0, 15.0, 8.0), stay_s=1.0), Land(at(12.0, 15.0, 0.0))]
         drone.upload_mission(route)
+        drone.start_mission()
+        assert not drone.armed
+
+    flown.fly(mission)
+    east, north, _ = flown.fleet.flights["d"].truth().position
+    assert (east, north) == pytest.approx((12.0, 15.0), abs=1.5)
+
+
+def test_a_mission_on_board_of_an_m300() -> None:
+    flown = Flown("&names=dji_osdk_ros&parameters=AIRCRAFT:5")
+
+    def mission(drone: Drone) -> None:
+        drone.wait_ready()
+        assert drone.telemetry.autopilot == "DJI M300"
+        with pytest.raises(UsageError, match="does not stay"):
+            drone.upload_mission([TakeOff(6.0), Waypoint(at(0.0, 15.0, 8.0), stay_s=1.0), Land()])
+        drone.upload_mission([TakeOff(6.0), Waypoint(at(0.0, 15.0, 8.0)), Land(at(12.0, 15.0, 0.0))])
         drone.start_mission()
         assert not drone.armed
 

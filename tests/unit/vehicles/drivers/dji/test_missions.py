@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import degrees
+
 import pytest
 
 from volery.base.errors import UsageError
@@ -55,6 +57,27 @@ def test_landing_elsewhere_is_a_waypoint_over_it() -> None:
     made = plan_of("d", "dji_sdk", [TakeOff(8.0), Land(point(30.0, AboveHome(0.0)))], HOME, HOME)
     assert [one.altitude for one in made.task.mission_waypoint] == [8.0, 8.0]
     assert made.task.action_on_finish == 2
+
+
+def test_an_m300_takes_radians_and_turns_at_waypoints() -> None:
+    items = [TakeOff(6.0), ChangeSpeed(4.0), Waypoint(point(20.0, AMSL(915.0)), heading=270.0), Land()]
+    made = plan_of("d", "dji_osdk_ros", items, HOME, HOME, second_kind=True)
+    settings = made.task
+    assert settings.__msgtype__ == "dji_osdk_ros/msg/WaypointV2InitSetting"
+    assert (settings.missTotalLen, settings.finishedAction, settings.autoFlightSpeed) == (2, 2, 4.0)
+    first, last = settings.mission
+    assert (degrees(first.latitude), degrees(first.longitude)) == pytest.approx((46.0, -103.0))
+    assert (first.relativeHeight, first.headingMode) == (6.0, 0)
+    assert (last.relativeHeight, last.headingMode, last.heading) == (15.0, 3, -90.0)
+    assert {one.waypointType for one in settings.mission} == {2}
+
+
+def test_an_m300_does_not_stay_and_takes_more_waypoints() -> None:
+    many = [Waypoint(point(float(number))) for number in range(1, 201)]
+    made = plan_of("d", "dji_osdk_ros", many, HOME, HOME, second_kind=True)
+    assert made.task.missTotalLen == 200
+    with pytest.raises(UsageError, match="does not stay at waypoints"):
+        plan_of("d", "dji_osdk_ros", [*many, Waypoint(point(5.0), stay_s=1.0)], HOME, HOME, second_kind=True)
 
 
 @pytest.mark.parametrize(
