@@ -158,7 +158,7 @@ def _imported(file: Path) -> list[str]:
 
 def _texts(package: str, folder: Path) -> Iterator[tuple[str, str]]:
     for kind in KINDS:
-        for path in sorted((folder / kind).glob(f"*.{kind}")):
+        for path in sorted((folder / kind).rglob(f"*.{kind}")):  # ROS 1 packages sort them into folders
             yield f"{package}/{kind}/{path.stem}", path.read_text(encoding="utf-8")
 
 

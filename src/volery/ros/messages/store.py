@@ -18,6 +18,8 @@ from volery.ros.messages.message import DurationValue, Field, Header, Message, N
 
 _ID = "unique_identifier_msgs/UUID goal_id\n"
 _CONSTANT = re.compile(r"^([ \t]*\w+[ \t]+)([A-Za-z]\w*)(?=[ \t]*=)", re.MULTILINE)
+_SEPARATOR = re.compile(r"^---.*\n?", re.MULTILINE)
+"""A line between the parts of a service or an action; ROS 1 takes any that begins with three dashes."""
 _CAPITALS = re.compile(r"[A-Z][A-Z0-9]*(?:_[A-Z0-9]+)*")
 
 
@@ -53,7 +55,7 @@ def interface_messages(name: str, text: str) -> dict[str, str]:
 
 
 def _split(name: str, text: str, what: str, count: int) -> list[str]:
-    found = f"\n{text}".split("\n---")
+    found = _SEPARATOR.split(text)
     if len(found) != count:
         lines = "one line '---'" if count == 2 else f"{count - 1} lines '---'"
         raise UsageError(f"{name}: {what}, with {lines} between them; here are {len(found)} parts")

@@ -19,6 +19,8 @@ SUMS = {
     "nav_msgs/Odometry": "cd5e73d190d741a2f92e81eda573aca7",
     "tf2_msgs/TFMessage": "94810edda583a504dfda3829e70d7eec",
     "rosgraph_msgs/Clock": "a9c97c1d230cfc112e270351a944ee47",
+    "std_msgs/Time": "cd7166c74c552c311fbcc2fe5a7bc289",
+    "std_msgs/Duration": "3e286caf4241d664e55f3ad380e2ae46",
 }
 SERVICES = {
     "std_srvs/Empty": "d41d8cd98f00b204e9800998ecf8427e",

@@ -1,3 +1,4 @@
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -137,6 +138,12 @@ def test_constants_may_have_small_letters_as_in_ros_1() -> None:
     assert (kind.kManual, kind.A__B, kind.Name, kind.__match_args__) == (3, 4, "a = b", ("mode",))
 
 
+def test_parts_are_separated_by_any_line_of_three_dashes_or_more() -> None:
+    messages.define("line_msgs/srv/Sync", "int8 x\n---- response\nint8 y\n")
+    kind = messages.service("line_msgs/Sync")
+    assert (kind.request.__match_args__, kind.response.__match_args__) == (("x",), ("y",))
+
+
 def test_a_definition_holds_the_types_it_is_made_of() -> None:
     text = messages.definition("sensor_msgs/NavSatFix")
     assert "float64[9] position_covariance" in text
@@ -199,3 +206,13 @@ def test_packages_are_importable_modules() -> None:
     assert modules["mavros_msgs.msg"].VFR_HUD is messages.message_class("mavros_msgs/VfrHud")
     with pytest.raises(AttributeError, match=r"std_msgs\.msg has no 'Strng'.*did you mean 'String'"):
         _ = modules["std_msgs.msg"].Strng
+
+
+def test_definitions_lie_in_folders_below_the_packages_own(tmp_path: Path) -> None:
+    folder = tmp_path / "sorted_msgs/msg/control"
+    folder.mkdir(parents=True)
+    (folder / "Gain.msg").write_text("float64 p\n", encoding="utf-8")
+    program = tmp_path / "node.py"
+    program.write_text("from sorted_msgs.msg import Gain\n", encoding="utf-8")
+    assert messages.define_imported(program) == ["sorted_msgs"]
+    assert messages.new("sorted_msgs/Gain", p=2.0).p == 2.0
