@@ -184,7 +184,12 @@ class Tuning:
     """Height [m] to which a climb from the ground by the throttle goes on by itself; 0: it does not."""
     throttle_dead: float = 0.1
     """Half width of the throttle's dead zone about its middle, on a scale of 0..1."""
-    hover_throttle: float = 0.39
+    hover_throttle: float | None = None
+    """Stored collective in hover, see ``Flight.set_hover_throttle``; ``None``: that of the inner loops."""
+    thrust_volts: tuple[float, float] = (0.0, 0.0)
+    """Voltage for which thrust is computed, and the least that counts, see ``Flight.set_thrust_voltage``."""
+    learns_hover: bool = True
+    """Whether they adapt it in flight."""
 
     loiter_speed: float = 12.5
     loiter_accel: float = 5.0

@@ -262,6 +262,7 @@ class Vehicle:
         self.parameters = Parameters(
             rules.parameters.defaults(), {**rules.parameters.of_vehicle(system, flight), **(overrides or {})}
         )
+        self.tuning = Tuning()
         self._tune()
         self.rc = RcChannels(rules.rc.transmitter)
         self.mission = OnboardMission()
@@ -300,6 +301,7 @@ class Vehicle:
         self.boot_at = self.kernel.now() - age
         self._reset()
         self.rc.release()
+        self._start_hover_throttle()
         self.mode = self.rules.boot_mode
         self.manoeuvre = self.mode.manoeuvre(self)
 
@@ -390,9 +392,19 @@ class Vehicle:
         return True
 
     def _tune(self) -> None:
+        before = self.tuning.hover_throttle
         self.tuning = self.rules.parameters.tuning(self.parameters)
+        if self.tuning.hover_throttle != before:
+            self._start_hover_throttle()
         self.flight.set_yaw_loop(*self.tuning.yaw_loop)
         self.flight.set_brakes(on=self.tuning.brakes)
+        self.flight.set_thrust_voltage(*self.tuning.thrust_volts)
+        self.flight.set_hover_learning(on=self.tuning.learns_hover)
+
+    def _start_hover_throttle(self) -> None:
+        """Take the stored hover throttle from the parameters, where there is one."""
+        if self.tuning.hover_throttle is not None:
+            self.flight.set_hover_throttle(self.tuning.hover_throttle)
 
     def seconds_parameter(self, name: str) -> Ns:
         """Return the value of a parameter in seconds as nanoseconds."""

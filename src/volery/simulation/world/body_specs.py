@@ -3,7 +3,8 @@
 Defaults describe the bodies that ArduPilot's own simulator flies and drives by default: a quadrotor of 3 kg
 with rotors of 0.35 m on three lithium-polymer cells of 3.3 A h, which draws about 28 A in hover, and a rover
 the size of a large model car. Inertia, drag and rotor lag are estimated; the power is fitted to the energy
-that ArduPilot's simulator reports. The multirotor flies some seven minutes on a charge.
+that ArduPilot's simulator reports; its rover draws nothing at rest. The
+multirotor flies some seven minutes on a charge.
 """
 
 from __future__ import annotations
@@ -33,8 +34,10 @@ from volery.simulation.world.state_layout import (
     P_GRIP,
     P_GUST_DECAY,
     P_GUST_GAIN,
+    P_HOVER_SPEED,
     P_IDLE_POWER,
     P_INERTIA,
+    P_INFLOW,
     P_KIND,
     P_MAGNETIC_FIELD,
     P_MASS,
@@ -173,7 +176,7 @@ class Multirotor:
         efficiency: Efficiency of motor and speed controller, 0..1.
         top_speed: Rotor speed at full throttle and full battery [rad/s].
         rotor_lag: Time constant of rotor speed [s].
-        drag_linear: Linear drag coefficient [N s/m].
+        drag_linear: Linear drag coefficient with the rotors in hover [N s/m]; it grows with their speed.
         drag_quadratic: Quadratic drag coefficient [N s^2/m^2].
         spin_damping: Damping of body rates [N m s/rad].
         feet: Half length, half width and depth below the centre of the landing gear [m].
@@ -274,13 +277,13 @@ class Rover:
     speed_top: float = 20.0
     speed_lag: float = 1.7
     rolling: float = 0.03
-    efficiency: float = 0.235
+    efficiency: float = 0.216
     drag_linear: float = 0.0
     drag_quadratic: float = 0.3
     grip: float = 4.0
     skid: bool = False
     turn_top_deg: float = 120.0
-    idle_power: float = 5.0
+    idle_power: float = 0.0
 
     def __post_init__(self) -> None:
         _above_zero("rover", self, _ROVER_POSITIVE)
@@ -312,6 +315,9 @@ def _fill_multirotor(row: Array, spec: Multirotor) -> None:
     row[P_ROTOR_DECAY] = _decay_in_half_a_step(spec.rotor_lag)
     row[P_MAX_ROTOR_SPEED] = spec.top_speed
     row[P_EFFICIENCY] = spec.efficiency
+    row[P_HOVER_SPEED] = spec.hover_speed
+    jet = 2.0 * spec.hover_power / weight
+    row[P_INFLOW] = weight / (jet * jet)
 
 
 def _fill_rover(row: Array, spec: Rover) -> None:

@@ -155,7 +155,7 @@ def _settle_multirotor(row: Array) -> None:
     speed = 0.0
     spin = 0.0
     for axis in range(3):
-        speed = max(speed, abs(row[S_VELOCITY + axis]))
+        speed = max(speed, abs(row[S_VELOCITY + axis]), abs(row[W_LAST_VELOCITY + axis]))  # not a rebound
         spin = max(spin, abs(row[S_RATES + axis]))
     still = row[S_RESTING] > 0.5 or (speed < _STILL_SPEED and spin < _STILL_RATE)
     resting = touching and light and still

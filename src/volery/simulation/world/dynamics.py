@@ -17,11 +17,14 @@ Multirotor: a rigid body under four rotors, drag, gravity and the ground.
 * Rotor: w' = (u w_top V / V_full - w) / T, thrust k_T w^2, reaction torque k_Q w^2 with k_Q = k_T^1.5 / (FM
   sqrt(2 rho A)): momentum theory's induced power at the figure of merit FM (Leishman, Principles of
   Helicopter Aerodynamics, 2.3). Shaft power k_Q w^3; electrical power is that over the efficiency of motor
-  and controller. Valid in hover and slow flight; inflow of climb or fast flight, flapping, ground effect and
-  the rotors' gyroscopic torque are not modelled.
-* Drag: F = -c_1 v - c_2 (|v_p| v_p + |v_a| v_a), v relative to the air, v_p its part in the plane of the
-  rotors and v_a along their axis, as in ArduPilot's simulator; valid to about 20 m/s. Rotation is damped by
-  -c_w w.
+  and controller. Valid in hover and slow flight; the power of inflow, flapping, ground effect and the
+  rotors' gyroscopic torque are not modelled.
+* Drag: F = -c_1 (w_m / w_h) v - c_2 (|v_p| v_p + |v_a| v_a), v relative to the air, v_p its part in the plane
+  of the rotors and v_a along their axis, w_m the rotors' mean speed and w_h that of hover. The first term is
+  the momentum drag of turning rotors, as in ArduPilot's simulator (SIM_Motor, SIM_Frame), which takes the
+  roots of the thrusts; valid to about 20 m/s. Rotation is damped by -c_w w.
+* Inflow: in a climb along their axis the rotors lose c_3 v_a^2, also those that stand, by that simulator's
+  law of the jet, k_T w^2 = c_3 v_out^2 with the speed v_out = 2 P / T of hover at the electrical power P.
 * Ground: a spring and damper under each of four feet, Coulomb friction smoothed below 5 cm/s. Upside down the
   body lies on four points as far above the centre.
 
@@ -54,8 +57,10 @@ from volery.simulation.world.state_layout import (
     P_FULL_VOLTS,
     P_GRAVITY,
     P_GRIP,
+    P_HOVER_SPEED,
     P_IDLE_POWER,
     P_INERTIA,
+    P_INFLOW,
     P_MASS,
     P_MAX_ROTOR_SPEED,
     P_MAX_SPEED,
@@ -266,10 +271,11 @@ def is_pushed(row: Array) -> bool:
 @numeric
 def _add_rotor_and_air_loads(row: Array) -> None:
     """Compute force (east, north, up, without gravity) and torque (forward, left, up) of rotors and air."""
-    lift = 0.0
+    lift, turning = 0.0, 0.0
     for axis in range(3):
         row[W_TORQUE + axis] = 0.0
     for i in range(4):
+        turning += row[W_STATE + S_ROTORS + i]
         square = row[W_STATE + S_ROTORS + i] * row[W_STATE + S_ROTORS + i]
         thrust = row[P_THRUST] * square * row[U_MOTOR_HEALTH + i]
         lift += thrust
@@ -282,8 +288,11 @@ def _add_rotor_and_air_loads(row: Array) -> None:
     ae, an, au = row[W_ROTATION + 2], row[W_ROTATION + 5], row[W_ROTATION + 8]
     along = ve * ae + vn * an + vu * au
     plane = sqrt(max(0.0, ve * ve + vn * vn + vu * vu - along * along))
-    drag = row[P_DRAG_LINEAR] + row[P_DRAG_QUADRATIC] * plane
+    momentum = row[P_DRAG_LINEAR] * turning / (4.0 * row[P_HOVER_SPEED])
+    drag = momentum + row[P_DRAG_QUADRATIC] * plane
     lift -= row[P_DRAG_QUADRATIC] * (abs(along) - plane) * along
+    if along > 0.0:
+        lift -= row[P_INFLOW] * along * along
     row[W_FORCE] = ae * lift - drag * ve
     row[W_FORCE + 1] = an * lift - drag * vn
     row[W_FORCE + 2] = au * lift - drag * vu

@@ -147,7 +147,15 @@ ROVER = 1.0
 P_KIND = _add("P_KIND", "1", "MULTIROTOR or ROVER")
 P_MASS = _add("P_MASS", "kg", "mass")
 P_INERTIA = _add("P_INERTIA", "kg m^2", "principal moments of inertia", 3, FLU)
-P_DRAG_LINEAR = _add("P_DRAG_LINEAR", "N s/m", "linear drag coefficient")
+P_DRAG_LINEAR = _add(
+    "P_DRAG_LINEAR", "N s/m", "linear drag coefficient; multirotor: with its rotors in hover"
+)
+P_HOVER_SPEED = _add(
+    "P_HOVER_SPEED", "rad/s", "multirotor: rotor speed at which the thrust equals the weight"
+)
+P_INFLOW = _add(
+    "P_INFLOW", "N s^2/m^2", "multirotor: loss of thrust over the square of the climb along the axis"
+)
 P_DRAG_QUADRATIC = _add("P_DRAG_QUADRATIC", "N s^2/m^2", "quadratic drag coefficient")
 P_SPIN_DAMPING = _add("P_SPIN_DAMPING", "N m s/rad", "damping of body rates")
 P_FEET = _add("P_FEET", "m", "position of the feet", 3, "half length, half width, depth below the centre")

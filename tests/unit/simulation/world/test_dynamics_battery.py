@@ -99,7 +99,7 @@ def test_a_full_rotor_slows_down_as_the_battery_sags(clock, frame):
 
 
 def test_driving_costs_more_than_standing(clock, frame):
-    world = World(clock, [Rover(sensors="perfect"), Rover(sensors="perfect")], frame=frame)
+    world = World(clock, [Rover(sensors="perfect", idle_power=5.0)] * 2, frame=frame)
     world.set_input(0, U_THROTTLE, 0.0, 0.2)
     clock.wait(30)
     driving, standing = world.truth(0), world.truth(1)

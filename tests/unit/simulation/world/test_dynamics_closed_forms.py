@@ -73,14 +73,20 @@ def test_a_body_at_hover_thrust_keeps_its_position(clock, frame, dragless):
     assert max(abs(east), abs(north), abs(up - 100.0)) < 1e-8
 
 
-def test_terminal_velocity_balances_weight_and_drag(clock, frame, ideal_battery):
-    spec = Multirotor(sensors="perfect", battery=ideal_battery)
+@pytest.mark.parametrize("rotors", [0.0, 0.7, 1.3])
+def test_terminal_velocity_balances_weight_thrust_inflow_and_a_drag_that_grows_with_the_rotors(
+    rotors, clock, frame, ideal_battery
+):
+    spec = Multirotor(sensors="perfect", battery=ideal_battery, rotor_lag=1e9)
     world = World(clock, [spec], frame=frame)
-    in_the_air(world, spec, 5000.0, (0.0,) * 4)
+    in_the_air(world, spec, 5000.0, (rotors * spec.hover_speed,) * 4)
     clock.wait(60)
-    speed = -world.truth(0).velocity[2]
-    drag = (spec.drag_linear + spec.drag_quadratic * speed) * speed
-    assert drag == pytest.approx(spec.mass * STANDARD_GRAVITY, rel=1e-6)
+    speed = world.truth(0).velocity[2]
+    drag = (rotors * spec.drag_linear + spec.drag_quadratic * abs(speed)) * speed
+    weight = spec.mass * STANDARD_GRAVITY
+    jet = 2.0 * spec.hover_power / weight
+    drag += weight * (max(0.0, speed) / jet) ** 2
+    assert drag == pytest.approx((rotors * rotors - 1.0) * weight, rel=1e-6)
 
 
 def test_motor_lag_is_first_order(clock, frame, dragless):

@@ -23,6 +23,9 @@ CRITICAL, WARNING, NOTICE, INFO = 2, 4, 5, 6
 FORCE, SKIP_CHECKS = 21_196, 2_989
 """Values of param2 that skip the checks: for both directions, and for arming only."""
 
+LEARN_AND_SAVE = 2
+"""MOT_HOVER_LEARN."""
+
 DISPLAY_EVERY: Ns = 30 * S
 
 COPTER_DISARMED, ROVER_DISARMED = "Disarming motors", "Throttle disarmed"
@@ -134,8 +137,8 @@ def disarm(vehicle: Vehicle, words: str, force: bool) -> int:
     if vehicle.flies or vehicle.mode.name != "AUTO":
         vehicle.mission.current = 0
     vehicle.send_text(INFO, words)
-    if vehicle.flies:
-        vehicle.set_parameter("MOT_THST_HOVER", vehicle.estimate.hover_throttle)
+    if vehicle.flies and vehicle.parameters["MOT_HOVER_LEARN"] == LEARN_AND_SAVE:
+        vehicle.set_parameter("MOT_THST_HOVER", vehicle.estimate.stored_hover)
     return ACCEPTED
 
 

@@ -159,6 +159,9 @@ YAW_AUTHORITY = 0.755
 ROTOR_LAG_S = 0.04
 """Lag of the rotors here, s; ArduPilot's own simulator has none, so the filter is quicker by as much."""
 
+LEAST_HOVER, MOST_HOVER = 0.125, 0.6875
+"""AP_MOTORS_THST_HOVER_MIN and AP_MOTORS_THST_HOVER_MAX."""
+
 COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
     {
         **_SHARED,
@@ -239,9 +242,12 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "LOIT_BRK_ACCEL": "LOITER's braking",
         "LOIT_BRK_DELAY": "time before LOITER brakes",
         "LOIT_SPEED": "LOITER's largest speed",
+        "MOT_BAT_VOLT_MAX": "voltage for which thrust is computed; not above MOT_BAT_VOLT_MIN: it is ignored",
+        "MOT_BAT_VOLT_MIN": "least voltage that counts for that",
+        "MOT_HOVER_LEARN": "0 keeps MOT_THST_HOVER, 1 learns it in flight, 2 stores it, too",
         "MOT_PWM_MAX": "pulse width of a motor test at 100 %",
         "MOT_PWM_MIN": "pulse width of a motor test at 0 %",
-        "MOT_THST_HOVER": "hover thrust; learnt in flight and stored on disarming",
+        "MOT_THST_HOVER": "hover thrust at the start of a flight",
         "PILOT_ACCEL_Z": "the pilot's vertical acceleration",
         "PILOT_SPEED_DN": "the pilot's largest descent; 0: PILOT_SPEED_UP",
         "PILOT_SPEED_UP": "the pilot's largest climb",
@@ -389,7 +395,9 @@ def copter_tuning(parameters: Parameters) -> Tuning:
         pilot_yaw_rate=radians(p["PILOT_Y_RATE"]),
         pilot_takeoff=min(10.0, max(0.0, p["PILOT_TKOFF_ALT"] / 100.0)),
         throttle_dead=p["THR_DZ"] / 1000.0,
-        hover_throttle=p["MOT_THST_HOVER"],
+        hover_throttle=min(MOST_HOVER, max(LEAST_HOVER, p["MOT_THST_HOVER"])),
+        thrust_volts=_thrust_volts(p),
+        learns_hover=p["MOT_HOVER_LEARN"] > 0.0,
         loiter_speed=_moving(p["LOIT_SPEED"] / 100.0),
         loiter_accel=_moving(p["LOIT_ACC_MAX"] / 100.0, 1.0),
         loiter_tilt=min(angle, _moving(radians(p["LOIT_ANG_MAX"]), angle * 2.0 / 3.0)),
@@ -399,6 +407,12 @@ def copter_tuning(parameters: Parameters) -> Tuning:
         circle_rate=radians(p["CIRCLE_RATE"]),
         target_timeout=from_seconds(p["GUID_TIMEOUT"]),
     )
+
+
+def _thrust_volts(p: Parameters) -> tuple[float, float]:
+    """Return full and least voltage of the thrust [V]; 0 where the parameters switch it off."""
+    full, least = p["MOT_BAT_VOLT_MAX"], p["MOT_BAT_VOLT_MIN"]
+    return (full, least) if full > least else (0.0, 0.0)
 
 
 FASTEST_PILOT, LEAST_CRUISE = 30.0, 0.05

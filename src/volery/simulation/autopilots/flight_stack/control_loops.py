@@ -3,7 +3,8 @@
 * Attitude and rates, every grid step: the attitude error as a quaternion, limited by a square-root law, gives
   rates; a PID on each rate has its derivative on the measurement. The mixer gives roll and pitch precedence
   over yaw, and yaw over collective. Motor output is linear in thrust through ArduPilot's thrust curve
-  (MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX).
+  (MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX), and independent of the voltage where C_FULL_VOLTS is above 0
+  (MOT_BAT_VOLT_MAX, MOT_BAT_VOLT_MIN: apply_thrust_curve_and_volt_scaling of AP_MotorsMulticopter).
 * Where C_YAW_P is above 0 yaw is ArduCopter's, which swings: angle gain ATC_ANG_YAW_P, its braking limited to
   120 degrees/s^2, and a rate loop on an error that is filtered at ATC_RAT_YAW_FLTE, 2.5 Hz. With its default
   gains on its own simulator's quadrotor the loop has a natural frequency of 5 rad/s and a damping of 0.36.
@@ -15,7 +16,7 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import pi, sqrt
 
 from volery.base.elementary import atan2, sine_cosine
 from volery.base.numeric_code import numeric
@@ -23,6 +24,8 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_ACCEL,
     C_COASTS,
     C_CONTROL,
+    C_FULL_VOLTS,
+    C_LEAST_VOLTS,
     C_MOTOR,
     C_POSITION,
     C_SPEED,
@@ -62,6 +65,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_TARGET_VELOCITY,
     K_THROTTLE,
     K_VELOCITY,
+    K_VOLTS_SHARE,
     K_YAW_MISS,
     K_YAW_SPEED,
     MOTOR,
@@ -79,6 +83,7 @@ from volery.simulation.world.state_layout import (
     P_ROTOR_Y,
     P_SKID_STEERED,
     P_WHEELBASE,
+    S_VOLTS,
     STEP_S,
     Array,
 )
@@ -100,6 +105,7 @@ _SPIN_ARM = 0.10
 _SPIN_MIN = 0.15
 _SPIN_MAX = 0.95
 _EXPO = 0.65
+_VOLTS_FILTER = STEP_S / (STEP_S + 1.0 / (2.0 * pi * 0.5))  # AP_MOTORS_BATT_VOLT_FILT_HZ: 0.5 Hz
 _SPOOL_TIME = 0.5  # [s]
 _YAW_ROOM = 0.2  # of full thrust that yaw may always have
 
@@ -186,11 +192,25 @@ def _filtered_yaw_torque(row: Array, target: float) -> float:
 
 
 @numeric
-def motor_output(thrust: float) -> float:
-    """Return the motor command 0..1 for a share of full thrust."""
+def motor_output(thrust: float, volts_share: float) -> float:
+    """Return the motor command 0..1 for a share of full thrust, at a share of the voltage of full thrust."""
     linear = 1.0 - _EXPO
     curve = (sqrt(linear * linear + 4.0 * _EXPO * clip(thrust, 0.0, 1.0)) - linear) / (2.0 * _EXPO)
-    return _SPIN_MIN + (_SPIN_MAX - _SPIN_MIN) * curve
+    return _SPIN_MIN + (_SPIN_MAX - _SPIN_MIN) * min(1.0, curve / volts_share)
+
+
+@numeric
+def _volts_share(row: Array) -> float:
+    """Return the filtered voltage over that of full thrust: one grid step."""
+    full = row[C_FULL_VOLTS]
+    if full <= 0.0:
+        return 1.0
+    now = clip(row[S_VOLTS], max(row[C_LEAST_VOLTS], 0.6 * full), full) / full
+    if row[K_VOLTS_SHARE] == 0.0:
+        row[K_VOLTS_SHARE] = now
+    row[K_VOLTS_SHARE] += _VOLTS_FILTER * (now - row[K_VOLTS_SHARE])
+    share: float = row[K_VOLTS_SHARE]
+    return share
 
 
 @numeric
@@ -209,11 +229,12 @@ def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
     target = row[K_THROTTLE] * row[K_SPOOL]
     collective = clip(target, -low, max(1.0 - high, -low))
     row[K_AT_LOWER_LIMIT] = 1.0 if target <= 0.01 - low else 0.0
+    share = _volts_share(row)
     room = max(min(collective + low, 1.0 - collective - high), _YAW_ROOM * 0.5)
     yaw = clip(yaw, -room, room)
     for i in range(4):
         thrust = collective + scale * row[K_MOTORS + i] - yaw * row[P_ROTOR_SPIN + i]
-        row[K_MOTORS + i] = motor_output(thrust)
+        row[K_MOTORS + i] = motor_output(thrust, share)
 
 
 @numeric

@@ -19,11 +19,14 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_AIDED,
     C_COASTS,
     C_CONTROL,
+    C_FULL_VOLTS,
+    C_HOVER_KEPT,
     C_STICK,
     C_YAW_P,
     FLIGHT,
     HOLD_HEADING,
     K_POSITION,
+    K_STORED_HOVER,
     YAW_ANGLE,
     YAW_ANGLE_AND_RATE,
     YAW_RATE,
@@ -236,6 +239,23 @@ class Flight:
     def set_brakes(self, *, on: bool) -> None:
         """Let a rover brake by its motor, or only coast."""
         self._world.set_input(self._body, C_COASTS, float(not on))
+
+    def set_hover_throttle(self, throttle: float) -> None:
+        """Set the stored collective in hover, 0..1; the loops of climb and height learn their own."""
+        self._world.set_input(self._body, K_STORED_HOVER, throttle)
+
+    def set_thrust_voltage(self, full: float, least: float) -> None:
+        """Keep thrust independent of the battery's voltage.
+
+        Args:
+            full: Voltage for which thrust is computed [V]; 0: the voltage is ignored.
+            least: Least voltage that counts [V].
+        """
+        self._world.set_input(self._body, C_FULL_VOLTS, full, least)
+
+    def set_hover_learning(self, *, on: bool) -> None:
+        """Adapt the stored collective in flight, or keep it."""
+        self._world.set_input(self._body, C_HOVER_KEPT, float(not on))
 
     def mix_steering(self, steering: float, share: float) -> None:
         """Add a pilot's steering to that of a rover's controls.

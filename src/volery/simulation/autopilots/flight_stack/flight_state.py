@@ -103,6 +103,11 @@ C_STICK_SHARE = _add(
     "C_STICK_SHARE", "1", "rover: share by which the autopilot's own steering is reduced then"
 )
 C_COASTS = _add("C_COASTS", "1", "1: a rover does not brake by its motor")
+C_FULL_VOLTS = _add(
+    "C_FULL_VOLTS", "V", "voltage for which thrust is computed; with a lower one motors turn faster; 0: none"
+)
+C_LEAST_VOLTS = _add("C_LEAST_VOLTS", "V", "least voltage that counts for that")
+C_HOVER_KEPT = _add("C_HOVER_KEPT", "1", "1: the hover throttle is not learnt")
 
 # --- memory that ``Estimate`` shows ---
 K_POSITION = _add("K_POSITION", "m", "estimated, about the world's origin", 3, NED)
@@ -127,6 +132,7 @@ K_MOTORS = _add("K_MOTORS", "1", "motor commands 0..1; rover: steering, throttle
 K_LANDED = _add("K_LANDED", "1", "1: the landed detector reports landed")
 K_THROTTLE = _add("K_THROTTLE", "1", "collective 0..1; rover: throttle -1..1")
 K_HOVER_THROTTLE = _add("K_HOVER_THROTTLE", "1", "learnt collective in hover")
+K_STORED_HOVER = _add("K_STORED_HOVER", "1", "the same, from a start and with a learning that are given")
 K_TARGET = _add("K_TARGET", "m", "shaped target position about the world's origin", 3, NED)
 K_TARGET_VELOCITY = _add("K_TARGET_VELOCITY", "m/s", "shaped; rover: the first is the forward speed", 3, NED)
 K_TARGET_ACCEL = _add("K_TARGET_ACCEL", "m/s^2", "shaped", 3, NED)
@@ -159,6 +165,7 @@ K_SPEED_INTEGRAL = _add("K_SPEED_INTEGRAL", "1", "rover: integrator of the speed
 K_AT_LOWER_LIMIT = _add("K_AT_LOWER_LIMIT", "1", "1 while the collective is at its lower limit")
 K_TILT_LIMITED = _add("K_TILT_LIMITED", "m/s^2", "wanted acceleration while the lean is at its limit", 2, NED)
 K_LAST_MISS = _add("K_LAST_MISS", "m/s", "filtered error of the horizontal velocity loop", 2, NED)
+K_VOLTS_SHARE = _add("K_VOLTS_SHARE", "1", "filtered voltage over C_FULL_VOLTS; 0: not yet known")
 K_MISS_DERIVATIVE = _add("K_MISS_DERIVATIVE", "m/s^2", "its filtered derivative", 2, NED)
 FLIGHT = FLIGHT_LAYOUT.end - FLIGHT_LAYOUT.start
 """Number of columns that the flight stack adds to a row."""
@@ -453,6 +460,11 @@ class Estimate:
     def hover_throttle(self) -> float:
         """Learnt collective in hover, 0..1."""
         return self._row[K_HOVER_THROTTLE]
+
+    @property
+    def stored_hover(self) -> float:
+        """The same, started by ``Flight.set_hover_throttle``, learnt as ``set_hover_learning`` admits."""
+        return self._row[K_STORED_HOVER]
 
     @property
     def landed(self) -> bool:

@@ -28,6 +28,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_HOVER_THROTTLE,
     K_LANDED,
     K_MOTORS,
+    K_STORED_HOVER,
 )
 from volery.simulation.autopilots.flight_stack.guidance import GUIDE_EVERY, guide_multirotor
 from volery.simulation.world.body_step import (
@@ -47,13 +48,13 @@ from volery.simulation.world.state_layout import (
     Bodies,
 )
 
-_FIRST_HOVER = 0.35  # MOT_THST_HOVER's default
+_FIRST_HOVER = 0.35
 
 
 @numeric
 def _boot(row: Array) -> None:
     """Initialise the flight stack of one vehicle before its first step."""
-    row[K_HOVER_THROTTLE] = _FIRST_HOVER
+    row[K_HOVER_THROTTLE] = row[K_STORED_HOVER] = _FIRST_HOVER
     row[K_LANDED] = 1.0
     initialise_estimate(row)
 

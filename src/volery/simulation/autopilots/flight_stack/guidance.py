@@ -21,6 +21,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_ACCEL_Z,
     C_CLIMB,
     C_CONTROL,
+    C_HOVER_KEPT,
     C_JERK,
     C_PITCH,
     C_POSITION,
@@ -50,6 +51,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_ORIGIN,
     K_POSITION,
     K_SPOOL,
+    K_STORED_HOVER,
     K_TARGET,
     K_TARGET_ACCEL,
     K_TARGET_EULER,
@@ -424,7 +426,10 @@ def _learn_hover_throttle(row: Array) -> None:
     x, y = row[K_ATTITUDE + 1], row[K_ATTITUDE + 2]
     level = x * x + y * y < 0.002
     if steady and level and abs(row[K_ACCEL + 2]) < 1.0:
-        learnt = row[K_HOVER_THROTTLE] + GUIDE_S / _LEARN_TIME * (row[K_THROTTLE] - row[K_HOVER_THROTTLE])
+        share = GUIDE_S / _LEARN_TIME
+        if row[C_HOVER_KEPT] < 0.5:
+            row[K_STORED_HOVER] += share * (row[K_THROTTLE] - row[K_STORED_HOVER])
+        learnt = row[K_HOVER_THROTTLE] + share * (row[K_THROTTLE] - row[K_HOVER_THROTTLE])
         learnt = clip(learnt, 0.125, 0.6875)
         row[K_VELOCITY_INTEGRAL + 2] += _GRAVITY * (learnt / row[K_HOVER_THROTTLE] - 1.0)
         row[K_HOVER_THROTTLE] = learnt

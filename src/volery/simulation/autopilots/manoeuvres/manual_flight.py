@@ -75,7 +75,7 @@ class Stabilize(ManualFlight):
         The middle of the stick is hover thrust: the stick is scaled to a middle of one half, then bent by a
         cubic (ArduCopter's documented throttle curve, with the learnt hover throttle as its middle).
         """
-        hover = self.vehicle.estimate.hover_throttle
+        hover = self.vehicle.estimate.stored_hover
         middle = self.vehicle.tuning.sticks.throttle_middle
         centred = (
             0.5 * throttle / middle if throttle < middle else 0.5 + 0.5 * (throttle - middle) / (1.0 - middle)

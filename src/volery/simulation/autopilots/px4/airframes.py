@@ -158,7 +158,6 @@ def copter_tuning(parameters: Parameters) -> Tuning:
         pilot_accel_z=_moving(min(p["MPC_ACC_UP_MAX"], p["MPC_ACC_DOWN_MAX"])),
         pilot_yaw_rate=radians(min(720.0, max(1.0, p["MPC_MAN_Y_MAX"]))),
         throttle_dead=p["MPC_HOLD_DZ"] / 2.0,
-        hover_throttle=p["MPC_THR_HOVER"],
     )
 
 
