@@ -370,7 +370,7 @@ class FailsafeState:
     """Names of the failsafes whose condition is true."""
     station_last_ns: Ns = NEVER
     """Time of the last message of the ground station that controls the vehicle [ns]."""
-    simulated: tuple[float, float, float, float, float, float] = (0.0, 0.0, 1.0, 0.0, 180.0, 12.6)
+    simulated: tuple[float, ...] = (0.0, 0.0, 1.0, 0.0, 180.0, 12.6, 0.0, 0.0)
     """Values of the parameters that inject faults, as they were last applied."""
     simulated_at: int = -1
     """Changes of parameters when these were last compared."""
@@ -380,6 +380,10 @@ class FailsafeState:
     """Whether a transmitter or overrides have been received since boot."""
     crashing_since: Ns = NEVER
     """Since when [ns] a vehicle leans far from where it should."""
+    glitching: bool = False
+    """Whether the estimator has refused all fixes for a second, and has not fused them for ten since then."""
+    refused_at: Ns = NEVER
+    """When [ns] it last refused one."""
     true_since: dict[str, Ns] = field(default_factory=dict)
     """Since when [ns] a condition has been true that must last before a failsafe acts, by its name."""
 

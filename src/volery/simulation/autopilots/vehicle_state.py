@@ -398,6 +398,7 @@ class Vehicle:
             self._start_hover_throttle()
         self.flight.set_yaw_loop(*self.tuning.yaw_loop)
         self.flight.set_brakes(on=self.tuning.brakes)
+        self.flight.set_gps_gate(*self.tuning.gps_gate)
         self.flight.set_thrust_voltage(*self.tuning.thrust_volts)
         self.flight.set_hover_learning(on=self.tuning.learns_hover)
 

@@ -72,6 +72,7 @@ from volery.simulation.world.state_layout import (
     U_GPS_BLOCKED,
     U_GPS_DRIFT,
     U_GPS_DRIFT_START,
+    U_GPS_OFFSET,
     U_MAG_BLOCKED,
     W_ROTATION,
     WHITE_SIGMA,
@@ -511,6 +512,7 @@ def _sample_gps(row: Array, key: np.uint64, k: int) -> None:
         noise = row[M_GPS_VELOCITY_BIAS + axis] + speed * gaussian(key, _GPS_VELOCITY_STREAM + axis, k)
         row[M_GPS_VELOCITY + axis] = sign * row[S_VELOCITY + source] + noise
     for axis in range(2):
+        row[M_GPS + axis] += row[U_GPS_OFFSET + axis]
         drift = row[U_GPS_DRIFT + axis]
         if drift != 0.0:
             row[M_GPS + axis] += drift * (k - row[U_GPS_DRIFT_START]) * STEP_S

@@ -22,6 +22,7 @@ from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, Auxili
 from volery.simulation.autopilots.ardupilot.avoidance import limit_copter, obstacle_problems
 from volery.simulation.autopilots.ardupilot.buttons import read_buttons
 from volery.simulation.autopilots.ardupilot.camera import update_camera
+from volery.simulation.autopilots.ardupilot.estimator_sources import GLITCH_CHECK, watch_glitches
 from volery.simulation.autopilots.ardupilot.failsafes import (
     COPTER_FAILSAFES,
     radio_never_received,
@@ -222,6 +223,7 @@ CHECKS = (
     Check("winch unhealthy", no_servo),
     *SHARED_CHECKS,
     *FENCE_CHECKS,
+    GLITCH_CHECK,
     PROXIMITY_CHECK,
     traffic.TRAFFIC_CHECK,
     *STOP_CHECKS,
@@ -276,6 +278,7 @@ def on_step(vehicle: Vehicle) -> None:
     """Expire overrides, and disarm automatically after a landing or without a take-off."""
     pilot_input.on_step(vehicle)
     boot.find_home(vehicle)
+    watch_glitches(vehicle)
     if not pilot_input.sticks_rest(vehicle):
         pilot_input.read_mode_switch(vehicle, "FLTMODE_CH", "FLTMODE")
         pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)

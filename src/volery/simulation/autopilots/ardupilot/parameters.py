@@ -74,6 +74,9 @@ _SHARED = {
     "CAM1_TRIGG_DIST": "distance between two pictures; 0: none by distance",
     "CAM_AUTO_ONLY": "any value but 0: pictures by distance in AUTO only",
     "CAM_MAX_ROLL": "largest roll for pictures by distance; 0: any",
+    "EK3_GLITCH_RAD": "uncertainty after a reset to a fix that was refused for 10 s; 0: every fix counts",
+    "EK3_POS_I_GATE": "distance from which a fix is refused, in hundredths of its standard deviation",
+    "EK3_POSNE_M_NSE": "least standard deviation of a fix in that comparison",
     "FENCE_ACTION": "action beyond the fence; 0 only reports",
     "FENCE_ENABLE": "any value but 0 switches the fence on",
     "FENCE_RADIUS": "circle of the fence about home",
@@ -128,6 +131,8 @@ _SHARED = {
     "SIM_ENGINE_FAIL": "the motor that SIM_ENGINE_MUL weakens, from 0",
     "SIM_ENGINE_MUL": "share of that motor's thrust",
     "SIM_GPS_DISABLE": "any value but 0: the receiver sees no satellites",
+    "SIM_GPS_GLITCH_X": "error of the latitude that the receiver reports",
+    "SIM_GPS_GLITCH_Y": "error of the longitude that the receiver reports",
     "SIM_RC_FAIL": "any value but 0: the transmitter's throttle reads 950",
     "SIM_WIND_DIR": "direction that the wind comes from",
     "SIM_WIND_SPD": "mean speed of the wind",
@@ -396,6 +401,7 @@ def copter_tuning(parameters: Parameters) -> Tuning:
         pilot_takeoff=min(10.0, max(0.0, p["PILOT_TKOFF_ALT"] / 100.0)),
         throttle_dead=p["THR_DZ"] / 1000.0,
         hover_throttle=min(MOST_HOVER, max(LEAST_HOVER, p["MOT_THST_HOVER"])),
+        gps_gate=_gps_gate(p),
         thrust_volts=_thrust_volts(p),
         learns_hover=p["MOT_HOVER_LEARN"] > 0.0,
         loiter_speed=_moving(p["LOIT_SPEED"] / 100.0),
@@ -407,6 +413,13 @@ def copter_tuning(parameters: Parameters) -> Tuning:
         circle_rate=radians(p["CIRCLE_RATE"]),
         target_timeout=from_seconds(p["GUID_TIMEOUT"]),
     )
+
+
+def _gps_gate(p: Parameters) -> tuple[float, float, float]:
+    """Return gate [sigmas], least sigma and radius of a reset [m]; a radius of 0 lets every fix count."""
+    radius = p["EK3_GLITCH_RAD"]
+    gate = max(1.0, p["EK3_POS_I_GATE"] / 100.0) if radius > 0.0 else 0.0
+    return gate, max(0.1, p["EK3_POSNE_M_NSE"]), radius
 
 
 def _thrust_volts(p: Parameters) -> tuple[float, float]:
@@ -429,6 +442,7 @@ def rover_tuning(parameters: Parameters) -> Tuning:
         accel=_moving(p["ATC_ACCEL_MAX"], 1.0),
         waypoint_radius=_moving(p["WP_RADIUS"]),
         return_speed=_moving(p["RTL_SPEED"], speed),
+        gps_gate=_gps_gate(p),
         brakes=p["ATC_BRAKE"] != 0.0,
         pilot_speed=min(FASTEST_PILOT, _pilot_speed(p)),
     )

@@ -119,7 +119,8 @@ def simulate_faults(vehicle: Vehicle) -> None:
     wind = parameters["SIM_WIND_SPD"], parameters["SIM_WIND_DIR"]
     no_receiver = parameters["SIM_GPS_DISABLE"] != 0.0 or parameters["GPS_TYPE"] == 0.0
     volts = round(parameters["SIM_BATT_VOLTAGE"], 3)
-    wanted = (float(no_receiver), *motor_and_share, *wind, volts)
+    glitch = parameters["SIM_GPS_GLITCH_X"], parameters["SIM_GPS_GLITCH_Y"]
+    wanted = (float(no_receiver), *motor_and_share, *wind, volts, *glitch)
     before = vehicle.failsafes.simulated
     if wanted == before:
         return
@@ -129,6 +130,10 @@ def simulate_faults(vehicle: Vehicle) -> None:
     if wind != before[3:5]:
         speed, towards = wind[0], radians(wind[1] + 180.0)
         vehicle.flight.set_wind(north=speed * cos(towards), east=speed * sin(towards))
+    if glitch != before[6:]:
+        latitude, longitude, amsl = vehicle.estimate.origin
+        there = vehicle.flight.to_ned(latitude + glitch[0], longitude + glitch[1], amsl)
+        vehicle.flight.offset_gps(there[0], there[1])
     vehicle.flight.block_gps(bool(wanted[0]))
     if vehicle.flies:
         for motor in range(4):

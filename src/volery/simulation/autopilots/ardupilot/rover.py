@@ -10,6 +10,7 @@ from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, Auxili
 from volery.simulation.autopilots.ardupilot.avoidance import limit_rover
 from volery.simulation.autopilots.ardupilot.buttons import read_buttons
 from volery.simulation.autopilots.ardupilot.camera import update_camera
+from volery.simulation.autopilots.ardupilot.estimator_sources import watch_glitches
 from volery.simulation.autopilots.ardupilot.failsafes import ROVER_FAILSAFES
 from volery.simulation.autopilots.ardupilot.fence import FENCE_CHECKS, check_fence, respond_rover
 from volery.simulation.autopilots.ardupilot.firmware import (
@@ -228,6 +229,7 @@ def on_step(vehicle: Vehicle) -> None:
     """Expire overrides and count the driving time, at each tick."""
     pilot_input.on_step(vehicle)
     boot.find_home(vehicle)
+    watch_glitches(vehicle)
     if not pilot_input.sticks_rest(vehicle):
         pilot_input.read_mode_switch(vehicle, "MODE_CH", "MODE")
         pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)

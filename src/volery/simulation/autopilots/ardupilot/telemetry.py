@@ -534,6 +534,9 @@ def mission_current(vehicle: Vehicle) -> Fields:
 WITHOUT_POSITION, WITH_POSITION, STARTING = 167, 831, 1024
 """EKF_STATUS_FLAGS as recorded: attitude and height only, with a position, not initialised."""
 
+GLITCHING = 1 << 15
+"""Bit of the same: satellites are refused."""
+
 EKF_REPORTS_AFTER, EKF_STARTS_AFTER, EKF_ALIGNED_AFTER = int(3.3 * S), int(5.3 * S), int(5.75 * S)
 
 
@@ -545,10 +548,11 @@ def ekf_status(vehicle: Vehicle) -> Fields | None:
     if age < EKF_ALIGNED_AFTER:
         return {"flags": STARTING if age < EKF_STARTS_AFTER else 0}
     estimate = vehicle.estimate
+    flags = WITH_POSITION if vehicle.has_position else WITHOUT_POSITION
     return {
-        "flags": WITH_POSITION if vehicle.has_position else WITHOUT_POSITION,
+        "flags": flags | GLITCHING if vehicle.failsafes.glitching else flags,
         "velocity_variance": 0.007,
-        "pos_horiz_variance": min(1.0, estimate.gps_innovation * estimate.gps_innovation / 25.0),
+        "pos_horiz_variance": estimate.gps_innovation / 5.0,
         "pos_vert_variance": 0.002,
         "compass_variance": min(1.0, abs(estimate.heading_error)),
     }

@@ -15,6 +15,9 @@ from volery.base.elementary import atan2
 from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_AIDED,
+    C_GPS_GATE,
+    C_GPS_RADIUS,
+    C_GPS_SIGMA,
     K_ACCEL,
     K_ACCEL_BIAS,
     K_AIDED,
@@ -25,12 +28,14 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_EULER,
     K_GPS_AGE,
     K_GPS_INNOVATION,
+    K_GPS_REFUSED,
     K_GYRO_BIAS,
     K_HEADING_ERROR,
     K_ORIGIN,
     K_POSITION,
     K_RATES,
     K_SIGMA,
+    K_TARGET,
     K_USED_BARO,
     K_USED_GPS,
     K_USED_MAG,
@@ -80,6 +85,7 @@ _TILT_INTEGRAL = 0.01  # [1/s^2]
 _HEADING_GAIN = 0.4  # [1/s]
 _HEADING_INTEGRAL = 0.01  # [1/s^2]
 _GRAVITY_GAIN = 0.3  # [1/s] while nothing better is known
+_RESET_AFTER = 10.0  # [s] posRetryTimeUseVel_ms of EKF3
 _STALE = 1.0  # [s] after which a fix no longer holds the tilt
 
 
@@ -263,13 +269,55 @@ def _switch_aiding(row: Array) -> None:
 
 
 @numeric
+def _refuses(row: Array, north: float, east: float, variance: float) -> bool:
+    """Return whether a fix is too far from the estimate, and count the time for which all have been.
+
+    The test of EKF3 (AP_NavEKF3_PosVelFusion): both innovations over the gate (EK3_POS_I_GATE) and their
+    variances, that of the fix at least EK3_POSNE_M_NSE. After ten seconds the position is reset to the fix,
+    and the shaped target moves with it, so that the vehicle does not.
+
+    Args:
+        row: State row.
+        north: Innovation of the fix [m].
+        east: Innovation of the fix [m].
+        variance: Declared variance of each axis of a fix [m^2].
+    """
+    gate = row[C_GPS_GATE]
+    if gate <= 0.0:
+        return False
+    least = max(variance, row[C_GPS_SIGMA] * row[C_GPS_SIGMA])
+    total = row[K_COVARIANCE] + row[K_COVARIANCE + 6] + 2.0 * least
+    if north * north + east * east < gate * gate * total:
+        row[K_GPS_REFUSED] = 0.0
+        return False
+    row[K_GPS_REFUSED] += row[K_GPS_AGE]
+    if row[K_GPS_REFUSED] < _RESET_AFTER:
+        return True
+    row[K_GPS_REFUSED] = 0.0
+    sigma = 0.5 * row[C_GPS_RADIUS]
+    for axis in range(2):
+        jump = row[M_GPS + axis] - row[K_POSITION + axis]
+        row[K_POSITION + axis] += jump
+        row[K_TARGET + axis] += jump
+        speed = row[K_COVARIANCE + 6 * axis + 3]
+        _reset_covariance(row, axis, max(sigma * sigma, variance), speed)
+    return True
+
+
+@numeric
 def _fuse_gps(row: Array) -> None:
     """Fuse a new fix, and correct the tilt by part of the estimated acceleration bias."""
     level, speed = _variance(row, P_GPS_HORIZONTAL_ERROR), _variance(row, P_GPS_VELOCITY_ERROR)
     worst = 0.0
+    north, east = row[M_GPS] - row[K_POSITION], row[M_GPS + 1] - row[K_POSITION + 1]
+    refused = _refuses(row, north, east, level)
     for axis in range(2):
-        missed = row[M_GPS + axis] - row[K_POSITION + axis]
-        worst = max(worst, _fuse_position(row, axis, missed, level))
+        missed = north if axis == 0 else east
+        if refused:
+            total = row[K_COVARIANCE + 6 * axis] + max(level, row[C_GPS_SIGMA] * row[C_GPS_SIGMA])
+            worst = max(worst, abs(missed) / sqrt(total))
+        else:
+            worst = max(worst, _fuse_position(row, axis, missed, level))
         _fuse_velocity(row, axis, row[M_GPS_VELOCITY + axis] - row[K_VELOCITY + axis], speed)
     row[K_GPS_INNOVATION] = worst
     if row[M_GPS_FIX] >= RTK_FIX:

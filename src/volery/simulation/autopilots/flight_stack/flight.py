@@ -20,6 +20,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_COASTS,
     C_CONTROL,
     C_FULL_VOLTS,
+    C_GPS_GATE,
     C_HOVER_KEPT,
     C_STICK,
     C_YAW_P,
@@ -47,6 +48,7 @@ from volery.simulation.world.state_layout import (
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
     U_GPS_DRIFT,
+    U_GPS_OFFSET,
     U_MAG_BLOCKED,
     U_MOTOR_HEALTH,
     U_PUSH,
@@ -226,6 +228,16 @@ class Flight:
         """Stop using satellites, or use them again with the origin as it was; the receiver works on."""
         self._world.set_input(self._body, C_AIDED, 2.0 if used else 0.0)
 
+    def set_gps_gate(self, gate: float, sigma: float, radius: float) -> None:
+        """Let the estimator refuse fixes that are far from its position, as EKF3 of ArduPilot does.
+
+        Args:
+            gate: Distance from which a fix is refused, in standard deviations; 0: all are fused.
+            sigma: Least standard deviation of a fix in that comparison [m].
+            radius: Uncertainty of the position once it is reset to a fix, twice over [m].
+        """
+        self._world.set_input(self._body, C_GPS_GATE, gate, sigma, radius)
+
     def set_yaw_loop(self, gain: float, integral: float, corner: float) -> None:
         """Filter the error of the yaw rate, as ArduCopter does.
 
@@ -284,6 +296,10 @@ class Flight:
         self._world.set_input(
             self._body, U_GPS_DRIFT, north, east, float(self._world.advance_to_now(self._body))
         )
+
+    def offset_gps(self, north: float, east: float) -> None:
+        """Inject or clear a fault: the position that the receiver reports is off by so much [m]."""
+        self._world.set_input(self._body, U_GPS_OFFSET, north, east)
 
     def set_wind(self, north: float, east: float) -> None:
         """Set the mean velocity of the air about this vehicle, towards the north and the east [m/s]."""

@@ -103,6 +103,9 @@ C_STICK_SHARE = _add(
     "C_STICK_SHARE", "1", "rover: share by which the autopilot's own steering is reduced then"
 )
 C_COASTS = _add("C_COASTS", "1", "1: a rover does not brake by its motor")
+C_GPS_GATE = _add("C_GPS_GATE", "1", "distance from which a fix is refused, in its sigmas; 0: none is")
+C_GPS_SIGMA = _add("C_GPS_SIGMA", "m", "least sigma of a fix in that comparison")
+C_GPS_RADIUS = _add("C_GPS_RADIUS", "m", "twice the sigma of a position that is reset to a fix")
 C_FULL_VOLTS = _add(
     "C_FULL_VOLTS", "V", "voltage for which thrust is computed; with a lower one motors turn faster; 0: none"
 )
@@ -138,6 +141,7 @@ K_TARGET_VELOCITY = _add("K_TARGET_VELOCITY", "m/s", "shaped; rover: the first i
 K_TARGET_ACCEL = _add("K_TARGET_ACCEL", "m/s^2", "shaped", 3, NED)
 K_TARGET_EULER = _add("K_TARGET_EULER", "rad", "target of the attitude loop", 3, RPY)
 K_GPS_INNOVATION = _add("K_GPS_INNOVATION", "1", "last horizontal innovation of a fix, in sigmas")
+K_GPS_REFUSED = _add("K_GPS_REFUSED", "s", "time for which all fixes have been refused")
 
 # --- private memory ---
 K_GYRO_BIAS = _add("K_GYRO_BIAS", "rad/s", "estimated", 3, FRD)
@@ -358,6 +362,11 @@ class Estimate:
     def gps_innovation(self) -> float:
         """Last horizontal innovation of a fix, in its standard deviations."""
         return self._row[K_GPS_INNOVATION]
+
+    @property
+    def gps_refused(self) -> float:
+        """Time for which the estimator has refused all fixes [s]; 0 while it fuses them."""
+        return self._row[K_GPS_REFUSED]
 
     @property
     def gyro(self) -> Vector:

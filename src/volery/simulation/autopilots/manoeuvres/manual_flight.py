@@ -160,7 +160,6 @@ class Loiter(ClimbByThrottle):
         self._centred_at: Ns = NEVER
         self._braking = 0.0
         """Deceleration of the brake now [m/s^2]."""
-        self._held: Vector | None = None
 
     def enter(self) -> None:
         """Begin with the present velocity."""
@@ -169,7 +168,6 @@ class Loiter(ClimbByThrottle):
         self._last = self.vehicle.kernel.now()
         self._centred_at = NEVER  # the delay before braking counts from a stick that was let go in the mode
         self._braking = 0.0
-        self._held = None
 
     def step(self) -> None:
         """Update the velocity from the sticks, and give the set-point."""
@@ -179,7 +177,6 @@ class Loiter(ClimbByThrottle):
         if pilot.roll or pilot.pitch:
             self._centred_at = now
             self._braking = 0.0
-            self._held = None
             self._push(pilot, passed)
         else:
             self._let_go(now, passed)
@@ -213,20 +210,15 @@ class Loiter(ClimbByThrottle):
         slow = self._drag() * speed + self._braking
         left = max(0.0, speed - slow * passed)
         self._velocity = (north * left / speed, east * left / speed) if speed > 0.0 else (0.0, 0.0)
-        if left == 0.0 and self._held is None:
-            self._held = self.vehicle.estimate.target
 
     def _drive(self, pilot: StickPositions, climb: float) -> None:
         tuning = self.vehicle.tuning
         rate = pilot.yaw * tuning.pilot_yaw_rate
         north, east = self._velocity
-        held = self._held
         self.vehicle.drive(
             Setpoint(
-                Control.VELOCITY if held is None else Control.POSITION_CLIMB,
-                position=held or (0.0, 0.0, 0.0),
+                Control.VELOCITY,
                 velocity=(north, east, -climb),
-                climb=climb,
                 yaw_rate=rate,
                 speed=tuning.loiter_speed,
                 speed_up=max(tuning.pilot_up, climb),
@@ -236,9 +228,7 @@ class Loiter(ClimbByThrottle):
                 tilt=tuning.tilt,
             )
         )
-        given = self.vehicle.setpoint
-        if given.control is Control.VELOCITY:  # avoidance may have changed it
-            self._velocity, self._held = given.velocity[:2], None
+        self._velocity = self.vehicle.setpoint.velocity[:2]  # avoidance may have changed it
 
 
 ACRO_RATE = radians(360.0)

@@ -21,9 +21,6 @@ SLOW = 0.05
 BRAKE_ACCEL = 7.5
 """BRAKE_MODE_DECEL_RATE of ArduCopter [m/s^2]."""
 
-STANDS = 0.3
-"""Speed below which a braking vehicle holds its position [m/s]."""
-
 FACING_SHARE = 0.05
 """Share of the speed limit above which the nose follows the direction of flight."""
 
@@ -306,18 +303,13 @@ class Brake(Manoeuvre):
     def __init__(self, vehicle: Vehicle, accel: float = BRAKE_ACCEL) -> None:
         super().__init__(vehicle)
         self._accel = accel
-        self._held: Vector | None = None
 
     def step(self) -> None:
-        """Control to zero velocity, then to the position reached."""
-        estimate, tuning = self.vehicle.estimate, self.vehicle.tuning
-        north, east, _ = estimate.velocity
-        if self._held is None and hypot(north, east) < STANDS:
-            self._held = estimate.target
+        """Control to zero velocity: once it is reached, the shaped target stays where it is."""
+        tuning = self.vehicle.tuning
         self.vehicle.drive(
             Setpoint(
-                Control.VELOCITY if self._held is None else Control.POSITION,
-                position=self._held or (0.0, 0.0, 0.0),
+                Control.VELOCITY,
                 accel=self._accel,
                 accel_z=tuning.pilot_accel_z,
                 tilt=tuning.tilt,
