@@ -185,7 +185,7 @@ class Tuning:
     throttle_dead: float = 0.1
     """Half width of the throttle's dead zone about its middle, on a scale of 0..1."""
     hover_throttle: float | None = None
-    """Collective in hover that the inner loops start with; ``None``: their own."""
+    """Stored collective in hover, see ``Flight.set_hover_throttle``; ``None``: that of the inner loops."""
     gps_gate: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Gate of a fix in sigmas, its least sigma and the radius of a reset [m], see ``Flight.set_gps_gate``."""
     thrust_volts: tuple[float, float] = (0.0, 0.0)

@@ -446,6 +446,27 @@ class ProximityState:
 
 
 @dataclass
+class PrecisionState:
+    """Target of a precision landing. Lengths in metres, times in ns."""
+
+    kind: int | None = None
+    """Type that the vehicle has booted with; ``None``: not known yet."""
+    found: bool = False
+    """Whether the target is seen, and since when."""
+    found_at: Ns = NEVER
+    acquired: bool = False
+    """Whether it counts."""
+    measured_at: Ns = NEVER
+    place: tuple[float, float] = (0.0, 0.0)
+    """Estimated place, north, east about the estimator's origin, and its variance [m^2]."""
+    variance: float = 0.0
+    down: float = 0.0
+    """Distance below the vehicle at the last measurement."""
+    loiters: bool = False
+    """Whether LOITER is held over it."""
+
+
+@dataclass
 class AvoidanceState:
     """Avoidance of the fence and of obstacles."""
 

@@ -37,6 +37,7 @@ from volery.simulation.autopilots.state_groups import (
     Home,
     LeadState,
     OutputState,
+    PrecisionState,
     ProximityState,
     ReportState,
     SwitchState,
@@ -274,6 +275,8 @@ class Vehicle:
         """State that only the firmware uses."""
         self.boot_at: Ns = kernel.now()
         self.mode: Mode = rules.boot_mode
+        self.mode_before: Mode = rules.boot_mode
+        """The mode that was left last."""
         self.manoeuvre: Manoeuvre = self.mode.manoeuvre(self)
         self._reset()
 
@@ -289,6 +292,7 @@ class Vehicle:
         self.failsafes = FailsafeState()
         self.fence = FenceState()
         self.proximity = ProximityState()
+        self.precision = PrecisionState()
         self.avoidance = AvoidanceState()
         self.traffic = TrafficState()
         self.reports = ReportState(arming_checks_at=self.uptime(), counters_at=self.uptime())
@@ -415,6 +419,7 @@ class Vehicle:
 
     def enter_mode(self, mode: Mode) -> None:
         """Enter *mode*. The caller has decided that the mode is permitted."""
+        self.mode_before = self.mode
         self.mode = mode
         self.commanded = CommandedLimits()
         self.manoeuvre = mode.manoeuvre(self)

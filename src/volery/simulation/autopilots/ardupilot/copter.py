@@ -36,6 +36,7 @@ from volery.simulation.autopilots.ardupilot.firmware import (
     send_version,
     streams,
 )
+from volery.simulation.autopilots.ardupilot.flip import Flip
 from volery.simulation.autopilots.ardupilot.guided import copter_attitude, copter_global, copter_local
 from volery.simulation.autopilots.ardupilot.landing_gear import watch_gear
 from volery.simulation.autopilots.ardupilot.landing_sequence import leave_sequence
@@ -60,6 +61,12 @@ from volery.simulation.autopilots.ardupilot.mount import update_mount
 from volery.simulation.autopilots.ardupilot.mount_control import on_other_position
 from volery.simulation.autopilots.ardupilot.parameter_checks import copter_problems
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED, copter_tuning
+from volery.simulation.autopilots.ardupilot.precision_landing import (
+    aim,
+    on_landing_target,
+    precision_rows,
+    update_target,
+)
 from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, log_rows, update_proximity
 from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.servo_outputs import pass_transmitter_through
@@ -78,6 +85,7 @@ from volery.simulation.autopilots.ardupilot.weathervane import turn_into_wind
 from volery.simulation.autopilots.ardupilot.winch import no_servo, update_winch
 from volery.simulation.autopilots.autopilot import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
+from volery.simulation.autopilots.flight_stack.flight import Setpoint
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, GuidedAttitude
 from volery.simulation.autopilots.manoeuvres.manual_flight import (
     Acro,
@@ -94,6 +102,7 @@ from volery.simulation.autopilots.manoeuvres.to_point import Brake, Land, Return
 from volery.simulation.autopilots.manoeuvres.zigzag import ZigZag
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.simulation.autopilots.mavlink.firmware import LinkStart
+from volery.simulation.autopilots.onboard_log import LogRow
 from volery.simulation.autopilots.onboard_mission import DO_AUX_FUNCTION
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import (
@@ -127,6 +136,7 @@ LANDED_TO_DISARM = 200 * MS
 """Recorded: disarming 2.07 s after touch-down, most of it in the landed detector."""
 RUDDER_HOLD = 2 * S
 OPTION_MODES = {
+    2: 14,
     4: 6,
     16: 3,
     18: 9,
@@ -197,6 +207,7 @@ MODES = {
         Mode(1, "ACRO", MANUAL_BITS, Acro, pilot=True, manual_throttle=True),
         Mode(7, "CIRCLE", AUTO_BITS, CircleMode, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
         Mode(11, "DRIFT", MANUAL_BITS, Drift, needs_position=True, pilot=True, manual_throttle=True),
+        Mode(14, "FLIP", MANUAL_BITS, Flip, armable=False),
         Mode(16, "POSHOLD", AUTO_BITS, Loiter, LEVEL_AND_HEIGHT, True, pilot=True, user_takeoff=True),
         Mode(18, "THROW", MANUAL_BITS, Throw, needs_position=True, manual_throttle=True),
         Mode(19, "AVOID_ADSB", AUTO_BITS, Guided, LEVEL_AND_HEIGHT, needs_position=True, armable=False),
@@ -294,6 +305,7 @@ def on_step(vehicle: Vehicle) -> None:
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_copter)
     update_proximity(vehicle)
+    update_target(vehicle)
     traffic.update_traffic(vehicle)
     check_takeoff(vehicle)
     commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))
@@ -419,6 +431,16 @@ def _on_other_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) ->
     traffic.on_position(vehicle, fields, sender)
 
 
+def limit(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
+    """Return the set-point that is given: over the target of a precision landing, and within avoidance."""
+    return limit_copter(vehicle, aim(vehicle, setpoint))
+
+
+def log_extras(vehicle: Vehicle) -> tuple[LogRow, ...]:
+    """Return what the log has beside the samples of every firmware."""
+    return (*log_rows(vehicle), *precision_rows(vehicle))
+
+
 _MAVLINK = ardupilot_mavlink(
     start=LinkStart(
         boot_bytes=boot.bytes_at(
@@ -447,6 +469,7 @@ _MAVLINK = ardupilot_mavlink(
         "ADSB_VEHICLE": traffic.on_adsb,
         "FOLLOW_TARGET": follow.on_target,
         "GLOBAL_POSITION_INT": _on_other_position,
+        "LANDING_TARGET": on_landing_target,
         "SET_ATTITUDE_TARGET": copter_attitude,
         "SET_POSITION_TARGET_GLOBAL_INT": copter_global,
         "SET_POSITION_TARGET_LOCAL_NED": copter_local,
@@ -461,8 +484,8 @@ COPTER = Firmware(
         modes=MODES,
         boot_mode=MODES[0],
         return_point=return_point,
-        limit=limit_copter,
-        log_extras=log_rows,
+        limit=limit,
+        log_extras=log_extras,
         startup=StartupTimes(READY, ORIGIN, POSITION, POSITION),
         arming=ArmingTimes(
             motors_rest=2 * S, spool_up=500 * MS, takeoff_slew=100 * MS, abandoned_after=1500 * MS

@@ -68,7 +68,8 @@ PRX = _Form(
 PRXR = _Form(138, "PRXR", "QBffffffff", "TimeUS,Layer,D0,D45,D90,D135,D180,D225,D270,D315")
 EV = _Form(139, "EV", "QB", "TimeUS,Id")
 ARMED_EVENT, DISARMED_EVENT = 10, 11
-EXTRAS = {form.name: form for form in (PRX, PRXR)}
+PL = _Form(140, "PL", "QBBfffffffIIB", "TimeUS,Heal,TAcq,pX,pY,vX,vY,mX,mY,mZ,LastMeasMS,EKFOutl,Est")
+EXTRAS = {form.name: form for form in (PRX, PRXR, PL)}
 """Messages of ``FlightLog.extras``."""
 FORMS = (FMT, PARM, MSG, MODE, ARM, EV, ATT, POS, GPS, BAT, *EXTRAS.values())
 
@@ -108,7 +109,7 @@ def _extra_row(sample: LogSample, name: str, values: tuple[float, ...]) -> bytes
     """Return a row of the firmware's own at the time of a sample."""
     form = EXTRAS[name]
     fitting = (
-        int(one) if letter == "B" else one for letter, one in zip(form.letters[1:], values, strict=True)
+        int(one) if letter in "BI" else one for letter, one in zip(form.letters[1:], values, strict=True)
     )
     return form.row(round(sample.time_us), *fitting)
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from volery.base.time import Ns, S
 from volery.simulation.autopilots.ardupilot.battery import left_mah
+from volery.simulation.autopilots.ardupilot.flip import may_flip
 from volery.simulation.autopilots.ardupilot.landing_sequence import AUTO_RTL, nearest_landing
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED
@@ -161,7 +162,6 @@ MISSION_MODES = ("AUTO", "AUTO_RTL")
 """Names of the modes that fly the mission."""
 
 WITHOUT_EFFECT = {
-    14: ("FLIP", ""),
     15: ("AUTOTUNE", ""),
     22: ("FLOWHOLD", ""),
     25: ("SYSTEMID", "No axis selected, SID_AXIS = 0"),
@@ -231,7 +231,7 @@ def _enter(vehicle: Vehicle, mode: Mode) -> bool:
 
 def _not_set_up(vehicle: Vehicle, mode: Mode) -> str:
     """Return why a vehicle may not enter a mode, armed or not, or an empty text."""
-    if mode.name == "THROW" and vehicle.armed:
+    if (mode.name == "THROW" and vehicle.armed) or (mode.name == "FLIP" and not may_flip(vehicle)):
         return "init failed"
     if mode.name == "FOLLOW" and not vehicle.parameters["FOLL_ENABLE"]:
         vehicle.send_text(WARNING, "Set FOLL_ENABLE = 1")

@@ -27,7 +27,9 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_FULL_VOLTS,
     C_LEAST_VOLTS,
     C_MOTOR,
+    C_PITCH_RATE,
     C_POSITION,
+    C_ROLL_RATE,
     C_SPEED,
     C_STEERING,
     C_STICK,
@@ -70,6 +72,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_YAW_SPEED,
     MOTOR,
     OFF,
+    RATE,
     STEER,
 )
 from volery.simulation.autopilots.flight_stack.guidance import GUIDE_S, approach, ramp
@@ -255,7 +258,10 @@ def run_attitude_loops(row: Array, control: int) -> None:
             row[K_MOTORS + int(row[C_MOTOR])] = row[C_THROTTLE]
         return
     row[K_SPOOL] = min(1.0, row[K_SPOOL] + STEP_S / _SPOOL_TIME)
-    roll_rate, pitch_rate, yaw_rate = _rate_targets(row)
+    if control == RATE:
+        roll_rate, pitch_rate, yaw_rate = row[C_ROLL_RATE], row[C_PITCH_RATE], row[C_YAW_RATE]
+    else:
+        roll_rate, pitch_rate, yaw_rate = _rate_targets(row)
     roll = _torque(row, 0, roll_rate)
     pitch = _torque(row, 1, pitch_rate)
     yaw = _filtered_yaw_torque(row, yaw_rate) if row[C_YAW_P] > 0.0 else _torque(row, 2, yaw_rate)

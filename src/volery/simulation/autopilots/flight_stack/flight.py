@@ -94,6 +94,7 @@ class Setpoint:
         jerk: Limit of the target's jerk [m/s^3]; the default is ArduPilot's PSC_JERK_XY and PSC_JERK_Z.
         straight: POSITION: whether a point is approached along a straight line; else height and horizontal
             position have their own limits.
+        roll_rate: RATE: body rate [rad/s]; likewise ``pitch_rate``, and ``yaw_rate``.
         motor: MOTOR: number of the motor that turns alone, from 0; ``throttle`` is its command.
     """
 
@@ -116,6 +117,8 @@ class Setpoint:
     jerk: float = 5.0
     straight: bool = False
     motor: int = 0
+    roll_rate: float = 0.0
+    pitch_rate: float = 0.0
 
     def row(self) -> tuple[float, ...]:
         """Return the values in the order of the command columns, from ``C_CONTROL`` on."""
@@ -141,6 +144,8 @@ class Setpoint:
             self.jerk,
             float(self.straight),
             float(self.motor),
+            self.roll_rate,
+            self.pitch_rate,
         )
 
 

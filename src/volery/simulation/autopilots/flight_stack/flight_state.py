@@ -41,7 +41,7 @@ from volery.simulation.world.state_layout import (
 class Control(IntEnum):
     """Quantities that the inner loops control.
 
-    Multirotors take OFF to VELOCITY_HEIGHT, and MOTOR; rovers take OFF, IDLE, POSITION, STEER and DRIVE.
+    Multirotors take OFF to VELOCITY_HEIGHT, MOTOR and RATE; rovers take OFF, IDLE, POSITION, STEER and DRIVE.
     """
 
     OFF = 0  # motors stopped: disarmed
@@ -55,10 +55,11 @@ class Control(IntEnum):
     STEER = 8  # rover: steering and throttle, passed through
     DRIVE = 9  # rover: speed, and heading or turn rate
     MOTOR = 10  # multirotor on the ground: one motor, the others stopped
+    RATE = 11  # multirotor: body rates and throttle
 
 
 OFF, IDLE, ATTITUDE, CLIMB, VELOCITY, POSITION, POSITION_CLIMB, VELOCITY_HEIGHT = range(8)
-STEER, DRIVE, MOTOR = range(8, 11)
+STEER, DRIVE, MOTOR, RATE = range(8, 12)
 
 HOLD_HEADING, YAW_ANGLE, YAW_RATE, YAW_ANGLE_AND_RATE = range(4)
 """Values of ``C_YAW_MODE``."""
@@ -71,7 +72,7 @@ assert FLIGHT_LAYOUT.start == WORLD
 # --- scratch ---
 W_DCM = _add("W_DCM", "1", f"matrix from body ({FRD}) to {NED}", 9, "3 x 3 by rows")
 
-# --- commands: C_CONTROL to C_MOTOR in the order of ``Setpoint.row`` ---
+# --- commands: C_CONTROL to C_PITCH_RATE in the order of ``Setpoint.row`` ---
 C_CONTROL = _add("C_CONTROL", "1", "a Control")
 C_POSITION = _add("C_POSITION", "m", "about the estimator's origin", 3, NED)
 C_VELOCITY = _add("C_VELOCITY", "m/s", "over the ground; rover DRIVE: the first is the forward speed", 3, NED)
@@ -92,6 +93,8 @@ C_TILT = _add("C_TILT", "rad", "limit of tilt")
 C_JERK = _add("C_JERK", "m/s^3", "limit of the shaped target's jerk")
 C_STRAIGHT = _add("C_STRAIGHT", "1", "1: height and horizontal position are approached along a straight line")
 C_MOTOR = _add("C_MOTOR", "1", "MOTOR: number of the motor, from 0")
+C_ROLL_RATE = _add("C_ROLL_RATE", "rad/s", "RATE: body rate about the forward axis")
+C_PITCH_RATE = _add("C_PITCH_RATE", "rad/s", "RATE: body rate about the right axis")
 C_AIDED = _add(
     "C_AIDED", "1", "1: use satellites; the origin is the position then; 2: with the origin as it is"
 )

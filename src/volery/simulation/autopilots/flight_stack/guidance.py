@@ -67,6 +67,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     OFF,
     POSITION,
     POSITION_CLIMB,
+    RATE,
     VELOCITY,
     VELOCITY_HEIGHT,
 )
@@ -481,6 +482,11 @@ def guide_multirotor(row: Array) -> None:
         row[K_CONTROL] = control
     if control in (OFF, IDLE, MOTOR):
         _hold_nothing(row)
+        return
+    if control == RATE:
+        row[K_THROTTLE] = clip(row[C_THROTTLE], 0.0, 1.0)
+        row[K_YAW_SPEED] = 0.0
+        _set_target_angles(row, 0.0, 0.0)  # from which the next control begins
         return
     _shape_yaw(row)
     if row[K_SPOOL] < 1.0 and row[K_LANDED] > 0.5:

@@ -182,6 +182,11 @@ class Loiter(ClimbByThrottle):
             self._let_go(now, passed)
         self._drive(pilot, climb)
 
+    def is_left_alone(self) -> bool:
+        """Return whether no stick commands a motion over the ground."""
+        pilot = self.pilot
+        return not (pilot.roll or pilot.pitch)
+
     def _drag(self) -> float:
         """Return deceleration over speed [1/s]: it balances the largest tilt at the largest speed."""
         return GRAVITY * tan(self.vehicle.tuning.loiter_tilt) / self.vehicle.tuning.loiter_speed

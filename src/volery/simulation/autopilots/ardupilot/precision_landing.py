@@ -1,0 +1,196 @@
+"""Precision landing and loiter over a target that a companion computer or a simulated beacon finds.
+
+Laws, times and texts are those of AC_PrecLand and Mode::land_run_vertical_control of ArduCopter. The target
+stands: its place is estimated by a filter of one state for each axis, and its velocity is not. Landings are
+not tried again (PLND_STRICT, PLND_RET_MAX).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import hypot, radians, sqrt
+from typing import Any
+
+from volery.base.elementary import cos, sin, tan
+from volery.base.frames import Vector, world_to_body
+from volery.base.time import MS, Ns, to_seconds
+from volery.simulation.autopilots.ardupilot.modes import CRITICAL, INFO
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
+from volery.simulation.autopilots.onboard_log import LogRow
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+COMPANION, IRLOCK, SIMULATED = 1, 2, 4
+"""PLND_TYPE; the simulated beacon answers to the last two."""
+RAW_SENSOR = 0
+"""PLND_EST_TYPE."""
+PRECISION_LOITER = 39
+"""RCn_OPTION of precision loiter."""
+BODY_FRD = 12
+"""MAV_FRAME."""
+STARTS_AFTER: Ns = 2000 * MS
+"""Time for which a target must be seen before it counts [ns]: EKF_INIT_TIME_MS."""
+SEEN_WITHIN: Ns = 500 * MS
+LOST_AFTER: Ns = 2000 * MS
+WANDERS = 0.01
+"""Variance that the place of a target gains [m^2/s]; estimated."""
+SLOW_FROM, SLOW_TO = 2.0, 0.35
+"""Heights above the target between which the descent is slowed down [m]."""
+ACCEPTABLE, LEAST_DESCENT = 0.15, 0.1
+"""Error that stops the descent there [m], down to that rate [m/s]."""
+
+
+def _kind(vehicle: Vehicle) -> int:
+    """Return the type that the vehicle has booted with, 0 without precision landing."""
+    state, parameters = vehicle.precision, vehicle.parameters
+    if state.kind is None:
+        state.kind = round(parameters["PLND_TYPE"]) if parameters["PLND_ENABLED"] else 0
+    return state.kind
+
+
+def on_landing_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """Handle LANDING_TARGET: angles, or a position in body axes with its distance."""
+    if _kind(vehicle) != COMPANION:
+        return
+    distance = float(fields["distance"])
+    if not fields.get("position_valid"):
+        _measure(vehicle, (-tan(fields["angle_y"]), tan(fields["angle_x"]), 1.0), distance)
+    elif fields["frame"] == BODY_FRD and distance > 0.0:
+        _measure(vehicle, (fields["x"], fields["y"], fields["z"]), distance)
+
+
+def _measure(vehicle: Vehicle, sight: Vector, distance: float) -> None:
+    """Take a measurement of the target.
+
+    Args:
+        vehicle: The vehicle.
+        sight: A vector towards the target, forward, right, down, of any length.
+        distance: Distance of the target [m]; not above 0: the range finder gives the height above it.
+    """
+    estimate = vehicle.estimate
+    if sight[2] <= 0.0 or not estimate.position_ok:
+        return
+    if distance > 0.0:
+        scale = distance / sqrt(sum(one * one for one in sight))
+    elif vehicle.parameters["RNGFND1_TYPE"] and estimate.rangefinder:
+        scale = estimate.rangefinder / sight[2]
+    else:
+        return
+    turn = radians(vehicle.parameters["PLND_YAW_ALIGN"] * 0.01)
+    forward = (sight[0] * cos(turn) - sight[1] * sin(turn)) * scale
+    right = (sight[0] * sin(turn) + sight[1] * cos(turn)) * scale
+    w, x, y, z = estimate.quaternion
+    north, east, down = world_to_body((w, -x, -y, -z), (forward, right, sight[2] * scale))
+    here = estimate.position
+    _fuse(vehicle, (here[0] + north, here[1] + east), down, hypot(*estimate.rates))
+
+
+def _fuse(vehicle: Vehicle, place: tuple[float, float], down: float, rate: float) -> None:
+    """Update the target's place by a measurement; the first one begins a search."""
+    state, now = vehicle.precision, vehicle.kernel.now()
+    sigma = down * (0.01 + 0.01 * rate) + 0.02
+    state.down = down
+    if not state.found:
+        vehicle.send_text(INFO, "PrecLand: Target Found")
+        state.found, state.found_at = True, now
+        state.place, state.variance = place, sigma * sigma
+    state.variance += (
+        WANDERS * to_seconds(now - state.measured_at) if state.measured_at > state.found_at else 0.0
+    )
+    raw = vehicle.parameters["PLND_EST_TYPE"] == RAW_SENSOR
+    share = 1.0 if raw else state.variance / (state.variance + sigma * sigma)
+    state.place = (
+        state.place[0] + share * (place[0] - state.place[0]),
+        state.place[1] + share * (place[1] - state.place[1]),
+    )
+    state.variance *= 1.0 - share
+    state.measured_at = now
+    state.acquired = state.acquired or raw
+
+
+def update_target(vehicle: Vehicle) -> None:
+    """Measure the simulated beacon; begin to believe a target, and lose it."""
+    if _kind(vehicle) in (IRLOCK, SIMULATED):
+        _see_beacon(vehicle)
+    state, now = vehicle.precision, vehicle.kernel.now()
+    if state.acquired:
+        if now - state.measured_at > LOST_AFTER:
+            vehicle.send_text(CRITICAL, "PrecLand: Target Lost")
+            state.found = state.acquired = False
+    elif state.found and now - state.measured_at > SEEN_WITHIN:
+        vehicle.send_text(CRITICAL, "PrecLand: Init Failed")
+        state.found = False
+    elif state.found and now - state.found_at > STARTS_AFTER:
+        vehicle.send_text(INFO, "PrecLand: Init Complete")
+        state.acquired = True
+
+
+def _see_beacon(vehicle: Vehicle) -> None:
+    """Measure the direction of the beacon that SIM_PLD_ places, within its cylinder."""
+    p, estimate = vehicle.parameters, vehicle.estimate
+    if not p["SIM_PLD_ENABLE"] or vehicle.home is None:
+        return
+    amsl = vehicle.home.amsl + p["SIM_PLD_HEIGHT"]
+    north, east, down = vehicle.flight.to_ned(p["SIM_PLD_LAT"], p["SIM_PLD_LON"], amsl)
+    here = estimate.position
+    sight = (north - here[0], east - here[1], down - here[2])
+    if 0.0 < sight[2] <= p["SIM_PLD_ALT_LMT"] and hypot(sight[0], sight[1]) <= p["SIM_PLD_DIST_LMT"]:
+        _measure(vehicle, world_to_body(estimate.quaternion, sight), 0.0)
+
+
+def target_place(vehicle: Vehicle) -> Vector:
+    """Return where the copter is to stand: at the target, PLND_LAND_OFS_X ahead and _Y to the right."""
+    p, heading = vehicle.parameters, vehicle.estimate.attitude[2]
+    ahead, right = p["PLND_LAND_OFS_X"] / 100.0, p["PLND_LAND_OFS_Y"] / 100.0
+    north, east = vehicle.precision.place
+    c, s = cos(heading), sin(heading)
+    return north + ahead * c - right * s, east + ahead * s + right * c, 0.0
+
+
+def aim(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
+    """Return the set-point of a landing, or of LOITER with the switch up, over the target if one is seen."""
+    state, manoeuvre = vehicle.precision, vehicle.manoeuvre.flown
+    if not state.acquired or vehicle.landed:
+        return setpoint
+    if vehicle.manoeuvre.landing and setpoint.control is Control.POSITION_CLIMB:
+        place = target_place(vehicle)
+        return replace(setpoint, position=place, climb=-_descent(vehicle, place, -setpoint.climb))
+    if state.loiters and isinstance(manoeuvre, Loiter) and manoeuvre.is_left_alone():
+        return replace(
+            setpoint,
+            control=Control.POSITION_CLIMB,
+            position=target_place(vehicle),
+            climb=-setpoint.velocity[2],
+        )
+    return setpoint
+
+
+def _descent(vehicle: Vehicle, place: Vector, rate: float) -> float:
+    """Return the rate of descent [m/s] over a target, of a landing that would descend at *rate*."""
+    here, farthest = vehicle.estimate.position, vehicle.parameters["PLND_XY_DIST_MAX"]
+    error = hypot(place[0] - here[0], place[1] - here[1])
+    if error > farthest > 0.0:
+        return 0.0
+    if SLOW_TO < vehicle.precision.down < SLOW_FROM:
+        most = vehicle.tuning.land_speed / 2.0
+        return max(LEAST_DESCENT, most - error * most / ACCEPTABLE)
+    return rate
+
+
+def switch_loiter(vehicle: Vehicle, position: int) -> None:
+    """Hold LOITER over the target while the switch is up."""
+    if position:
+        vehicle.precision.loiters = position > 0
+
+
+def precision_rows(vehicle: Vehicle) -> tuple[LogRow, ...]:
+    """Return PL of the log on board."""
+    if not _kind(vehicle):
+        return ()
+    state, here = vehicle.precision, vehicle.estimate.position
+    north, east = (there - at for there, at in zip(state.place, here[:2], strict=True))
+    speed = vehicle.estimate.velocity
+    seen = (north, east, -speed[0], -speed[1], north, east, state.down) if state.acquired else (0.0,) * 7
+    at_ms = max(0, (state.measured_at - vehicle.boot_at) // MS)
+    kind = vehicle.parameters["PLND_EST_TYPE"]
+    return (("PL", (1.0, float(state.acquired), *seen, float(at_ms), 0.0, kind)),)
