@@ -65,6 +65,17 @@ def accepts(vehicle: Vehicle, name: str, system: int) -> bool:
     return system in (vehicle.system, round(vehicle.parameters["SYSID_MYGCS"]))
 
 
+PRIVATE = 1 << 10
+"""Bit of SERIALn_OPTIONS."""
+SERIAL_PORTS = range(1, 8)
+
+
+def private_links(vehicle: Vehicle) -> frozenset[int]:
+    """Return the numbers of the links that SERIALn_OPTIONS makes private."""
+    options = ((port, round(vehicle.parameters[f"SERIAL{port}_OPTIONS"])) for port in SERIAL_PORTS)
+    return frozenset(port for port, value in options if value & PRIVATE)
+
+
 def questions(sent: TelemetryPolicy) -> dict[str, QuestionHandler]:
     """Return the handlers by message; *sent* builds AUTOPILOT_VERSION."""
 
@@ -343,6 +354,7 @@ def ardupilot_mavlink(
             set_mode_ack=11,
             questions=questions(sent),
             accepts=accepts,
+            private_links=private_links,
             nan_commands=frozenset({mount_control.GIMBAL_PITCHYAW}),
         ),
         missions=MissionPolicy(

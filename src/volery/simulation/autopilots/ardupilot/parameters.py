@@ -138,6 +138,10 @@ _SHARED = {
     "SIM_WIND_SPD": "mean speed of the wind",
     "SIM_PIN_MASK": "bits of the pins that are high: relays set them, buttons are read from them",
     **{
+        f"SERIAL{port}_OPTIONS": "bit 10: link of that number is private, from the next boot on"
+        for port in range(1, 8)
+    },
+    **{
         f"SERVO{channel}_{part}": f"{words} of output {channel}"
         for channel in range(1, 17)
         for part, words in (

@@ -127,6 +127,11 @@ class MavlinkChannel:
         if self.open:
             self.link.send(Frame(name, fields, self._system, AUTOPILOT))
 
+    def pass_on(self, frame: Frame) -> None:
+        """Send a message of another system or component, while the channel is open."""
+        if self.open and self.is_wanted(frame.name):
+            self.link.send(frame)
+
     def stream(self) -> None:
         """Start the streams: the usual ones and those that were requested."""
         for name, period in self.usual.items():

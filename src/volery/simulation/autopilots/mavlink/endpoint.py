@@ -25,6 +25,7 @@ from volery.simulation.autopilots.mavlink.microservices import (
     MissionService,
     ParameterService,
 )
+from volery.simulation.autopilots.mavlink.routing import Routes
 from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.trace.events import Text
 
@@ -50,6 +51,7 @@ class MavlinkEndpoint:
         self._arrived: deque[tuple[MavlinkChannel, Frame]] = deque()
         self._handling = False
         self._after: list[Action] = []
+        self._routes: Routes | None = None
         self._text_id = 0
         self._timers: list[Handle] = []
         self._parameters = parameters = ParameterService(vehicle, firmware.parameters)
@@ -152,6 +154,8 @@ class MavlinkEndpoint:
         """Start heartbeats, time requests and streams, in phase with the boot."""
         self.stop()
         vehicle, firmware = self._vehicle, self.firmware
+        private = firmware.commands.private_links
+        self._routes = Routes(vehicle.system, private(vehicle)) if private is not None else None
         age = vehicle.uptime()
         for piece in firmware.start.boot_bytes[1:] if not age else ():
             self._at_uptime(piece.after, partial(self._send_bytes, piece.data))
@@ -261,6 +265,8 @@ class MavlinkEndpoint:
     def _handle(self) -> None:
         channel, frame = self._arrived.popleft()
         fields = frame.fields
+        if self._routes is not None:
+            self._routes.forward(channel, frame, self.channels)
         if not self.firmware.commands.accepts(self._vehicle, frame.name, frame.system):
             return
         if not self._is_addressed(frame):

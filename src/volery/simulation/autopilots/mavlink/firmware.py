@@ -181,6 +181,8 @@ class CommandPolicy:
     """
     accepts: Callable[[Vehicle, str, int], bool] = _always
     """Whether a message, by its name and the system that sends it, is handled at all."""
+    private_links: Callable[[Vehicle], frozenset[int]] | None = None
+    """Numbers of the links between which and others nothing is forwarded; ``None``: nothing ever is."""
     reads_nan: bool = False
     """Whether a NaN parameter of a command means that the parameter is not given."""
     nan_commands: frozenset[int] = frozenset()
