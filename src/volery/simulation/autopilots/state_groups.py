@@ -446,6 +446,19 @@ class ProximityState:
 
 
 @dataclass
+class SurfaceState:
+    """The ground below by the range finder: heights above the estimator's origin [m], times in ns."""
+
+    ignored: bool = False
+    """Whether a switch keeps the range finder from being used."""
+    ground: float = 0.0
+    """Height of the ground, filtered, and by how much of it the target height has moved."""
+    followed: float = 0.0
+    measured_at: Ns = NEVER
+    followed_at: Ns = NEVER
+
+
+@dataclass
 class PrecisionState:
     """Target of a precision landing. Lengths in metres, times in ns."""
 

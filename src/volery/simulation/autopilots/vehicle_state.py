@@ -40,6 +40,7 @@ from volery.simulation.autopilots.state_groups import (
     PrecisionState,
     ProximityState,
     ReportState,
+    SurfaceState,
     SwitchState,
     TrafficState,
 )
@@ -154,6 +155,11 @@ def unlimited(_vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     return setpoint
 
 
+def height_above_home(vehicle: Vehicle) -> float:
+    """Return the height above home: the default of a firmware without a range finder."""
+    return vehicle.height
+
+
 def no_rows(_vehicle: Vehicle) -> tuple[LogRow, ...]:
     """Return no rows: the default of a firmware that logs nothing of its own."""
     return ()
@@ -218,6 +224,8 @@ class VehicleRules:
     rc: RcDefaults
     return_point: Callable[[Vehicle], Vector | None] = do_nothing
     """Return where a return ends and its least height, north, east, down [m]; ``None``: home."""
+    height_above_ground: Callable[[Vehicle], float] = height_above_home
+    """Return the height that a landing goes by [m]."""
     limit: Callable[[Vehicle, Setpoint], Setpoint] = unlimited
     """Return the set-point that a manoeuvre may give, as avoidance limits it."""
     log_extras: Callable[[Vehicle], tuple[LogRow, ...]] = no_rows
@@ -293,6 +301,7 @@ class Vehicle:
         self.fence = FenceState()
         self.proximity = ProximityState()
         self.precision = PrecisionState()
+        self.surface = SurfaceState()
         self.avoidance = AvoidanceState()
         self.traffic = TrafficState()
         self.reports = ReportState(arming_checks_at=self.uptime(), counters_at=self.uptime())

@@ -1,9 +1,9 @@
 """ArduPilot's auxiliary functions: what RCn_OPTION assigns to a switch of the transmitter.
 
 The same functions act by a switch that moves, by the command DO_AUX_FUNCTION and by its mission item. A
-position is 1 up, 0 in the middle, -1 down. Four functions count as soon as the transmitter is first read:
-emergency stop and motor interlock, both of which keep the motors from turning, avoidance by proximity, and
-precision loiter.
+position is 1 up, 0 in the middle, -1 down. Five functions count as soon as the transmitter is first read:
+emergency stop and motor interlock, both of which keep the motors from turning, avoidance by proximity,
+precision loiter and the range finder.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from volery.simulation.autopilots.ardupilot.mount_control import lock_by_switch,
 from volery.simulation.autopilots.ardupilot.payload import GRAB, LET_GO, move_gripper, set_relay
 from volery.simulation.autopilots.ardupilot.pilot_input import HIGHEST, LOWEST, sticks_moved
 from volery.simulation.autopilots.ardupilot.precision_landing import PRECISION_LOITER, switch_loiter
+from volery.simulation.autopilots.ardupilot.range_finder import RANGE_FINDER, switch_range_finder
 from volery.simulation.autopilots.ardupilot.sprayer import switch_sprayer
 from volery.simulation.autopilots.ardupilot.winch import CONTROL, switch_winch
 from volery.simulation.autopilots.manoeuvres.zigzag import ZigZag
@@ -44,7 +45,7 @@ FIRST_SWITCH = 5
 
 NOTHING, ARMING, DISARMING, EMERGENCY_STOP, INTERLOCK, PROXIMITY = 0, 153, 81, 31, 32, 40
 """Values of RCn_OPTION."""
-READ_AT_ONCE = (EMERGENCY_STOP, INTERLOCK, PROXIMITY, PRECISION_LOITER)
+READ_AT_ONCE = (EMERGENCY_STOP, INTERLOCK, PROXIMITY, PRECISION_LOITER, RANGE_FINDER)
 """Those that count as soon as the transmitter is first read."""
 RELAY_OPTIONS = (28, 34, 35, 36, 66, 67)
 LOWEST_TAKEOFF = 1.0
@@ -238,6 +239,7 @@ def _item_here(vehicle: Vehicle, command: int) -> MissionItem:
 FUNCTIONS: Mapping[int, Callable[[Vehicle, int], None]] = {
     7: _save_waypoint,
     9: picture_by_switch,
+    RANGE_FINDER: switch_range_finder,
     11: _fence,
     15: switch_sprayer,
     19: _gripper,

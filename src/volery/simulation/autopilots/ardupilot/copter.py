@@ -69,6 +69,7 @@ from volery.simulation.autopilots.ardupilot.precision_landing import (
 )
 from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, log_rows, update_proximity
 from volery.simulation.autopilots.ardupilot.rally import return_point
+from volery.simulation.autopilots.ardupilot.range_finder import follow_ground, height_above_ground
 from volery.simulation.autopilots.ardupilot.servo_outputs import pass_transmitter_through
 from volery.simulation.autopilots.ardupilot.sprayer import update_sprayer
 from volery.simulation.autopilots.ardupilot.takeoff_check import check_takeoff
@@ -432,8 +433,8 @@ def _on_other_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) ->
 
 
 def limit(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
-    """Return the set-point that is given: over the target of a precision landing, and within avoidance."""
-    return limit_copter(vehicle, aim(vehicle, setpoint))
+    """Return the set-point that is given: over ground and target below, and within avoidance."""
+    return limit_copter(vehicle, follow_ground(vehicle, aim(vehicle, setpoint)))
 
 
 def log_extras(vehicle: Vehicle) -> tuple[LogRow, ...]:
@@ -484,6 +485,7 @@ COPTER = Firmware(
         modes=MODES,
         boot_mode=MODES[0],
         return_point=return_point,
+        height_above_ground=height_above_ground,
         limit=limit,
         log_extras=log_extras,
         startup=StartupTimes(READY, ORIGIN, POSITION, POSITION),

@@ -15,6 +15,7 @@ from volery.base.elementary import cos, sin, tan
 from volery.base.frames import Vector, world_to_body
 from volery.base.time import MS, Ns, to_seconds
 from volery.simulation.autopilots.ardupilot.modes import CRITICAL, INFO
+from volery.simulation.autopilots.ardupilot.range_finder import range_below
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
 from volery.simulation.autopilots.onboard_log import LogRow
@@ -72,10 +73,11 @@ def _measure(vehicle: Vehicle, sight: Vector, distance: float) -> None:
         return
     if distance > 0.0:
         scale = distance / sqrt(sum(one * one for one in sight))
-    elif vehicle.parameters["RNGFND1_TYPE"] and estimate.rangefinder:
-        scale = estimate.rangefinder / sight[2]
     else:
-        return
+        height = range_below(vehicle)
+        if height is None:
+            return
+        scale = height / sight[2]
     turn = radians(vehicle.parameters["PLND_YAW_ALIGN"] * 0.01)
     forward = (sight[0] * cos(turn) - sight[1] * sin(turn)) * scale
     right = (sight[0] * sin(turn) + sight[1] * cos(turn)) * scale

@@ -205,7 +205,8 @@ class Land(Manoeuvre):
     def sink(self) -> float:
         """Return the descent rate at the present height [m/s]."""
         tuning = self.vehicle.tuning
-        above = self.vehicle.height - tuning.land_slow_below
+        height = self.vehicle.rules.height_above_ground(self.vehicle)
+        above = height - tuning.land_slow_below
         return max(tuning.land_speed, min(tuning.land_speed_high, root_speed(above, tuning.accel_z)))
 
     def step(self) -> None:

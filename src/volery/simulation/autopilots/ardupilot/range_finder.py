@@ -1,0 +1,89 @@
+"""The range finder below a copter: the height that LAND goes by, and the ground that modes by hand follow.
+
+As in ArduCopter a range finder that measures replaces the height above home where a landing becomes slow
+(``Mode::get_alt_above_ground_cm``), and the target height moves with the ground below (surface_tracking.cpp).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from volery.base.elementary import cos
+from volery.base.time import Ns, S, to_seconds
+from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
+from volery.simulation.autopilots.manoeuvres.to_point import root_speed
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+RANGE_FINDER = 10
+"""RCn_OPTION of the range finder."""
+GROUND = 1
+"""SURFTRAK_MODE."""
+FOLLOWS_GROUND = ("ALT_HOLD", "LOITER", "POSHOLD", "ZIGZAG", "CIRCLE")
+FOLLOWED = (Control.CLIMB, Control.VELOCITY, Control.POSITION_CLIMB)
+LOST_AFTER: Ns = S
+"""SURFACE_TRACKING_TIMEOUT_MS."""
+
+
+def range_below(vehicle: Vehicle) -> float | None:
+    """Return the distance of the ground straight below [m] as measured; ``None``: there is no measurement."""
+    p, estimate = vehicle.parameters, vehicle.estimate
+    slant = estimate.rangefinder
+    if not p["RNGFND1_TYPE"] or vehicle.surface.ignored or slant is None:
+        return None
+    if not p["RNGFND1_MIN_CM"] <= 100.0 * slant <= p["RNGFND1_MAX_CM"]:
+        return None
+    roll, pitch, _ = estimate.attitude
+    return slant * max(0.707, cos(roll) * cos(pitch))
+
+
+def height_above_ground(vehicle: Vehicle) -> float:
+    """Return the height by the range finder [m], without a measurement that above home."""
+    measured = range_below(vehicle)
+    return vehicle.height if measured is None else measured
+
+
+def switch_range_finder(vehicle: Vehicle, position: int) -> None:
+    """Use the range finder while the switch is up."""
+    vehicle.surface.ignored = position <= 0
+
+
+def follow_ground(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
+    """Return the set-point of a mode by hand whose target height moves with the ground."""
+    state, now = vehicle.surface, vehicle.kernel.now()
+    off = vehicle.parameters["SURFTRAK_MODE"] != GROUND
+    if off or vehicle.mode.name not in FOLLOWS_GROUND or setpoint.control not in FOLLOWED or vehicle.landed:
+        state.measured_at = now - LOST_AFTER
+        return setpoint
+    passed = to_seconds(min(now - state.followed_at, S))
+    state.followed_at = now
+    _measure(vehicle, passed)
+    if now - state.measured_at >= LOST_AFTER:
+        return setpoint
+    missing = state.ground - state.followed
+    tuning = vehicle.tuning
+    rate = min(root_speed(abs(missing), tuning.pilot_accel_z), tuning.pilot_up)
+    climb = rate if missing > 0.0 else -rate
+    state.followed += climb * passed
+    velocity = (*setpoint.velocity[:2], setpoint.velocity[2] - climb)
+    return replace(
+        setpoint,
+        climb=setpoint.climb + climb,
+        velocity=velocity,
+        speed_up=max(setpoint.speed_up, setpoint.climb + climb),
+        speed_down=max(setpoint.speed_down, -setpoint.climb - climb),
+    )
+
+
+def _measure(vehicle: Vehicle, passed: float) -> None:
+    """Filter the height of the ground with SURFTRAK_TC; following begins with what is measured first."""
+    state, now, measured = vehicle.surface, vehicle.kernel.now(), range_below(vehicle)
+    if measured is None:
+        return
+    ground = -vehicle.estimate.position[2] - measured
+    lost = now - state.measured_at >= LOST_AFTER
+    state.measured_at = now
+    if lost:
+        state.ground = state.followed = ground
+        return
+    constant = max(0.0, vehicle.parameters["SURFTRAK_TC"])
+    state.ground += (ground - state.ground) * passed / (passed + constant) if passed else 0.0
