@@ -27,9 +27,10 @@ from numba import carray, cfunc, types  # type: ignore[attr-defined]  # numba do
 from volery.base.numeric_code import NumericCode, parsed
 from volery.cost.native.core_model import execute_blocks
 from volery.simulation.autopilots.flight_stack.flight_step import advance_flights
+from volery.simulation.autopilots.px4.loop_step import fly_px4_loops
 from volery.simulation.world.body_step import advance_bodies
 
-ENTRY_POINTS = (advance_flights, advance_bodies, execute_blocks)
+ENTRY_POINTS = (advance_flights, advance_bodies, fly_px4_loops, execute_blocks)
 
 ERROR_PATHS = """
 /* What numba's code calls where it raises an error; none does, since a division by zero gives an infinity. */

@@ -43,11 +43,20 @@ class Station:
     heading: float = 0.0
     looks_per_second = 20  # while it waits
 
-    def __init__(self, kind: str = "copter", *, warm: bool = True, use: str = "", **options: Any) -> None:
+    def __init__(
+        self,
+        kind: str = "copter",
+        *,
+        warm: bool = True,
+        use: str = "",
+        sensors: str = "rtk",
+        seed: int = 3,
+        **options: Any,
+    ) -> None:
         self.kernel = VirtualKernel()
         body = Multirotor if kind == "copter" else Rover
-        spec = body(sensors="rtk", heading_deg=self.heading)
-        self.world, (self.flight,) = make_world(self.kernel.now, [spec], seed=3, frame=self.home)
+        spec = body(sensors=sensors, heading_deg=self.heading)
+        self.world, (self.flight,) = make_world(self.kernel.now, [spec], seed=seed, frame=self.home)
         self.autopilot = Autopilot(self.kernel, self.flight, self.firmware, warm=warm, **options)
         self.vehicle = self.autopilot.vehicle
         self.received: list[Heard] = []

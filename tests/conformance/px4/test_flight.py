@@ -71,23 +71,32 @@ def test_a_leg_by_reposition_creeps_up_to_the_cruise_and_ends_too_far(
         assert flown[250][2] == pytest.approx(4.95, abs=0.15)
 
 
-@pytest.mark.parametrize("place", [0, 1])
-def test_landing_takes_as_long_as_recorded(place: int, facts: dict[str, Any], bench: Any) -> None:
-    rig, recorded = bench(), facts["flight"]["landings"][place]
-    rig.airborne()
-    rig.offboard(x=0.0, y=0.0, z=rig.ned[2] + rig.height - recorded["from"])
-    rig.run(12.0)
-    assert rig.height == pytest.approx(recorded["from"], abs=0.3)
-    start = rig.now
-    assert rig.mode(4, 6) == 0
-    rig.stop_stream()
-    rig.run_until(lambda: not rig.vehicle.armed)
-    landed = rig.said_at("Landing detected\t", start)
-    assert landed - start == pytest.approx(recorded["seconds"], abs=2.5)
-    rig.run(0.2)
-    assert rig.said_at("Disarmed by landing\t", start) - landed == pytest.approx(
-        recorded["to_disarm"], abs=0.15
-    )
+@pytest.mark.parametrize(("place", "crawls"), [(0, True), (1, False)])
+def test_landing_takes_as_long_as_recorded(
+    place: int, crawls: bool, facts: dict[str, Any], bench: Any
+) -> None:
+    """Landings scatter with the noise of SIH: beside its point by 0.5 to 1 m, the recorded aircraft sank at
+    0.6 to 0.75 of its speed. The first one sank slower still from DISTANCE_SENSOR 1 m on, at MPC_LAND_CRWL.
+    """
+    recorded, taken = facts["flight"]["landings"][place], []
+    for seed in range(1, 9):
+        rig = bench(sensors="sih", seed=seed)
+        rig.airborne()
+        rig.vehicle.firmware_state.reads_range = crawls
+        rig.offboard(x=0.0, y=0.0, z=rig.ned[2] + rig.height - recorded["from"])
+        rig.run(12.0)
+        assert rig.height == pytest.approx(recorded["from"], abs=0.5)
+        start = rig.now
+        assert rig.mode(4, 6) == 0
+        rig.stop_stream()
+        rig.run_until(lambda rig=rig: not rig.vehicle.armed)
+        landed = rig.said_at("Landing detected\t", start)
+        taken.append(landed - start)
+        rig.run(0.2)
+        to_disarm = rig.said_at("Disarmed by landing\t", start) - landed
+        assert to_disarm == pytest.approx(recorded["to_disarm"], abs=0.15)
+    assert min(taken) <= recorded["seconds"] <= max(taken)
+    assert max(taken) - min(taken) < 6.0  # fifteen landings from 20 m were logged: 24.2 to 30.2 s
 
 
 def test_disarms_ten_seconds_after_arming_without_a_takeoff(bench: Any) -> None:

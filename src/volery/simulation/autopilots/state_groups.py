@@ -70,6 +70,8 @@ class GroundState:
     """Whether the landed detector has reported flight since the motors came up."""
     takeoff_requested_at: Ns = NEVER
     takeoff_last_requested_at: Ns = NEVER
+    touched_at: Ns = NEVER
+    """Since when the landed detector has reported ground."""
 
     def arm(self, now: Ns) -> None:
         """Start to wait for a request to take off."""
@@ -83,22 +85,30 @@ class GroundState:
         self.landed = self.lifted = False
         self.takeoff_last_requested_at = now
 
-    def update(self, now: Ns, on_ground: bool, takeoff_requested: bool, abandoned_after: Ns) -> None:
+    def update(
+        self, now: Ns, on_ground: bool, takeoff_requested: bool, abandoned_after: Ns, landed_after: Ns = 0
+    ) -> None:
         """Update the state of an armed vehicle in flight.
 
-        It has landed once the detector reports ground after flight, or once it has stood on the ground
-        without a request to take off for *abandoned_after*.
+        It has landed once the detector has reported ground after flight for *landed_after*, or once it has
+        stood on the ground without a request to take off for *abandoned_after*.
 
         Args:
             now: The time [ns].
             on_ground: Report of the landed detector.
             takeoff_requested: Whether the manoeuvre requests to take off, on the ground.
             abandoned_after: Time after which a take-off that never left the ground ends [ns].
+            landed_after: Time for which the detector has to report ground [ns].
         """
         self.lifted = self.lifted or not on_ground
+        if not on_ground:
+            self.touched_at = NEVER
+        elif self.touched_at == NEVER:
+            self.touched_at = now
         if not on_ground or takeoff_requested:
             self.takeoff_last_requested_at = now
-        if on_ground and (self.lifted or now - self.takeoff_last_requested_at >= abandoned_after):
+        returned = self.lifted and now - self.touched_at >= landed_after
+        if on_ground and (returned or now - self.takeoff_last_requested_at >= abandoned_after):
             self.landed = True
             self.landed_at = self.idle_since = now
             self.takeoff_requested_at = NEVER

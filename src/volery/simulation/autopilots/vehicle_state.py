@@ -191,6 +191,8 @@ class ArmingTimes(NamedTuple):
     """Additional ramp of a slow start."""
     abandoned_after: Ns = 0
     """A vehicle on the ground without a request to take off counts as landed after that time."""
+    landed_after: Ns = 0
+    """A vehicle that touches the ground counts as landed that long after the landed detector's report."""
 
 
 class ParameterTable(NamedTuple):
@@ -513,7 +515,10 @@ class Vehicle:
         if self.armed and not self.landed and self.flies:
             on_ground = self.estimate.landed
             requested = on_ground and self.manoeuvre.takeoff_requested()
-            self.ground.update(self.kernel.now(), on_ground, requested, self.rules.arming.abandoned_after)
+            times = self.rules.arming
+            self.ground.update(
+                self.kernel.now(), on_ground, requested, times.abandoned_after, times.landed_after
+            )
 
 
 VehicleAction = Callable[[Vehicle], None]

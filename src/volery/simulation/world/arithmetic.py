@@ -30,6 +30,9 @@ def clip(value: float, low: float, high: float) -> float:
 
 # --- noise ---
 
+FIRMWARE_STREAM = 1000
+"""Number of the first stream of a firmware's own noise; those of the body's sensors are lower."""
+
 _STEP = np.uint64(0x9E3779B97F4A7C15)
 _STREAM = np.uint64(0xD1342543DE82EF95)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
+from numpy.typing import NDArray
 
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
@@ -37,7 +38,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     GpsFix,
 )
 from volery.simulation.autopilots.flight_stack.flight_step import advance_flights
-from volery.simulation.world.arithmetic import gaussian
+from volery.simulation.world.arithmetic import FIRMWARE_STREAM, gaussian
 from volery.simulation.world.body_specs import BodySpec, Multirotor
 from volery.simulation.world.dynamics import cell_voltage
 from volery.simulation.world.environment_models import Terrain, Wind
@@ -58,7 +59,6 @@ from volery.simulation.world.world import STEP, Truth, World
 
 __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
-_FIRST_STREAM = 1000  # of a firmware's own noise
 _FAR = 1e6  # [m] beyond which a point is placed on an unrolled map
 TURNINGS = {
     (False, False): HOLD_HEADING,
@@ -211,6 +211,11 @@ class Flight:
         """
         return self._world.measurement(self._body, sensor)
 
+    @property
+    def keys(self) -> NDArray[np.uint64]:
+        """Key of the vehicle's noise, for machine code that draws from it."""
+        return self._world.arrays.keys[self._body : self._body + 1]
+
     def draw(self, stream: int, number: int) -> float:
         """Return a draw of the firmware's own noise, of zero mean and unit variance.
 
@@ -219,7 +224,7 @@ class Flight:
             number: Counter of the draw.
         """
         with np.errstate(over="ignore"):  # hashes wrap around
-            return float(gaussian(self._world.arrays.keys[self._body], _FIRST_STREAM + stream, number))
+            return float(gaussian(self._world.arrays.keys[self._body], FIRMWARE_STREAM + stream, number))
 
     def set_origin(self) -> None:
         """Use satellites from now on; the origin becomes the receiver's position."""

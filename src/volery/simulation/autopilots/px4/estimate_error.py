@@ -1,156 +1,292 @@
 """Error of EKF2's estimate: a wrong delay of the receiver, and the noise of SIH's sensors.
 
-EKF2 takes a fix to be EKF2_GPS_DELAY (0.11 s) old and corrects its state of that time with it. The receiver
-of SIH has no such delay: the estimated position is ahead of the aircraft, and slower than it while it brakes.
-The error of one axis moves like EKF2's own states: position, velocity and tilt, corrected at each fix with
-the gains to which its covariance settles, and passed on by the output predictor with a lag.
+EKF2 takes a fix to be EKF2_GPS_DELAY old and corrects its oldest state with it. The receiver of SIH has no
+such delay: the estimated position is ahead of the aircraft. SIH's gyroscope and accelerometer are far
+noisier than EKF2_GYR_NOISE and EKF2_ACC_NOISE say, so the filter corrects too little, and its velocity, tilt,
+heading and biases wander. The attitude loops hold the estimated tilt and heading, so what is wrong with them
+pushes the aircraft the other way.
 
-SIH's gyroscope and accelerometer are far noisier than EKF2_GYR_NOISE and EKF2_ACC_NOISE say, so these gains
-correct too little: across the heading the velocity wanders by 0.3 m/s, in about 4 s. The attitude loops hold
-the estimated tilt, so what is wrong with it pushes the aircraft the other way.
+The error moves like EKF2's own states, and is corrected by fixes, by the heading of the magnetometer and by
+the barometer with gains from their covariance, which is advanced as well: a wrong bias of the accelerometer
+looks like a tilt until the nose turns, a wrong heading counts as much as the aircraft leans, and so does a
+wrong tilt along the vertical. The field is steep, so a wrong tilt is a wrong heading, too. The output
+predictor passes the errors on with a lag.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import sqrt
-from typing import Final, NamedTuple
+from typing import Final
 
-from volery.base.elementary import cos, sin
+import numpy as np
 
-STEP: Final = 0.02
-"""Step of the integration [s]."""
+from volery.base.elementary import sine_cosine
+from volery.base.numeric_code import numeric
+from volery.simulation.autopilots.px4.loop_state import (
+    A_ACCEL,
+    A_FLOWN,
+    A_THRUST,
+    E_BARO,
+    E_COVARIANCE,
+    E_FIELD,
+    E_FIX,
+    E_POSITION,
+    E_PUSH,
+    E_RATE,
+    E_STATES,
+    E_VELOCITY,
+    GRAVITY,
+    I_HEADING,
+    I_NOISY,
+    STATES,
+    SUBSTEP,
+)
+from volery.simulation.world.arithmetic import FIRMWARE_STREAM, gaussian
+from volery.simulation.world.state_layout import Array
 
-STEPS_PER_FIX: Final = 6
-"""Steps between two fixes: 8 Hz, the rate of PX4's simulated receiver."""
+AHEAD: Final = 0.08
+"""Time by which EKF2's state is older than a fix of SIH's receiver, which has no delay [s]. For the 110 ms of
+EKF2_GPS_DELAY in steps of EKF2_PREDICT_US (10 ms) EKF2 keeps 11 steps, which are ``EKF_STEP`` long in SIH."""
 
-AHEAD: Final = 0.06
-"""Time by which the estimate is ahead of the aircraft [s]: position error over speed in six logged flights
-of PX4 1.14 in SIH, 0.04 to 0.09."""
+FIX_PERIOD, FIELD_PERIOD = 0.125, 1.0 / 15.0
+"""Time between two fixes of PX4's simulated receiver; between two readings of the magnetometer,
+SENS_MAG_RATE [s]."""
 
-FROM_VELOCITY = (0.0607, 0.0396, 0.00874)
-FROM_POSITION = (0.0556, 0.0177, 0.00266)
-"""Gains of a fix's velocity [s, 1, 1/s] and position [1, 1/s, 1/s^2] on position, velocity and the
-acceleration that a wrong tilt appears as: the steady state of the filter with EKF2_ACC_NOISE 0.35 and
-EKF2_GYR_NOISE 0.015 in steps of EKF2_PREDICT_US; the receiver states deviations of 0.5 m/s and 0.9 m."""
+PLACE, SPEED, TILT, TURN, BIAS, YAW, SPIN = 0, 2, 4, 6, 8, 10, 11
+HEIGHT, CLIMB, WEIGHT = 12, 13, 14
+"""Numbers of the states: position and velocity [m, m/s], the acceleration that a wrong tilt appears as
+[m/s^2], north and east; its rate by a wrong bias of the gyroscope [m/s^3], a wrong bias of the accelerometer
+[m/s^2], forward and right; heading [rad] and its rate by a wrong bias [rad/s]; position and velocity down
+[m, m/s], a wrong bias of the accelerometer there [m/s^2]."""
 
-FROM_CLIMB = (0.0486, 0.0235, 0.00396)
-FROM_HEIGHT = (0.0326, 0.0083, 0.00099)
-"""The same along the vertical, where the third state is the bias of the accelerometer: EKF2_ACC_B_NOISE, and
-at least the deviation of 0.028 m/s^2 below which the filter lets none fall (5e-8 in steps of 8 ms). The
-receiver states 0.75 m/s and 1.78 m; of the barometer the filter believes 3.5 m (EKF2_BARO_NOISE)."""
+EKF_STEP: Final = 0.008
+"""Step of EKF2 [s]: two samples of SIH."""
 
-Gains = tuple[tuple[float, float, float], tuple[float, float, float]]
+ACCEL_GROWTH: Final = 0.35 * 0.35 * EKF_STEP
+TILT_GROWTH: Final = (GRAVITY * 0.015) * (GRAVITY * 0.015) * EKF_STEP
+TURN_GROWTH: Final = (GRAVITY * 0.001) * (GRAVITY * 0.001) * EKF_STEP
+BIAS_GROWTH: Final = 0.003 * 0.003 * EKF_STEP
+YAW_GROWTH: Final = 0.015 * 0.015 * EKF_STEP
+SPIN_GROWTH: Final = 0.001 * 0.001 * EKF_STEP
+"""Growth of the variances in a second: EKF2_ACC_NOISE, EKF2_GYR_NOISE, EKF2_GYR_B_NOISE, EKF2_ACC_B_NOISE in
+steps of ``EKF_STEP``."""
 
-LEVEL: Gains = (FROM_VELOCITY, FROM_POSITION)
-VERTICAL: Gains = (FROM_CLIMB, FROM_HEIGHT)
+LEAST_BIAS: Final = 5e-8 / (EKF_STEP * EKF_STEP)
+"""Variance of a bias of the accelerometer below which EKF2 lets none fall [m^2/s^4]."""
+
+FIX_SPEED_VARIANCE, FIX_PLACE_VARIANCE, YAW_VARIANCE = 0.25, 0.81, 0.09
+FIX_CLIMB_VARIANCE, FIX_HEIGHT_VARIANCE, BARO_VARIANCE = 0.5625, 3.1684, 12.25
+"""What the receiver states of itself; EKF2_HEAD_NOISE, EKF2_BARO_NOISE."""
+
+BARO_BIAS_SHARE: Final = 0.0095
+"""Share of the barometer's innovation that EKF2 takes for its bias (0.13 m/s over the root of 1 Hz)."""
+
+FIRST = (0.25, 0.25, 0.25, 0.25, 0.96, 0.96, 0.96, 0.96, 0.04, 0.04, 0.09, 0.01, 1.0, 0.25, 0.04)
+"""Variances with which the filter starts: of the tilt EKF2_ANGERR_INIT (0.1 rad), of biases EKF2_GBIAS_INIT
+(0.1 rad/s) and EKF2_ABIAS_INIT (0.2 m/s^2). What a bias of the accelerometer is and what a tilt, it learns
+when the nose turns."""
+
+SLANT_EAST, SLANT_NORTH = 0.289, -0.036
+"""Error of the heading by that of the tilt, as an acceleration to the east and to the north [rad s^2/m]: the
+field where it was recorded is 0.179, 0.023, 0.514 gauss north, east, down."""
 
 PREDICTOR_LAG: Final = 0.25
 """EKF2_TAU_VEL, EKF2_TAU_POS [s]."""
 
-GRAVITY: Final = 9.80665
-
 IMU_PERIOD: Final = 0.004
 """Time between two samples of SIH's gyroscope and accelerometer, IMU_INTEG_RATE [s]."""
 
-ROLL_NOISE, PITCH_NOISE = 0.14, 0.07
+ROLL_NOISE, PITCH_NOISE, YAW_NOISE = 0.14, 0.07, 0.03
 ACCEL_NOISE = (0.5, 1.7, 1.4)
-"""Deviation of a sample of SIH's gyroscope [rad/s], of its accelerometer forward, right, down [m/s^2]."""
+"""Deviation of a sample of SIH's gyroscope [rad/s], of its accelerometer forward, right, down [m/s^2]; from
+``Sih::reconstruct_sensors_signals`` of PX4 1.14."""
 
 FIX_VELOCITY_NOISE = (0.06, 0.077, 0.158)
 FIX_POSITION_NOISE = (0.2, 0.2, 0.5)
-"""Deviation of a fix of PX4's simulated receiver, north, east, down [m/s, m]."""
+"""Deviation of a fix of PX4's simulated receiver, north, east, down [m/s, m]; from ``SensorGpsSim::Run``."""
 
-_WALK: Final = sqrt(IMU_PERIOD * STEP)
+FIELD_NOISE, BARO_NOISE = 0.061, 0.09
+"""Deviation of the heading of a reading of PX4's simulated magnetometer [rad]: 0.02 gauss, 3.3 samples; of
+its barometer [m]: 1 Pa."""
+
+WALK: Final = sqrt(IMU_PERIOD * SUBSTEP)
 """Deviation of the integral of white samples over a step, over that of a sample [s]."""
 
 
-class Noise(NamedTuple):
-    """What the noise of the sensors adds to the error of one axis in one step."""
-
-    velocity: float = 0.0
-    """Integrated noise of the accelerometer [m/s]."""
-    tilt: float = 0.0
-    """Integrated noise of the gyroscope, as the acceleration that a wrong tilt appears as [m/s^2]."""
-    fix_velocity: float = 0.0
-    """Error of a fix's velocity [m/s]."""
-    fix_position: float = 0.0
-    """Error of a fix's position [m]."""
+@numeric
+def start_errors(row: Array) -> None:
+    """Start with variances to which the filter settles, and without errors."""
+    for number in range(STATES):
+        row[E_COVARIANCE + number * STATES + number] = FIRST[number]
 
 
-QUIET: Final = Noise()
+@numeric
+def _noise(row: Array, key: np.uint64, stream: int, step: int) -> float:
+    """Return a draw of zero mean and unit variance, or 0 without SIH's noise."""
+    return gaussian(key, FIRMWARE_STREAM + stream, step) if row[I_NOISY] > 0.0 else 0.0
 
 
-def sih_noise(draw: Callable[[int], float], heading: float) -> tuple[Noise, Noise, Noise]:
-    """Return the noise of one step of PX4's SIH, north, east and down.
+@numeric
+def step_errors(row: Array, key: np.uint64, step: int) -> None:
+    """Advance the errors of all states by one step."""
+    along = WALK * ACCEL_NOISE[0] * _noise(row, key, 0, step)
+    across = WALK * ACCEL_NOISE[1] * _noise(row, key, 1, step)
+    down = WALK * ACCEL_NOISE[2] * _noise(row, key, 2, step)
+    pitch = GRAVITY * PITCH_NOISE * WALK * _noise(row, key, 3, step)
+    roll = GRAVITY * ROLL_NOISE * WALK * _noise(row, key, 4, step)
+    yaw = YAW_NOISE * WALK * _noise(row, key, 12, step)
+    s, c = sine_cosine(row[I_HEADING])
+    kick_north, kick_east = c * along - s * across, s * along + c * across
+    north, east, upright = _accel_errors(row, s, c)
+    _advance_states(row, s, c, (north, east, upright))
+    row[E_STATES + SPEED] += kick_north
+    row[E_STATES + SPEED + 1] += kick_east
+    row[E_STATES + TILT] += c * pitch - s * roll
+    row[E_STATES + TILT + 1] += s * pitch + c * roll
+    row[E_STATES + YAW] += yaw
+    row[E_STATES + CLIMB] += down
+    _advance_covariance(row, s, c)
+    row[E_FIX] += SUBSTEP
+    if row[E_FIX] >= FIX_PERIOD:
+        row[E_FIX] -= FIX_PERIOD
+        _use_fix(row, key, step)
+    row[E_FIELD] += SUBSTEP
+    if row[E_FIELD] >= FIELD_PERIOD:
+        row[E_FIELD] -= FIELD_PERIOD
+        _use_field_and_baro(row, key, step)
+    row[E_PUSH] = row[E_STATES + TILT] - row[E_STATES + YAW] * row[A_THRUST + 1]
+    row[E_PUSH + 1] = row[E_STATES + TILT + 1] + row[E_STATES + YAW] * row[A_THRUST]
+    _predict(row, 0, north, kick_north, row[E_STATES + PLACE], row[E_STATES + SPEED])
+    _predict(row, 1, east, kick_east, row[E_STATES + PLACE + 1], row[E_STATES + SPEED + 1])
+    _predict(row, 2, upright, down, row[E_STATES + HEIGHT], row[E_STATES + CLIMB])
 
-    Deviations: ``Sih::reconstruct_sensors_signals`` and ``SensorGpsSim::Run`` of PX4 1.14.
 
-    Args:
-        draw: Returns the draw of a stream, 0 to 10, of zero mean and unit variance.
-        heading: Heading of the aircraft [rad].
-    """
-    ahead, aside, down = (_WALK * deviation * draw(axis) for axis, deviation in enumerate(ACCEL_NOISE))
-    pitch, roll = GRAVITY * PITCH_NOISE * _WALK * draw(3), GRAVITY * ROLL_NOISE * _WALK * draw(4)
-    along, across = cos(heading), sin(heading)
-    kicks = (
-        (along * ahead - across * aside, along * pitch - across * roll),
-        (across * ahead + along * aside, across * pitch + along * roll),
-        (down, 0.0),
-    )
-    north, east, vertical = (
-        Noise(*kick, FIX_VELOCITY_NOISE[axis] * draw(5 + axis), FIX_POSITION_NOISE[axis] * draw(8 + axis))
-        for axis, kick in enumerate(kicks)
-    )
-    return north, east, vertical
+@numeric
+def _accel_errors(row: Array, s: float, c: float) -> tuple[float, float, float]:
+    """Return the error of the acceleration that EKF2 sees, north, east, down [m/s^2]."""
+    ahead, aside, yaw = row[E_STATES + BIAS], row[E_STATES + BIAS + 1], row[E_STATES + YAW]
+    lean_north, lean_east = row[A_THRUST] / GRAVITY, row[A_THRUST + 1] / GRAVITY
+    weight = row[E_STATES + WEIGHT]
+    north = row[E_STATES + TILT] + c * ahead - s * aside
+    east = row[E_STATES + TILT + 1] + s * ahead + c * aside
+    down = weight + lean_north * north + lean_east * east
+    north -= weight * lean_north + yaw * row[A_THRUST + 1]
+    east -= weight * lean_east - yaw * row[A_THRUST]
+    return north, east, down
 
 
-class EstimateError:
-    """Estimated minus true motion along one axis.
+@numeric
+def _advance_states(row: Array, s: float, c: float, accel: tuple[float, float, float]) -> None:
+    """Advance the errors under errors of the acceleration, north, east, down."""
+    ahead, aside = row[E_STATES + TURN], row[E_STATES + TURN + 1]
+    row[E_STATES + PLACE] += SUBSTEP * row[E_STATES + SPEED]
+    row[E_STATES + PLACE + 1] += SUBSTEP * row[E_STATES + SPEED + 1]
+    row[E_STATES + SPEED] += SUBSTEP * accel[0]
+    row[E_STATES + SPEED + 1] += SUBSTEP * accel[1]
+    row[E_STATES + TILT] += SUBSTEP * (c * ahead - s * aside)
+    row[E_STATES + TILT + 1] += SUBSTEP * (s * ahead + c * aside)
+    row[E_STATES + YAW] += SUBSTEP * row[E_STATES + SPIN]
+    row[E_STATES + HEIGHT] += SUBSTEP * row[E_STATES + CLIMB]
+    row[E_STATES + CLIMB] += SUBSTEP * accel[2]
 
-    Args:
-        gains: Gains of a fix's velocity and position.
-    """
 
-    def __init__(self, gains: Gains = LEVEL) -> None:
-        self.position = 0.0
-        """Error of the position that EKF2 states [m]."""
-        self.velocity = 0.0
-        """Error of the velocity that EKF2 states [m/s]."""
-        self.rate = 0.0
-        """Rate at which the error of the position grows [m/s]."""
-        self.tilt = 0.0
-        """Acceleration that EKF2 sees and the aircraft does not have, its tilt being wrong [m/s^2]; 0 without
-        noise, where it is below 0.02, and along the vertical."""
-        self._gains = gains
-        self._place = self._speed = self._accel = 0.0
-        self._steps = 0
+@numeric
+def _advance_covariance(row: Array, s: float, c: float) -> None:
+    """Advance the covariance of the states, first by rows, then by columns."""
+    lean_north, lean_east = row[A_THRUST] / GRAVITY, row[A_THRUST + 1] / GRAVITY
+    for along, across in ((STATES, 1), (1, STATES)):
+        for other in range(STATES):
+            at = E_COVARIANCE + other * across
+            ahead, aside = row[at + BIAS * along], row[at + (BIAS + 1) * along]
+            turn, turn_aside = row[at + TURN * along], row[at + (TURN + 1) * along]
+            yaw, weight = GRAVITY * row[at + YAW * along], row[at + WEIGHT * along]
+            north = row[at + TILT * along] + c * ahead - s * aside
+            east = row[at + (TILT + 1) * along] + s * ahead + c * aside
+            row[at + PLACE * along] += SUBSTEP * row[at + SPEED * along]
+            row[at + (PLACE + 1) * along] += SUBSTEP * row[at + (SPEED + 1) * along]
+            row[at + HEIGHT * along] += SUBSTEP * row[at + CLIMB * along]
+            row[at + CLIMB * along] += SUBSTEP * (weight + lean_north * north + lean_east * east)
+            row[at + SPEED * along] += SUBSTEP * (north - weight * lean_north - lean_east * yaw)
+            row[at + (SPEED + 1) * along] += SUBSTEP * (east - weight * lean_east + lean_north * yaw)
+            row[at + TILT * along] += SUBSTEP * (c * turn - s * turn_aside)
+            row[at + (TILT + 1) * along] += SUBSTEP * (s * turn + c * turn_aside)
+            row[at + YAW * along] += SUBSTEP * row[at + SPIN * along]
+    for axis in range(2):
+        _grow(row, SPEED + axis, ACCEL_GROWTH)
+        _grow(row, TILT + axis, TILT_GROWTH)
+        _grow(row, TURN + axis, TURN_GROWTH)
+        _grow(row, BIAS + axis, BIAS_GROWTH)
+    _grow(row, YAW, YAW_GROWTH)
+    _grow(row, SPIN, SPIN_GROWTH)
+    _grow(row, CLIMB, ACCEL_GROWTH)
+    _grow(row, WEIGHT, BIAS_GROWTH)
+    largest = max(row[_at(BIAS)], row[_at(BIAS + 1)], row[_at(WEIGHT)])
+    least = max(LEAST_BIAS, 0.01 * largest)
+    for number in (BIAS, BIAS + 1, WEIGHT):
+        row[_at(number)] = max(row[_at(number)], least)
 
-    def step(self, velocity: float, accel: float, noise: Noise = QUIET) -> None:
-        """Advance by one step.
 
-        Args:
-            velocity: True velocity [m/s].
-            accel: True acceleration [m/s^2].
-            noise: Noise of the sensors.
-        """
-        self._place += STEP * self._speed
-        self._speed += STEP * self._accel + noise.velocity
-        self._accel += noise.tilt
-        self._steps += 1
-        if self._steps >= STEPS_PER_FIX:
-            self._steps = 0
-            from_velocity, from_position = self._gains
-            self._correct(from_velocity, AHEAD * accel + noise.fix_velocity - self._speed)
-            self._correct(from_position, AHEAD * velocity + noise.fix_position - self._place)
-        if noise.tilt:
-            self.tilt = self._accel
-        self.velocity += STEP * (self._accel + (self._speed - self.velocity) / PREDICTOR_LAG) + noise.velocity
-        self.rate = self.velocity + (self._place - self.position) / PREDICTOR_LAG
-        self.position += STEP * self.rate
+@numeric
+def _at(number: int) -> int:
+    """Return the column of the variance of a state."""
+    return E_COVARIANCE + number * (STATES + 1)
 
-    def _correct(self, gains: tuple[float, float, float], innovation: float) -> None:
-        """Correct position, velocity and acceleration by a fix's innovation."""
-        self._place += gains[0] * innovation
-        self._speed += gains[1] * innovation
-        self._accel += gains[2] * innovation
+
+@numeric
+def _grow(row: Array, number: int, rate: float) -> None:
+    row[_at(number)] += SUBSTEP * rate
+
+
+@numeric
+def _correct(row: Array, measured: int, innovation: float, variance: float) -> None:
+    """Correct the states by the innovation of one of them, and their covariance."""
+    first = E_COVARIANCE + measured * STATES
+    total = row[first + measured] + variance
+    for number in range(STATES):
+        row[E_STATES + number] += row[first + number] / total * innovation
+    for number in range(STATES):
+        if number != measured:
+            gain = row[first + number] / total
+            for other in range(STATES):
+                row[E_COVARIANCE + number * STATES + other] -= gain * row[first + other]
+    gain = row[first + measured] / total
+    for other in range(STATES):
+        row[first + other] -= gain * row[first + other]
+
+
+@numeric
+def _use_fix(row: Array, key: np.uint64, step: int) -> None:
+    """Correct by a fix."""
+    for axis in range(2):
+        speed = AHEAD * row[A_ACCEL + axis]
+        speed += FIX_VELOCITY_NOISE[axis] * _noise(row, key, 5 + axis, step)
+        _correct(row, SPEED + axis, speed - row[E_STATES + SPEED + axis], FIX_SPEED_VARIANCE)
+    for axis in range(2):
+        place = AHEAD * row[A_FLOWN + axis]
+        place += FIX_POSITION_NOISE[axis] * _noise(row, key, 8 + axis, step)
+        _correct(row, PLACE + axis, place - row[E_STATES + PLACE + axis], FIX_PLACE_VARIANCE)
+    climb = AHEAD * row[A_ACCEL + 2] + FIX_VELOCITY_NOISE[2] * _noise(row, key, 7, step)
+    _correct(row, CLIMB, climb - row[E_STATES + CLIMB], FIX_CLIMB_VARIANCE)
+    height = AHEAD * row[A_FLOWN + 2] + FIX_POSITION_NOISE[2] * _noise(row, key, 10, step)
+    _correct(row, HEIGHT, height - row[E_STATES + HEIGHT], FIX_HEIGHT_VARIANCE)
+
+
+@numeric
+def _use_field_and_baro(row: Array, key: np.uint64, step: int) -> None:
+    """Correct by the heading of the magnetometer and by the barometer."""
+    heading = SLANT_NORTH * row[E_STATES + TILT] + SLANT_EAST * row[E_STATES + TILT + 1]
+    heading += FIELD_NOISE * _noise(row, key, 13, step)
+    _correct(row, YAW, heading - row[E_STATES + YAW], YAW_VARIANCE)
+    height = BARO_NOISE * _noise(row, key, 14, step) - row[E_STATES + HEIGHT]
+    innovation = height - row[E_BARO]
+    row[E_BARO] += BARO_BIAS_SHARE * innovation
+    _correct(row, HEIGHT, innovation, BARO_VARIANCE)
+
+
+@numeric
+def _predict(row: Array, axis: int, accel: float, kick: float, place: float, speed: float) -> None:
+    """Pass the error of one axis on to what EKF2 states."""
+    row[E_VELOCITY + axis] += SUBSTEP * (accel + (speed - row[E_VELOCITY + axis]) / PREDICTOR_LAG) + kick
+    rate = row[E_VELOCITY + axis] + (place - row[E_POSITION + axis]) / PREDICTOR_LAG
+    row[E_RATE + axis] = rate
+    row[E_POSITION + axis] += SUBSTEP * rate

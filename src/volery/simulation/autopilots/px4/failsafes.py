@@ -202,7 +202,7 @@ def _detect_ground(commander: Commander, now: Ns) -> None:
     vehicle = commander.vehicle
     if not vehicle.flies:
         return
-    flying = not vehicle.estimate.landed and not vehicle.landed
+    flying = (not vehicle.estimate.landed or commander.control.lifts_off) and not vehicle.landed
     if flying and not commander.flying:
         commander.took_off, commander.lifted_at = True, now
         vehicle.send_text(INFO, "Takeoff detected\t")

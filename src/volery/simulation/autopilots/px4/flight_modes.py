@@ -45,12 +45,11 @@ def climb_share(vehicle: Vehicle) -> float:
     return 1.0
 
 
-CLIMB_SHARE = 0.95
-"""Share of MPC_Z_V_AUTO_UP at which the automatic modes climb."""
-
-
 class Hold(ToPoint):
     """AUTO.LOITER: stop and hold a point, which a reposition moves."""
+
+    _towards: float | None = None
+    """Heading towards the point when it was last farther than NAV_ACC_RAD away [rad]."""
 
     def step(self) -> None:
         """Move the trajectory towards the point and follow it."""
@@ -60,11 +59,18 @@ class Hold(ToPoint):
         control.fly_to(self.point, self.cruise(), self._heading())
 
     def _heading(self) -> float | None:
-        """Return the heading [rad]: towards a region of interest, the commanded one, or that of the leg."""
-        commanded = self.vehicle.commanded
+        """Return the heading [rad]: towards a region of interest, the commanded one, or towards the point.
+
+        The nose stays where it is within NAV_ACC_RAD of the point (MPC_YAW_MODE 0).
+        """
+        vehicle, commanded = self.vehicle, self.vehicle.commanded
         if commanded.look_at is not None:
-            return bearing(self.vehicle.estimate.position, commanded.look_at)
-        return self.yaw if commanded.yaw is None else commanded.yaw
+            return bearing(vehicle.estimate.position, commanded.look_at)
+        if commanded.yaw is not None or self.yaw is not None or self.point is None:
+            return self.yaw if commanded.yaw is None else commanded.yaw
+        if not self.near(vehicle.parameters["NAV_ACC_RAD"], inf):
+            self._towards = bearing(vehicle.estimate.position, self.point)
+        return self._towards
 
     def cruise(self) -> Cruise:
         """Return the speeds of the trajectory."""
@@ -72,8 +78,9 @@ class Hold(ToPoint):
         speed = self.speed or vehicle.commanded.speed or p["MPC_XY_CRUISE"]
         return Cruise(
             min(max(0.1, speed), vehicle.tuning.speed),
-            min(CLIMB_SHARE * p["MPC_Z_V_AUTO_UP"], vehicle.tuning.speed_up),
-            min(p["MPC_Z_V_AUTO_DN"], vehicle.tuning.speed_down),
+            p["MPC_Z_V_AUTO_UP"],
+            p["MPC_Z_V_AUTO_DN"],
+            p["MPC_ACC_UP_MAX"],
         )
 
     def near(self, sideways: float, height: float) -> bool:
@@ -102,12 +109,12 @@ class TakeOff(Hold):
         return True
 
     def cruise(self) -> Cruise:
-        """Return the limits of the trajectory, with those of the ramp: its climb rate and acceleration."""
-        p = self.vehicle.parameters
-        low = self.vehicle.firmware_state.above_ground < p["MPC_LAND_ALT1"]
-        lift = p["MPC_TKO_SPEED"] / max(0.1, p["MPC_TKO_RAMP_T"]) if low else inf
-        climb = climb_share(self.vehicle) * p["MPC_TKO_SPEED"]
-        return super().cruise()._replace(up=climb, lift=lift)
+        """Return the limits of the trajectory, below MPC_LAND_ALT1 those of a take-off."""
+        p, cruise = self.vehicle.parameters, super().cruise()
+        if self.vehicle.firmware_state.above_ground >= p["MPC_LAND_ALT1"]:
+            return cruise
+        lift = min(cruise.lift, p["MPC_TKO_SPEED"] / max(0.1, p["MPC_TKO_RAMP_T"]))
+        return cruise._replace(up=p["MPC_TKO_SPEED"], lift=lift, at_vehicle=True)
 
     def arrived(self, passing: bool = False) -> bool:
         """Return whether the vehicle is within NAV_MC_ALT_RAD below the altitude, or above it."""
@@ -116,7 +123,7 @@ class TakeOff(Hold):
 
 
 class Descent(Land):
-    """AUTO.LAND: sink more slowly below MPC_LAND_ALT1, ALT2 and ALT3."""
+    """AUTO.LAND: sink more slowly below MPC_LAND_ALT1, and at MPC_LAND_SPEED below ALT2."""
 
     def step(self) -> None:
         """Move the trajectory down over the point and follow it."""
@@ -124,20 +131,20 @@ class Descent(Land):
         if not vehicle.has_position or self.point is None or vehicle.estimate.landed:
             super().step()
             return
-        tuning = vehicle.tuning
+        p = vehicle.parameters
         control: PositionLoops = vehicle.firmware_state.control
-        limits = Cruise(tuning.speed, tuning.speed_up, self.sink())
+        limits = Cruise(p["MPC_XY_CRUISE"], p["MPC_Z_V_AUTO_UP"], self.sink(), p["MPC_ACC_UP_MAX"])
         control.fly_to((self.point[0], self.point[1], inf), limits, vehicle.commanded.yaw)
 
     def sink(self) -> float:
         """Return the sink rate at the present height [m/s]."""
         p, height = self.vehicle.parameters, self.vehicle.firmware_state.above_ground
-        middle = p["MPC_LAND_SPEED"]
-        if height > p["MPC_LAND_ALT2"]:
-            return interpolated(
-                height, (p["MPC_LAND_ALT2"], middle), (p["MPC_LAND_ALT1"], p["MPC_Z_V_AUTO_DN"])
-            )
-        return interpolated(height, (p["MPC_LAND_ALT3"], p["MPC_LAND_CRWL"]), (p["MPC_LAND_ALT2"], middle))
+        if height <= p["MPC_LAND_ALT3"] and self.vehicle.firmware_state.reads_range:
+            return p["MPC_LAND_CRWL"]
+        high = p["MPC_LAND_ALT1"], p["MPC_Z_VEL_MAX_DN"]
+        return min(
+            p["MPC_Z_V_AUTO_DN"], interpolated(height, (p["MPC_LAND_ALT2"], p["MPC_LAND_SPEED"]), high)
+        )
 
 
 class Return(Manoeuvre):

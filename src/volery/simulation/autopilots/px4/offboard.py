@@ -27,7 +27,6 @@ from volery.simulation.autopilots.onboard_mission import (
     LOCAL_NED,
 )
 from volery.simulation.autopilots.px4.event_interface import FRAME_UNSUPPORTED, SETPOINT_INVALID, EventLog
-from volery.simulation.autopilots.px4.flight_modes import climb_share
 from volery.simulation.autopilots.px4.position_control import PositionLoops, Wanted
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
@@ -289,7 +288,6 @@ class FollowTarget(Manoeuvre):
         control: PositionLoops = vehicle.firmware_state.control
         control.fly(
             Wanted(target.position, target.velocity, target.acceleration),
-            climb_share(vehicle) * vehicle.tuning.speed_up,
             target.yaw if rate is None else None,
             rate,
         )
