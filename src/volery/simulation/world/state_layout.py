@@ -117,8 +117,8 @@ U_GUST = _add("U_GUST", "m/s", "standard deviation of gusts")
 U_BARO_BLOCKED = _add("U_BARO_BLOCKED", "1", "1: the barometer gives no new samples")
 U_MAG_BLOCKED = _add("U_MAG_BLOCKED", "1", "1: the magnetometer gives no new samples")
 U_GPS_DRIFT = _add("U_GPS_DRIFT", "m/s", "speed at which the reported position drifts", 2, "north, east")
-U_GPS_OFFSET = _add("U_GPS_OFFSET", "m", "error that is added to the reported position", 2, "north, east")
 U_GPS_DRIFT_START = _add("U_GPS_DRIFT_START", "1", "grid step at which the drift began")
+U_GPS_OFFSET = _add("U_GPS_OFFSET", "m", "error that is added to the reported position", 2, "north, east")
 U_PUSH = _add("U_PUSH", "m/s^2", "acceleration by a force from outside; multirotors only", 3, FLU)
 
 # --- measurements: last sample of each sensor, in the axes of autopilots ---
