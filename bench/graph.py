@@ -20,8 +20,8 @@ from volery.cost import load_catalogue
 from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.ros import messages
 from volery.ros.graph import EmbeddedGraph, free
 from volery.ros.messages.encodings import copied_to_cdr

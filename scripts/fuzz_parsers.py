@@ -30,7 +30,7 @@ with atheris.instrument_imports(include=INSTRUMENTED):
     from volery.base.units import QuantityError, parse
     from volery.cost.catalogue import read_catalogue
     from volery.links.flight_logs import read_flight_log
-    from volery.links.link import Frame
+    from volery.links.frame import Frame
     from volery.links.mavlink_codec import MavlinkParser, SignedMavlink
     from volery.links.pprzlink_codec import PPRZLINK, PprzlinkParser
     from volery.links.pprzlink_messages import DATALINK, TELEMETRY

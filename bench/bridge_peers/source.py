@@ -9,7 +9,7 @@ import socket
 import sys
 import time
 
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import encode
 
 PUBLISHED = ("ATTITUDE", "GPS_RAW_INT", "RC_CHANNELS", "VFR_HUD", "RAW_IMU")

@@ -12,8 +12,8 @@ from volery.bridge import serve_vehicle
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import WallKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.ros import messages
 from volery.ros.graph import EmbeddedGraph, QoS
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from volery.base.seeds import stream
 from volery.base.time import MS
 from volery.kernel.virtual import VirtualKernel
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.links.pprzlink_messages import DATALINK, TELEMETRY, message_type_of
 from volery.testing.fuzzing import SEALS, FuzzTarget, Mutator, fuzz

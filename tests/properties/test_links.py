@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import MavlinkParser, encode, quantised
 
 RANGES = {

@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.pprzlink_codec import PprzlinkParser, encode, quantised
 from volery.links.pprzlink_messages import Field, message_names, message_type
 

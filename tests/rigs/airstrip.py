@@ -12,8 +12,9 @@ from volery.base.position import AMSL, AboveHome, Position
 from volery.base.seeds import stream
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame, Link
+from volery.links.link import Link
 from volery.links.wire_faults import WireFaults, faulty_pair
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import cos, radians, sin
 from pathlib import Path
 
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import encode
 
 Rows = Iterable[Sequence[float]]

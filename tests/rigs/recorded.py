@@ -14,7 +14,7 @@ from typing import Any
 
 from volery.base.time import MS
 from volery.kernel.virtual import VirtualKernel
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import quantised
 from volery.vehicles.telemetry import Telemetry
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.tlog import read_tlog
 
 STATION = 255

@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.link import Frame, Link
+from volery.links.frame import Frame
+from volery.links.link import Link
 from volery.links.mavlink_messages import message_type
 
 ACCEPTED = 0

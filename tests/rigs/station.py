@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor, Rover

@@ -20,7 +20,8 @@ from typing import Any, NamedTuple, Self
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
-from volery.links.link import Frame, Link
+from volery.links.frame import Frame
+from volery.links.link import Link
 from volery.links.pprzlink_messages import message_type
 from volery.ros.messages.dji_constants import DisplayMode
 
@@ -97,11 +98,12 @@ _KEPT_ALL = frozenset(
 """Messages that are published one by one; of all others only the latest is published."""
 
 
-class ReceivedFrame(NamedTuple):
+class ReceivedFrame:
     """A frame and the time at which it was received."""
 
-    frame: Frame
-    at: Ns
+    def __init__(self, frame: Frame, at: Ns) -> None:
+        self.frame = frame
+        self.at = at
 
 
 class FrameSubscription:

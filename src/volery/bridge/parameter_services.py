@@ -22,7 +22,7 @@ from volery.bridge.node_interface import (
     Translator,
     stamped,
 )
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_messages import from_bytewise, to_bytewise
 from volery.ros.messages import new, service
 

@@ -21,7 +21,7 @@ from volery.bridge.node_interface import (
     Translator,
     stamped,
 )
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_messages import mission_type
 from volery.ros.messages import new, service
 

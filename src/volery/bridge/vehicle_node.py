@@ -34,7 +34,8 @@ from volery.bridge.autopilot_link import (
 from volery.bridge.naming_schemes import MAVROS
 from volery.bridge.node_interface import InterfaceContext, NamingScheme, NodeInterface, Subscription
 from volery.kernel.task import ExecutionContext, Scope, Task
-from volery.links.link import Frame, Link
+from volery.links.frame import Frame
+from volery.links.link import Link
 from volery.links.pprzlink_codec import FROM_ROS, PPRZROS_TYPE, TO_ROS, to_frame, to_message
 from volery.ros.graph import INVALID_VALUES, Node, Publisher, RosGraph, Work
 from volery.trace.events import Text
@@ -249,11 +250,12 @@ class VehicleNode:
         sources: list[str] = []
         self._batch, self._sources = batch, sources
         try:
-            for frame, at in received:
+            for one in received:
+                frame, stamp = one.frame, self._graph.epoch + one.at
                 self._source = frame.name
                 for translate in interface.translators.get(frame.name, ()):
                     try:
-                        translate(frame.fields, self._graph.epoch + at)
+                        translate(frame.fields, stamp)
                     except INVALID_VALUES as error:
                         self._refuse(frame.name, error)
         finally:

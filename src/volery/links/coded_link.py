@@ -15,7 +15,8 @@ from typing import Protocol
 
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
-from volery.links.link import Codec, Frame, Receiver, ReceiveStatistics
+from volery.links.frame import Frame
+from volery.links.link import Codec, Receiver, ReceiveStatistics
 from volery.links.mavlink_codec import MAVLINK
 from volery.trace.events import LinkState
 

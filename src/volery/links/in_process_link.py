@@ -16,7 +16,8 @@ from functools import partial
 
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
-from volery.links.link import Codec, Frame, Link, Receiver
+from volery.links.frame import Frame
+from volery.links.link import Codec, Link, Receiver
 from volery.links.mavlink_codec import MAVLINK
 
 

@@ -9,23 +9,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
+
+from volery.links.frame import Frame
 
 _KEPT_LINES = 20
 _PRINTABLE = frozenset(b"\t\r\n") | frozenset(range(0x20, 0x7F))
 _LONGEST_LINE = 120
-
-
-class Frame(NamedTuple):
-    """A message: its name and fields as the protocol defines them (``HEARTBEAT``, ``custom_mode`` ...).
-
-    ``system`` and ``component`` are the ids of the sender. Fields are never changed after sending.
-    """
-
-    name: str
-    fields: dict[str, Any]
-    system: int
-    component: int
 
 
 Receiver = Callable[[Frame], None]

@@ -21,7 +21,8 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.base.errors import UsageError
-from volery.links.link import Codec, Frame, NonFrameBytes, ReceiveStatistics
+from volery.links.frame import Frame
+from volery.links.link import Codec, NonFrameBytes, ReceiveStatistics
 from volery.links.mavlink_messages import MessageType, message_type, message_type_of
 
 STX = 0xFD

@@ -24,7 +24,8 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, S
-from volery.links.link import Codec, Frame, NonFrameBytes, ReceiveStatistics
+from volery.links.frame import Frame
+from volery.links.link import Codec, NonFrameBytes, ReceiveStatistics
 from volery.links.mavlink_codec import MavlinkParser
 from volery.links.pprzlink_messages import DATALINK, TELEMETRY, message_type, message_type_of
 from volery.ros.messages import message_class, new

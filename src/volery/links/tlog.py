@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 from volery.base.time import US, Ns, S
 from volery.kernel.api import Kernel
-from volery.links.link import Frame, Link, Receiver
+from volery.links.frame import Frame
+from volery.links.link import Link, Receiver
 from volery.links.mavlink_codec import STX, STX_V1, MavlinkParser, encode, frame_length
 
 _STAMP = struct.Struct(">Q")

@@ -10,7 +10,8 @@ from typing import Protocol
 from volery.base.seeds import stream
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
-from volery.links.link import Frame, Link, Receiver
+from volery.links.frame import Frame
+from volery.links.link import Link, Receiver
 from volery.links.wire_faults import FaultyLink, WireFaults
 from volery.ros.graph.interface import NodeId, Route
 from volery.run.assembly.simulated_fleet import SimulatedFleet

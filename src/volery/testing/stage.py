@@ -22,7 +22,8 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
 from volery.kernel.wall import WallKernel
-from volery.links.link import Frame, Link
+from volery.links.frame import Frame
+from volery.links.link import Link
 from volery.links.mavlink_messages import constant
 from volery.links.wire_faults import WireFaults
 from volery.run.assembly.ros_graphs import GRAPHS

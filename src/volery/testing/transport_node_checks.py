@@ -8,7 +8,7 @@ from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.kernel.task import ExecutionContext
 from volery.ros.graph.endpoints import ServiceError
-from volery.ros.graph.interface import Work
+from volery.ros.graph.work import Work
 from volery.ros.messages import new, request, service
 from volery.testing.checks import demand, raising
 from volery.testing.transport_site import LIMIT, Site, check

@@ -15,7 +15,7 @@ import pytest
 import volery
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import MavlinkParser, SignedMavlink, encode
 
 KEY = bytes(range(32))

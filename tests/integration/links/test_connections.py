@@ -8,6 +8,7 @@ import threading
 import tty
 from collections.abc import Callable, Iterator
 from contextlib import closing
+from dataclasses import replace
 
 import pytest
 
@@ -17,7 +18,7 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
 from volery.kernel.wall import WallKernel
 from volery.links.coded_link import CodedLink
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import encode
 from volery.links.stream_links import SerialLink, TcpClient, TcpServer
 from volery.links.udp_link import UdpLink, UdpServer
@@ -222,7 +223,7 @@ def test_a_udp_server_takes_the_frames_of_a_system_from_one_address(bench: Bench
         closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as vehicle,
         closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as spoofer,
     ):
-        forged = BEAT._replace(fields={**BEAT.fields, "type": 99})
+        forged = replace(BEAT, fields={**BEAT.fields, "type": 99})
         vehicle.sendto(encode(BEAT, 0), (HERE, server.port))
         bench.until(lambda: bench.received[server])
         spoofer.sendto(encode(forged, 0), (HERE, server.port))

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from volery.links.coded_link import MAX_UNHANDLED, ReaderThread
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import MAVLINK, encode
 from volery.links.stream_links import MAX_CLIENTS
 

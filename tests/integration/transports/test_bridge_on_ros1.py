@@ -21,7 +21,7 @@ from typing import Any
 import pytest
 
 import volery
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import MAVLINK, encode
 from volery.ros.transports.ros1 import Roscore
 from volery.ros.transports.ros1.rospy_copy import write_package

@@ -11,8 +11,8 @@ from volery.bridge import ROSCOPTER, VehicleNode, VehicleNodeOptions
 from volery.cost import Price
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.ros import messages
 from volery.ros.graph import EmbeddedGraph
 from volery.trace.events import Text

@@ -4,7 +4,7 @@ from typing import Any
 import pytest
 
 from volery.base.time import MS, S
-from volery.links.link import Frame
+from volery.links.frame import Frame
 
 
 def test_state_follows_the_heartbeat(rig: Any) -> None:

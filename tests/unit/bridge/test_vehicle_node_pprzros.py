@@ -11,8 +11,8 @@ from volery.base.time import MS, S
 from volery.bridge import serve_pprzros
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.links.pprzlink_codec import FROM_ROS, PPRZLINK, PPRZROS_TYPE, TO_ROS, to_frame, to_message
 from volery.ros.graph import EmbeddedGraph
 from volery.ros.messages import new

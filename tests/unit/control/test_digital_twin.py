@@ -22,7 +22,7 @@ from volery.control.digital_twin import (
 )
 from volery.control.log_signals import read_signals
 from volery.control.step_response import Signal, make_signal
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.ros import messages
 from volery.ros.messages.bags import create_bag
 

@@ -13,7 +13,7 @@ from volery.base.errors import UsageError
 from volery.base.time import MS
 from volery.control.log_signals import chosen_signal, euler_degrees, read_signals
 from volery.control.step_response import step_responses
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.ros import messages
 from volery.ros.messages.bags import create_bag
 from volery.trace.attachments import RunSetup

@@ -10,7 +10,7 @@ import pytest
 from rigs.flight_log_files import dataflash, tlog, ulog
 from volery.base.errors import UsageError
 from volery.links.flight_logs import DATAFLASH, TLOG, ULOG, columns_of, log_format, read_flight_log
-from volery.links.link import Frame
+from volery.links.frame import Frame
 
 BEAT = Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "custom_mode": 4, "mavlink_version": 3}, 1, 1)
 

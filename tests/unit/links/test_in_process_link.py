@@ -5,8 +5,8 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 
 
 def text(words: str) -> Frame:

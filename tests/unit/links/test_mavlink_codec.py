@@ -4,7 +4,7 @@ import pytest
 from pymavlink.dialects.v10 import ardupilotmega as dialect_v1
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import CHECKSUM, HEADER, MavlinkParser, encode, frame_length, quantised
 
 BEAT = encode(Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "base_mode": 81, "mavlink_version": 3}, 1, 1), 0)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.base.errors import UsageError
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import SignedMavlink, encode, read_key
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.vehicles.address import listen, parse_listen

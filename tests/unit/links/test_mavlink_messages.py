@@ -4,7 +4,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.base.errors import UsageError
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import encode, quantised
 from volery.links.mavlink_messages import constant, entry_name, message_type
 

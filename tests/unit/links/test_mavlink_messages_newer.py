@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega
 
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import MavlinkParser, encode
 from volery.links.mavlink_messages import NEWER_MESSAGES, FieldDefinition, MessageDefinition, message_type
 

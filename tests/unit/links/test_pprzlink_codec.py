@@ -5,7 +5,7 @@ import math
 import pytest
 
 from volery.base.errors import UsageError
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import encode as mavlink
 from volery.links.pprzlink_codec import PPRZLINK, PprzlinkParser, checksum, encode, quantised
 from volery.links.pprzlink_messages import entry_name, entry_value, message_type, parse_definitions

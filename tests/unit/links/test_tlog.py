@@ -7,8 +7,8 @@ from pymavlink import mavutil
 
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.links.mavlink_codec import encode
 from volery.links.tlog import TlogTap, read_tlog
 

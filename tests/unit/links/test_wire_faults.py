@@ -8,7 +8,7 @@ from volery.base.errors import UsageError
 from volery.base.seeds import stream
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.wire_faults import WireFaults, faulty_pair, parse_wire_faults
 
 COUNT = 400

@@ -9,7 +9,7 @@ import pytest
 
 from rigs.airstrip import Airstrip
 from volery.base.errors import NotArrived, Refused, UsageError
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.vehicles import Drone
 from volery.vehicles.drivers.ardupilot import open_driver as open_ardupilot
 from volery.vehicles.drivers.px4 import open_driver as open_px4

@@ -11,8 +11,8 @@ from rigs.missions import carried_out
 from volery.base.errors import UsageError
 from volery.base.time import MS
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.vehicles.drivers.mavlink.services import MavlinkServices
 from volery.vehicles.onboard_logs import OnboardLogs
 from volery.vehicles.telemetry import Telemetry

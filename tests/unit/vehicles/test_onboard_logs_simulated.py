@@ -14,7 +14,7 @@ from rigs.airstrip import Airstrip, at
 from volery.base.time import S
 from volery.control.log_signals import read_signals
 from volery.kernel.waiting import sleep
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.vehicles import Drone
 from volery.vehicles.drivers.ardupilot import open_driver as open_ardupilot
 from volery.vehicles.drivers.px4 import open_driver as open_px4

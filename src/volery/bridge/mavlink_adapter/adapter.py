@@ -42,8 +42,9 @@ from volery.bridge.mavlink_adapter.drone_commands import (
 from volery.bridge.mavlink_adapter.telemetry_encoder import TelemetryEncoder
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame, Receiver
+from volery.links.link import Receiver
 from volery.links.mavlink_messages import (
     CHUNK,
     MessageStreams,

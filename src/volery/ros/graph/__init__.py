@@ -36,9 +36,9 @@ from volery.ros.graph.interface import (
     Tariffs,
     Timer,
     TopicState,
-    Work,
     free,
 )
+from volery.ros.graph.work import Work
 
 __all__ = [
     "AS_OFFERED",

@@ -15,7 +15,7 @@ from volery.kernel.api import Handle
 from volery.kernel.task import Task
 from volery.kernel.waiting import Rate, current_task, end_activation
 from volery.ros.graph.graph_context import NodeContext
-from volery.ros.graph.interface import Work
+from volery.ros.graph.work import Work
 
 FIRST, NEXT = 1.0, 0.0
 """The x of ``spin_once`` in a ``Tariff``."""

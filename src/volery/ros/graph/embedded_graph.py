@@ -42,13 +42,13 @@ from volery.ros.graph.interface import (
     ServiceState,
     Tariffs,
     TopicState,
-    Work,
     absolute_name,
     absolute_remaps,
     free,
     full_node_name,
     no_route,
 )
+from volery.ros.graph.work import Work
 from volery.ros.messages import Message, cdr_size, new
 
 if TYPE_CHECKING:

@@ -27,8 +27,8 @@ from volery.ros.graph.interface import (
     Handler,
     QoS,
     Route,
-    Work,
 )
+from volery.ros.graph.work import Work
 from volery.ros.messages import cdr_size, message_class, service
 from volery.ros.messages.encodings import copied_to_cdr
 from volery.trace.events import NONE, Call, Message, Published, Text

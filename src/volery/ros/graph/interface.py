@@ -19,6 +19,7 @@ from volery.base.errors import UsageError, choices
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
+from volery.ros.graph.work import Work
 
 CLOCK = "/clock"
 CLOCK_TYPE = "rosgraph_msgs/msg/Clock"
@@ -208,13 +209,6 @@ class Rate(Protocol):
 
     def remaining(self) -> Ns:
         """Return the time until the next release, ns; 0 for a late loop."""
-
-
-class Work(NamedTuple):
-    """A callback that is ready: since when, ns, and what runs it, as component code."""
-
-    arrived: Ns
-    run: Callable[[], None]
 
 
 class Group(Protocol):

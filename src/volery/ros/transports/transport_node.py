@@ -29,9 +29,9 @@ from volery.ros.graph.interface import (
     Handler,
     Node,
     QoS,
-    Work,
     full_node_name,
 )
+from volery.ros.graph.work import Work
 from volery.ros.messages import Message, ServiceType, message_class, service
 from volery.ros.messages.encodings import copied_to_cdr
 from volery.ros.transports.client_library import (

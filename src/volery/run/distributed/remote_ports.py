@@ -24,7 +24,7 @@ from volery.kernel.waiting import current_task
 from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
 from volery.ros.graph import Client, Node, ServiceError
-from volery.ros.graph.interface import Work
+from volery.ros.graph.work import Work
 from volery.ros.messages import Message, define_all, request, service
 from volery.run.distributed.call_types import CallTypes, Find, OperationType
 from volery.run.distributed.plan import NODE, operations, service_name

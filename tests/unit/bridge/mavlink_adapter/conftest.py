@@ -13,7 +13,7 @@ from volery.base.time import S
 from volery.bridge import MAVROS, MavlinkAdapter, VehicleNode, VehicleNodeOptions
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.ros import messages
 from volery.ros.graph import EmbeddedGraph
 from volery.run.assembly.simulated_fleet import fleet_of

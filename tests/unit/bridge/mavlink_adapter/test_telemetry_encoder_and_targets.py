@@ -21,7 +21,7 @@ from volery.bridge.mavlink_adapter.drone_commands import (
 )
 from volery.bridge.mavlink_adapter.telemetry_encoder import TelemetryEncoder
 from volery.kernel.virtual import VirtualKernel
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import quantised
 from volery.vehicles.driver import ManualControl
 from volery.vehicles.telemetry import Attitude, Battery, Telemetry, Velocity

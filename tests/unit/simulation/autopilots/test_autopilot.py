@@ -11,8 +11,8 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.simulation.autopilots.ardupilot import FIRMWARE
 from volery.simulation.autopilots.autopilot import Autopilot, firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world

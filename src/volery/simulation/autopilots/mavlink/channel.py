@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 from volery.base.time import MS, Ns
 from volery.kernel.api import Kernel
-from volery.links.link import ByteLink, Frame, Link, SelectiveLink
+from volery.links.frame import Frame
+from volery.links.link import ByteLink, Link, SelectiveLink
 from volery.links.mavlink_messages import MessageStreams
 from volery.simulation.autopilots.state_groups import NEVER
 

@@ -14,7 +14,8 @@ from typing import Any
 
 from volery.base.time import S
 from volery.kernel.api import Action, Handle
-from volery.links.link import Frame, Link
+from volery.links.frame import Frame
+from volery.links.link import Link
 from volery.links.mavlink_messages import MessageStreams, status_text_chunks
 from volery.simulation.autopilots.mavlink.channel import AUTOPILOT, MavlinkChannel, Peer, StatusTextQueue
 from volery.simulation.autopilots.mavlink.file_service import FileService

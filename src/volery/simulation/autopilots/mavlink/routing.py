@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.simulation.autopilots.mavlink.channel import AUTOPILOT, MavlinkChannel
 
 NOT_FORWARDED = ("ADSB_VEHICLE", "RADIO", "RADIO_STATUS")

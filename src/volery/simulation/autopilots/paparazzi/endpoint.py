@@ -13,7 +13,8 @@ from typing import Any
 from volery.base.frames import ned_to_enu
 from volery.base.time import MS, Ns
 from volery.kernel.api import Action, Handle
-from volery.links.link import Frame, Link
+from volery.links.frame import Frame
+from volery.links.link import Link
 from volery.simulation.autopilots.paparazzi import modes, parameters, rotorcraft_state
 from volery.simulation.autopilots.paparazzi.flight_modes import Guided
 from volery.simulation.autopilots.paparazzi.parameters import AUTO1_SWITCH, AUTO2_SWITCH, MANUAL_SWITCH

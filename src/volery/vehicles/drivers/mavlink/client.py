@@ -15,7 +15,8 @@ from mypy_extensions import mypyc_attr
 from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.links.link import Frame, Link, SelectiveLink
+from volery.links.frame import Frame
+from volery.links.link import Link, SelectiveLink
 from volery.links.mavlink_messages import constant, entry_name, from_bytewise, message_type
 from volery.trace.events import LinkState
 from volery.vehicles.address import rate_option, records_texts, system_option

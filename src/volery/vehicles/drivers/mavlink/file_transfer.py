@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from volery.base.errors import Refused, UsageError
 from volery.kernel.api import Action
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.vehicles.drivers.mavlink.pending_requests import PendingRequests
 from volery.vehicles.services import FileEntry
 

@@ -29,7 +29,7 @@ from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.links.mavlink_messages import constant, entry_name
 from volery.ros.graph import Node, Publisher, ServiceError
-from volery.ros.graph.interface import Work
+from volery.ros.graph.work import Work
 from volery.ros.messages import message_class, new, request
 from volery.vehicles.address import check_options
 from volery.vehicles.driver import Acceleration, AttitudeTarget

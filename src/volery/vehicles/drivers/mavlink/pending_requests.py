@@ -15,7 +15,7 @@ from volery.base.errors import CapabilityError, NotArrived, Refused
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.kernel.waiting import Signal
-from volery.links.link import Frame
+from volery.links.frame import Frame
 
 TRIES = 5
 AGAIN: Ns = 1500 * MS

@@ -14,7 +14,7 @@ from volery.base.errors import CapabilityError, Refused, did_you_mean
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Lock
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_messages import constant, entry_name, from_bytewise, mission_type, to_bytewise
 from volery.vehicles.drivers.mavlink.file_transfer import FileTransfer
 from volery.vehicles.drivers.mavlink.pending_requests import PendingRequests

@@ -15,7 +15,8 @@ from volery.base.errors import CapabilityError, LinkError, LinkSilent, UsageErro
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
-from volery.links.link import Frame, Link, Receiver
+from volery.links.frame import Frame
+from volery.links.link import Link, Receiver
 from volery.links.paparazzi_aircraft import PaparazziAircraft, Setting
 from volery.links.pprzlink_codec import (
     FROM_ROS,

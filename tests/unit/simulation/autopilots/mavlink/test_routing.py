@@ -8,7 +8,7 @@ import pytest
 
 from rigs.station import Station
 from volery.base.frames import LocalFrame
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.simulation.autopilots.ardupilot import FIRMWARE
 
 COMPANION, COMPONENT, STATION = 7, 9, 255

@@ -11,8 +11,8 @@ import pytest
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.links.wire_faults import WireFaults, faulty_pair
 from volery.simulation.autopilots.autopilot import Autopilot

@@ -10,8 +10,8 @@ import pytest
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.links.mavlink_messages import from_bytewise, status_text_chunks, to_bytewise
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world

@@ -11,8 +11,8 @@ from volery.base.errors import CapabilityError, LinkGarbled, UsageError
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.vehicles import Rover
 from volery.vehicles.drivers.ardupilot import open_driver
 from volery.vehicles.drivers.ardupilot.modes import on_link_loss

@@ -19,8 +19,8 @@ from volery.bridge.vehicle_node import VehicleNodeOptions
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.ros.graph import EmbeddedGraph
 from volery.vehicles import Drone, Vehicle
 from volery.vehicles.drivers.mavros import MAVROS

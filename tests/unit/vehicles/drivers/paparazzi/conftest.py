@@ -16,7 +16,8 @@ from rigs.bench import Bench
 from volery.base.frames import geodetic_to_ecef
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.link import Frame, Link
+from volery.links.frame import Frame
+from volery.links.link import Link
 from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.links.pprzlink_messages import entry_value

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
+from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.link import Frame
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.links.pprzlink_messages import TELEMETRY, Field, message_names, message_type
 from volery.vehicles.drivers.paparazzi import open_driver

@@ -23,6 +23,7 @@ from volery.base.errors import (
 from volery.base.position import AMSL, AboveGround, AboveHome, Position
 from volery.base.time import S
 from volery.kernel.waiting import sleep
+from volery.links.frame import Frame
 from volery.trace.events import Operation, Text
 from volery.vehicles import Capability
 from volery.vehicles.driver import Waypoint
@@ -873,12 +874,7 @@ def test_a_silent_link(bench: Make) -> None:
 def test_another_kind_of_aircraft(bench: Make) -> None:
     at = bench()
     at.autopilot.mute = True
-    at.after(
-        1,
-        lambda: at.autopilot.link.send(
-            at.autopilot.received[0]._replace(name="PPRZ_MODE", fields={}, system=7)
-        ),
-    )
+    at.after(1, lambda: at.autopilot.link.send(Frame("PPRZ_MODE", {}, 7, 0)))
     with pytest.raises(CapabilityError, match="is a plane, not a drone"):
         at.fly(lambda drone: drone.wait_connected())
 

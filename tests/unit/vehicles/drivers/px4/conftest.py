@@ -15,7 +15,7 @@ from rigs import scripted
 from rigs.bench import Bench
 from rigs.scripted import ACCEPTED, ASK, GET_HOME, INTERVAL, STREAMED, Scripted
 from volery.base.time import MS, S
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.vehicles.drivers.px4 import open_driver
 from volery.vehicles.drivers.px4.decoder import event_id
 from volery.vehicles.drivers.px4.modes import HOLD, LAND, MANUAL_MODES, MODES, OFFBOARD, RTL, TAKEOFF

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from rigs.recorded import Recorded, extract
-from volery.links.link import Frame
+from volery.links.frame import Frame
 from volery.links.mavlink_codec import MavlinkParser, encode
 from volery.vehicles.drivers.px4.decoder import KNOWN_EVENTS, PX4Decoder, event_id, event_text
 
