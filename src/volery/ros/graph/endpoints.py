@@ -164,7 +164,10 @@ class EmbeddedPublisher:
         node, connections = self.node, self._connections
         if not (connections or self._latches or self._recorded or (self._checked and not fresh)):
             return
-        content = node.graph.copy(message) if node.graph.as_bytes else message.copy()
+        if node.graph.as_bytes:
+            content = node.graph.copy(message)
+        else:
+            content = message.converted() if fresh else message.copy()
         size = 0
         if self._recorded or (self._checked and not fresh):
             data = copied_to_cdr(content)

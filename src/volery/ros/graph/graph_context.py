@@ -277,7 +277,7 @@ class NodeContext:
                 background += cost.background
                 at += cost.caller
         if not self.graph.unrecorded:
-            kind = f"ros:publish*{len(subscribers)}"
+            kind = f"ros:publish*{len(subscribers)}" if len(subscribers) > 1 else "ros:publish"
             kernel.record(Charge(now, self.id.component, self.id.processor, kind, caller, background, 0.0))
         return self._execute(now, caller, background)
 

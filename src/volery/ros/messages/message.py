@@ -62,6 +62,43 @@ class _Writing:
         return f"{kind}({', '.join(values)})"
 
 
+def generated_conversion(cls: Any, fields: list[Any]) -> Copy:
+    """Return a generated function that converts the lists of a message to arrays in place, and returns it.
+
+    An array of the field's type stays. A type with lists of strings or messages is copied, since these may
+    belong to other messages as well.
+    """
+    names: dict[str, Any] = {"array": np.ndarray}
+    tests = _conversions(fields, "message", names)
+    if tests is None:
+        return cast("Copy", cls._copy)
+    source = "\n".join(["def convert(message):", *tests, "    return message"])
+    exec(compile(source, f"<conversion of {cls.__msgtype__}>", "exec"), names)
+    written: Copy = names["convert"]
+    return written
+
+
+def _conversions(fields: list[Any], of: str, names: dict[str, Any]) -> list[str] | None:
+    """Return the statements that convert the lists below the expression *of*; None if they are no numbers."""
+    lines: list[str] = []
+    for one in fields:
+        value = f"{of}.{one.name}"
+        if one.length is None:
+            inner = [] if one.nested is None else _conversions(one.nested.fields_of, value, names)
+            if inner is None:
+                return None
+            lines += inner
+        elif one.nested is not None or one.base == "string":
+            return None
+        else:
+            number = len(names)
+            names[f"type_{number}"], names[f"copier_{number}"] = _dtype(one.base), _copier(one)
+            shape = f"{value}.shape != ({one.length},)" if one.length else f"{value}.ndim != 1"
+            wrong = f"type({value}) is not array or {value}.dtype is not type_{number} or {shape}"
+            lines += [f"    if {wrong}:", f"        {value} = copier_{number}({value})"]
+    return lines
+
+
 Default = Callable[[], Any]
 Copier = Callable[[Any], Any]
 
@@ -75,6 +112,7 @@ class Message:
     _copiers: ClassVar[tuple[tuple[int, Copier], ...]] = ()
     _values: ClassVar[Callable[[Any], tuple[Any, ...]]]
     _copy: ClassVar[Any]  # a function: Copy
+    _convert: ClassVar[Any]  # likewise
     fields_of: ClassVar[list[Field]] = []
     """Fields of the type. Private to this package."""
     __hash__: ClassVar[Any] = None  # messages are mutable values
@@ -89,6 +127,16 @@ class Message:
             return self._copy(self)
         except _MISFITS:
             return self._copied_by_fields()  # raises an error that names the field
+
+    def converted(self) -> Any:
+        """Return this message with its lists converted to arrays, or a copy if its lists are no numbers.
+
+        Only for a message of the caller alone. Raises ``UsageError`` if a value does not fit.
+        """
+        try:
+            return self._convert(self)
+        except _MISFITS:
+            return self._copied_by_fields()
 
     def _copied_by_fields(self) -> Any:
         cls = type(self)
@@ -179,6 +227,7 @@ def make_class(
         label, members, bases=(base,), namespace=namespace, init=bool(fields), eq=False, slots=True
     )
     made._copy = staticmethod(generated_copy(made, fields))
+    made._convert = staticmethod(generated_conversion(made, fields))
     return cast("type[Message]", made)
 
 

@@ -78,6 +78,29 @@ def test_a_copy_is_deep() -> None:
     assert copied.header.frame_id == "a"
 
 
+def test_a_message_of_the_caller_alone_is_converted_in_place() -> None:
+    own = messages.new("mavros_msgs/RCIn", channels=[1500, 1600])
+    assert own.converted() is own
+    assert own.channels.dtype == np.uint16
+    channels = own.channels
+    assert own.converted().channels is channels
+
+
+@pytest.mark.parametrize("values", [[0.0] * 8, np.zeros(8), "nine"])
+def test_a_conversion_finds_values_that_do_not_fit(values: object) -> None:
+    fix = messages.new("sensor_msgs/NavSatFix", position_covariance=values)
+    with pytest.raises(UsageError, match="position_covariance"):
+        fix.converted()
+
+
+def test_a_conversion_copies_messages_within_a_list() -> None:
+    status = messages.new("diagnostic_msgs/DiagnosticStatus", name="motor")
+    listed = messages.new("diagnostic_msgs/DiagnosticArray", status=[status])
+    status_sent = listed.converted().status[0]
+    status.name = "battery"
+    assert status_sent.name == "motor"
+
+
 def test_constants_are_attributes_of_the_class() -> None:
     assert messages.message_class("mavros_msgs/PositionTarget").FRAME_BODY_NED == 8
     assert messages.message_class("mavros_msgs/OverrideRCIn").CHAN_NOCHANGE == 65535
