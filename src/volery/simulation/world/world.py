@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from struct import pack_into
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -54,6 +55,8 @@ from volery.simulation.world.state_layout import (
 
 STEP: Final[Ns] = 2 * MS
 """Grid step: 500 Hz."""
+OCTETS: Final = 8
+"""Size of a value in a row."""
 
 
 class Truth(NamedTuple):
@@ -98,10 +101,13 @@ class Truth(NamedTuple):
     distance: float
 
 
-class _PendingInput(NamedTuple):
-    step: int
-    column: int
-    values: tuple[float, ...]
+class _PendingInput:
+    """Values for the columns of a row from *column* on, with effect from a grid step."""
+
+    def __init__(self, step: int, column: int, values: tuple[float, ...]) -> None:
+        self.step = step
+        self.column = column
+        self.values = values
 
 
 def _initial_arrays(
@@ -165,6 +171,8 @@ class World:
         if not count:
             raise UsageError("a world without bodies; give at least one")
         self.arrays = _initial_arrays(self.specs, seed, frame, wind or Wind(), terrain or Terrain(), columns)
+        self._octets = self.arrays.rows.data.cast("B")
+        self._row_octets = self.arrays.rows.strides[0]
         self._reached = self.arrays.reached.data
         self._read = self.arrays.read.data
         self._span = self.arrays.span.data
@@ -282,8 +290,9 @@ class World:
         pending = self._pending.get(body)
         reached = self._reached[body]
         while pending and pending[0].step <= reached:
-            _, column, values = pending.popleft()
-            self.arrays.rows[body, column : column + len(values)] = values
+            due = pending.popleft()
+            start = self._row_octets * body + OCTETS * due.column
+            pack_into(f"{len(due.values)}d", self._octets, start, *due.values)
             if not pending:
                 del self._pending[body]
 

@@ -8,10 +8,11 @@ three for a rover.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import dist, radians
+from math import radians
 from typing import Any
 
 from volery.base.elementary import cos, sin
+from volery.base.frames import Vector
 from volery.base.time import MS, Ns, S, from_seconds
 from volery.simulation.autopilots.ardupilot.failsafes import radio_lost
 from volery.simulation.autopilots.ardupilot.modes import WARNING, arm, change_mode, disarm
@@ -298,6 +299,11 @@ def read_rudder(
         disarm(vehicle, words[1], force=False)
 
 
+def _is_near(here: Vector, point: Vector) -> bool:
+    north, east, down = here[0] - point[0], here[1] - point[1], here[2] - point[2]
+    return north * north + east * east + down * down < TRACK_SPACING * TRACK_SPACING
+
+
 def keep_track(vehicle: Vehicle) -> None:
     """Add the position of an armed vehicle to its track; a point near an earlier one cuts the loop.
 
@@ -318,10 +324,11 @@ def keep_track(vehicle: Vehicle) -> None:
     if vehicle.mode.name == "SMART_RTL":
         return
     here, track = vehicle.estimate.position, ground.track
-    if track and dist(here, track[-1]) < TRACK_SPACING:
+    if track and _is_near(here, track[-1]):
         return
-    near = next((place for place, point in enumerate(track) if dist(here, point) < TRACK_SPACING), None)
-    if near is not None:
-        del track[near + 1 :]
-    elif len(track) < TRACK_POINTS:
+    for place, point in enumerate(track):
+        if _is_near(here, point):
+            del track[place + 1 :]
+            return
+    if len(track) < TRACK_POINTS:
         track.append(here)

@@ -6,7 +6,6 @@ east-north-up or forward-left-up, anticlockwise, radians. Heights count from the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from math import hypot, isfinite, pi
 from typing import TYPE_CHECKING, Any
 
@@ -30,16 +29,16 @@ SLOWEST = 0.1
 """Speed towards a position that is almost reached [m/s]."""
 
 
-@dataclass(frozen=True)
 class SdkCommand:
     """Valid set-point. Offsets count from ``anchor``, the position at its arrival (north-east-down) [m]."""
 
-    flag: int
-    x: float
-    y: float
-    z: float
-    yaw: float
-    anchor: Vector
+    def __init__(self, flag: int, x: float, y: float, z: float, yaw: float, anchor: Vector) -> None:
+        self.flag = flag
+        self.x = x
+        self.y = y
+        self.z = z
+        self.yaw = yaw
+        self.anchor = anchor
 
     @property
     def horizontal(self) -> int:
@@ -120,7 +119,8 @@ class SdkControl(Manoeuvre):
         """Return the set-point, or one that stays here if it leads across a border."""
         controller = self.vehicle.firmware_state
         if controller.bars(*self._north_east(command)):
-            return replace(command, x=0.0, y=0.0, anchor=self.vehicle.estimate.position)
+            here = self.vehicle.estimate.position
+            return SdkCommand(command.flag, 0.0, 0.0, command.z, command.yaw, here)
         return command
 
     def _north_east(self, command: SdkCommand) -> tuple[float, float]:
