@@ -1,4 +1,7 @@
-"""Backend for a DJI node: it processes messages, sends set-points at 50 Hz, and calls services.
+"""Backend for a DJI node: it processes messages, sends set-points, and calls services.
+
+A set-point follows each position, which the node publishes at 50 Hz: so it is computed from the newest one,
+and the task wakes once for both.
 
 It runs in separate tasks in the execution context of the commanding node: their execution time is charged
 there, they continue while the component computes, and a computer that is too slow delays them.
@@ -35,6 +38,9 @@ from volery.vehicles.drivers.dji.setpoints import SetpointStream
 from volery.vehicles.telemetry import Answer, Telemetry
 
 SETPOINT_PERIOD: Ns = 20 * MS
+"""Period of the positions."""
+SETPOINT_WITHIN: Ns = 30 * MS
+"""Time after which a set-point is sent without a new position."""
 ANSWERED_WITHIN: Ns = 60 * S
 TASK_ANSWERED_WITHIN: Ns = 600 * S
 """The vehicle node of 4.1 answers a take-off or a landing only when it is finished."""
@@ -104,7 +110,8 @@ class DjiBackend:
         self._pending: set[str] = set()
         self._arrived: deque[Work] = deque(maxlen=KEPT)
         self._due = Signal(kernel, f"messages of {interface.namespace}")
-        self._next: Ns = 0
+        self._next: Ns = 0  # when a set-point is sent at the latest
+        self._positions = 0  # that set-points have followed
         self._sent_at: Ns = -QUIET
         self._silent = False
         self._closed = False
@@ -162,13 +169,13 @@ class DjiBackend:
         self.telemetry.changed.notify()
 
     def _send_setpoint(self) -> None:
-        now = self._kernel.now()
-        if not self.stream.wanted or (now < self._next and not self.stream.fresh):
+        now, positions = self._kernel.now(), self.decoder.positions
+        follows = positions != self._positions and now >= self._next - SETPOINT_PERIOD
+        if not self.stream.wanted or not (follows or self.stream.fresh or now >= self._next):
             return
         with self._kernel.guard:
             setpoint = self.stream.setpoint()
-        late = now - self._next
-        self._next = (self._next if 0 <= late < SETPOINT_PERIOD else now) + SETPOINT_PERIOD
+        self._positions, self._next = positions, now + SETPOINT_WITHIN
         if setpoint is None:
             return
         try:

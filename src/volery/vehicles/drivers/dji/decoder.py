@@ -86,6 +86,7 @@ class DjiDecoder:
         commanded: mode commanded last.
         displayed: mode that the aircraft shows, or that its status shows of an M100.
         node_seen: a DJI node publishes.
+        positions: number of messages with a position.
         located_at: time of the last position with a good ``gps_health``, ns; -1 before the first.
         home_altitude: stated altitude of home, m AMSL; NaN if it is not stated.
 
@@ -107,6 +108,7 @@ class DjiDecoder:
         self.authority = False
         self.commanded = ""
         self.node_seen = False
+        self.positions = 0
         self.displayed = UNKNOWN
         self.located_at: Ns = -1
         self._placed_at: Ns = -1
@@ -182,8 +184,9 @@ class DjiDecoder:
 
         The status is always a fix. A place of 0, 0 is none, whatever the altitude.
         """
+        self.positions += 1
         latitude, longitude, altitude = message.latitude, message.longitude, message.altitude
-        if not all(isfinite(value) for value in (latitude, longitude, altitude)):
+        if not (isfinite(latitude) and isfinite(longitude) and isfinite(altitude)):
             return
         if abs(latitude) > 90.0 or abs(longitude) > 180.0:
             return
@@ -211,9 +214,10 @@ class DjiDecoder:
 
     def _rc(self, message: Any) -> None:
         """Decode sticks and switches; any move of the mode switch takes the authority."""
-        if len(message.axes) <= SWITCH_AXIS:
+        axes = [float(one) for one in message.axes]
+        if len(axes) <= SWITCH_AXIS:
             return
-        switch = self._switch = float(message.axes[SWITCH_AXIS])
+        switch = self._switch = axes[SWITCH_AXIS]
         if self.authority and self._granted_at is None:
             self._granted_at = switch
         if self.authority and switch != self._granted_at:
@@ -221,7 +225,7 @@ class DjiDecoder:
         elif self._taken == "RC" and switch == self._granted_at:
             self._taken = ""
         at_program = self._granted_at is None or switch == self._granted_at
-        shares = [one / max(1.0, abs(one)) for one in message.axes]  # some switches are in ten-thousandths
+        shares = [one / max(1.0, abs(one)) for one in axes]  # some switches are in ten-thousandths
         channels = [pulse_of(one) for one in shares]
         channels[SWITCH_AXIS] = PROGRAM_MAY_FLY if at_program else PILOT_FLIES
         if self._transmitter not in {UNKNOWN, CONNECTED}:  # the last values are repeated

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite, radians
 
 from volery.base.errors import CapabilityError, Refused
-from volery.base.frames import heading_to_yaw
+from volery.base.frames import LocalFrame, heading_to_yaw
 from volery.base.position import Position
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import Action, Kernel
@@ -117,8 +117,10 @@ class Dji:
         height = above_home(goal, home)
         self._steps.check_height(height, f"go to {goal}")
 
+        frame = LocalFrame(goal.latitude, goal.longitude)
+
         def there() -> Point:
-            return Point(goal.latitude, goal.longitude, height, yaw_of(self.telemetry), speed)
+            return Point(frame, height, yaw_of(self.telemetry), speed)
 
         return self._steps.to_point(f"reach {goal}", there, arrived_at(goal, False), within)
 

@@ -104,6 +104,10 @@ class NodeInterface(Protocol):
         """Send four numbers in the conventions of ROS. May block while they are sent."""
 
 
+def _raise(_index: int, error: Exception) -> None:
+    raise error
+
+
 class _CommonInterface:
     """Services that both nodes have below their namespace."""
 
@@ -211,7 +215,7 @@ class DjiSdkInterface(_CommonInterface):
         axes = list(numbers) if publisher is not None else [*numbers, float(flag)]
         joy: Any = message_class(JOY)()
         joy.axes = axes
-        (publisher or self._generic).publish(joy)
+        self._node.publish_all([(publisher or self._generic, joy)], _raise)
 
 
 class OsdkRosInterface(_CommonInterface):

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from volery.base.errors import OutOfBounds, PositionLost, Refused
+from volery.base.frames import LocalFrame
 from volery.base.time import Ns, S
 from volery.ros.messages.dji_constants import SETPOINT_HEIGHTS, DisplayMode
 from volery.vehicles.driver import Step
@@ -191,7 +192,9 @@ class DjiSteps:
     def over_here(self, height: float) -> Point | None:
         """Return the present place at *height* metres above home; ``None`` without a position."""
         here = self.telemetry.position
-        return None if here is None else Point(here.latitude, here.longitude, height, yaw_of(self.telemetry))
+        if here is None:
+            return None
+        return Point(LocalFrame(here.latitude, here.longitude), height, yaw_of(self.telemetry))
 
     def check_height(self, height: float, asked: str) -> None:
         """Raise ``OutOfBounds`` for a height (m above home) outside the range of set-points."""

@@ -51,10 +51,9 @@ Setpoint = tuple[int, Sequence[float]]
 
 
 class Point(NamedTuple):
-    """A point: degrees, metres above home, yaw in rad anticlockwise from east, speed in m/s."""
+    """A point: the origin of a frame, metres above home, yaw in rad anticlockwise from east, speed in m/s."""
 
-    latitude: float
-    longitude: float
+    frame: LocalFrame
     height: float
     yaw: float
     speed: float | None = None
@@ -160,9 +159,8 @@ class SetpointStream:
         here = self._telemetry.position
         if here is None or not self._decoder.located or not isfinite(self._telemetry.above_home):
             return None
-        east, north, _ = LocalFrame(here.latitude, here.longitude, 0.0).to_enu(
-            target.latitude, target.longitude, 0.0
-        )
+        beyond_east, beyond_north, _ = target.frame.to_enu(here.latitude, here.longitude, 0.0)
+        east, north = -beyond_east, -beyond_north
         if target.speed is None:
             return POSITION_YAW, (east, north, target.height, target.yaw)
         away, carrot = hypot(east, north), target.speed * CARROT_S

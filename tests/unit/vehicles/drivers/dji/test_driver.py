@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from itertools import pairwise
 from math import pi
 from typing import Any
 
@@ -174,6 +175,43 @@ def test_setpoints_are_remaining_offsets_fifty_times_a_second(bench: Make) -> No
         assert (x, y, z) == (pytest.approx(0.0, abs=0.05), pytest.approx(20.0, abs=0.1), 9.0)
         assert yaw == pytest.approx(0.0, abs=1e-6)  # as it looked before: east
         assert made.drone.mode == "NAVI_SDK_CTRL"
+
+    made.run(body)
+
+
+def test_a_setpoint_follows_each_position_at_once(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.107)
+        made.later(2.0, lambda: made.node.be_at(20.0, 0.0, 9.0))
+        arrives = made.kernel.now() + 2 * S
+        made.drone.goto(at(20.0, 0.0, 9.0))
+        made.wait(0.1)
+        followed = [one for one in made.node.setpoints if one[0] >= arrives]
+        assert all(sent % (20 * MS) == 0 for sent, _, _ in followed)
+        assert followed[0][0] - arrives < 20 * MS
+        assert followed[0][2][1] == pytest.approx(0.0, abs=0.1)  # the offset from where it is now
+
+    made.run(body)
+
+
+def test_setpoints_go_on_without_positions(bench: Make) -> None:
+    made = bench()
+
+    def body() -> None:
+        made.drone.wait_ready()
+        made.node.obey(4)
+        made.wait(0.1)
+        made.node.lost = True
+        start = made.kernel.now()
+        made.drone.set_velocity(2.0, lasting=1.0)
+        made.wait(0.5)
+        times = [sent for sent, _, _ in made.node.setpoints if sent >= start]
+        assert len(times) >= 16
+        assert max(b - a for a, b in pairwise(times)) <= 30 * MS
 
     made.run(body)
 
