@@ -23,10 +23,8 @@ equal priority count as more urgent, and so does execution outside activations, 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
 
 from volery.base.time import MS, US, Ns
 from volery.trace.attachments import ComponentSetup, ProcessorSetup
@@ -180,11 +178,6 @@ BACKGROUND = " (background)"
 """Ends the name of what is executed beside a component's own flows of control."""
 
 
-def _chosen(choose: Callable[[Ns, Ns], Ns], one: list[Ns], other: list[Ns]) -> list[Ns]:
-    """Return what *choose* returns for the items of two lists, and the rest of the longer one."""
-    return [*map(choose, one, other), *one[len(other) :], *other[len(one) :]]
-
-
 class _Releases:
     """Spans of releases and longest response time of a component's activations."""
 
@@ -192,20 +185,30 @@ class _Releases:
         self.count = 0
         self.longest: Ns = 0
         self.spans: list[Ns] = []
-        self._last: deque[Ns] = deque(maxlen=IN_A_ROW + 1)  # in order
+        self._last: list[Ns] = []  # in order
 
     def add(self, event: Activation) -> None:
+        released, last = event.released, self._last
         self.count += 1
-        self.longest = max(self.longest, event.finished - event.released)
-        late = bool(self._last) and event.released < self._last[-1]
+        self.longest = max(self.longest, event.finished - released)
+        late = bool(last) and released < last[-1]
         if late:  # due before the one before it: taken as if all since had been released with it
-            kept = [min(one, event.released) for one in self._last]
-            self._last = deque(kept, maxlen=IN_A_ROW + 1)
-        self._last.append(event.released)
-        recent = list(self._last)
-        for end in range(len(recent) - 1, 0 if late else len(recent) - 2, -1):
-            spans = [recent[end] - before for before in reversed(recent[:end])]
-            self.spans = _chosen(min, self.spans, spans)
+            last = self._last = [min(one, released) for one in last]
+        last.append(released)
+        if len(last) > IN_A_ROW + 1:
+            del last[0]
+        for end in range(len(last) - 1, 0 if late else len(last) - 2, -1):
+            self._shorten(last, end)
+
+    def _shorten(self, last: list[Ns], end: int) -> None:
+        """Take the spans that end with the release at index *end*, where they are shorter."""
+        spans = self.spans
+        for row in range(end):
+            span = last[end] - last[end - 1 - row]
+            if row == len(spans):
+                spans.append(span)
+            elif span < spans[row]:
+                spans[row] = span
 
     def curve(self, period: Ns) -> tuple[Ns, ...]:
         """Return the least times that 2, 3, ... releases take; empty if they are unknown."""
@@ -227,7 +230,7 @@ class _Work:
         self.most: Ns = 0  # executed in one window
         self._window = 0  # the latest one in which it executed
         self._within: Ns = 0  # executed in it so far
-        self._last: deque[Ns] = deque(maxlen=IN_A_ROW)
+        self._last: list[Ns] = []
 
     def executed(self, start: Ns, end: Ns) -> None:
         """Add what was executed from *start* to *end* to its windows."""
@@ -240,9 +243,17 @@ class _Work:
             start = until
 
     def ended(self) -> None:
-        self._last.append(self.since)
+        last, costs, total = self._last, self.costs, 0
+        last.append(self.since)
+        if len(last) > IN_A_ROW:
+            del last[0]
         self.since = 0
-        self.costs = _chosen(max, self.costs, list(accumulate(reversed(self._last))))
+        for row in range(len(last)):
+            total += last[-1 - row]
+            if row == len(costs):
+                costs.append(total)
+            elif total > costs[row]:
+                costs[row] = total
 
 
 class Demands:
