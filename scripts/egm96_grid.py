@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from volery.base.geoid import GRID_FILE, Egm96Grid, pack
+from volery.base.geoid import GRID_FILE
+from volery.base.geoid_grid import Egm96Grid, pack
 
 FINER = 3
 """5' in a quarter of a degree."""

@@ -11,80 +11,15 @@ GSFC and NIMA Geopotential Model EGM96, NASA/TP-1998-206861; public domain. ``sc
 
 from __future__ import annotations
 
-import lzma
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib.resources import files
-from math import floor, isfinite
-
-import numpy as np
-import numpy.typing as npt
 
 from volery.base.errors import UsageError
+from volery.base.geoid_grid import Egm96Grid, unpack
 
-PER_DEGREE = 4
-ROWS, COLUMNS = 180 * PER_DEGREE + 1, 360 * PER_DEGREE
-"""Rows from the south pole to the north pole, columns eastwards from 180 degrees west."""
-DECIMETRE = 0.1
 GRID_FILE = "egm96.xz"
-
-
-def pack(decimetres: npt.NDArray[np.int16]) -> bytes:
-    """Compress a grid for the file: second differences, low bytes before high bytes."""
-    steps = np.diff(np.diff(decimetres, axis=1, prepend=np.int16(0)), axis=0, prepend=np.int16(0))
-    octets = np.frombuffer(steps.astype("<i2").tobytes(), np.uint8).reshape(-1, 2)
-    return lzma.compress(octets.T.tobytes(), preset=9)
-
-
-def unpack(data: bytes) -> npt.NDArray[np.int16]:
-    """Return the grid in the compressed bytes of the file."""
-    octets = np.frombuffer(lzma.decompress(data), np.uint8).reshape(2, -1)
-    steps = np.ascontiguousarray(octets.T).view("<i2").reshape(ROWS, COLUMNS)
-    return np.cumsum(np.cumsum(steps, axis=0, dtype=np.int16), axis=1, dtype=np.int16)
-
-
-_Posts = tuple[tuple[int, ...], ...]
-
-
-class Egm96Grid:
-    """Heights of the geoid, interpolated between the points of the grid."""
-
-    def __init__(self, decimetres: npt.NDArray[np.int16]) -> None:
-        self._decimetres = decimetres
-        self._cells: dict[tuple[int, int], _Posts] = {}
-
-    def height(self, latitude: float, longitude: float) -> float:
-        """Return metres above the ellipsoid by Catmull-Rom cubics; 0 for coordinates off the globe."""
-        if not (isfinite(longitude) and abs(latitude) <= 90.0):
-            return 0.0
-        up, along = (latitude + 90.0) * PER_DEGREE, (longitude + 180.0) * PER_DEGREE
-        row, column = min(floor(up), ROWS - 2), floor(along)
-        posts = self._cells.get((row, column)) or self._cell(row, column)
-        a, b, c, d = _weights(along - column)
-        height = 0.0
-        for weight, (p, q, r, s) in zip(_weights(up - row), posts, strict=True):
-            height += weight * (a * p + b * q + c * r + d * s)
-        return height * DECIMETRE
-
-    def _cell(self, row: int, column: int) -> _Posts:
-        """Return the four by four points around a cell of the grid."""
-        rows = [min(max(row + step, 0), ROWS - 1) for step in (-1, 0, 1, 2)]
-        columns = [(column + step) % COLUMNS for step in (-1, 0, 1, 2)]
-        found = self._cells[row, column] = tuple(
-            tuple(int(self._decimetres[one, other]) for other in columns) for one in rows
-        )
-        return found
-
-
-def _weights(f: float) -> tuple[float, float, float, float]:
-    """Return the weights of four neighbours for a point at *f* (0..1) between the middle two."""
-    return (
-        -0.5 * f * (1.0 - f) * (1.0 - f),
-        1.0 - 2.5 * f * f + 1.5 * f * f * f,
-        0.5 * f + 2.0 * f * f - 1.5 * f * f * f,
-        0.5 * f * f * (f - 1.0),
-    )
 
 
 @cache
