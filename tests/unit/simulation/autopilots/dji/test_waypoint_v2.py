@@ -80,21 +80,21 @@ def test_it_is_flown_paused_and_resumed(apron: Make) -> None:
 
 
 @pytest.mark.parametrize(
-    ("norths", "changes", "speed"),
+    ("norths", "speed"),
     [
-        ((10.0,), {}, 5.0),  # one waypoint
-        ((10.0, nan), {}, 5.0),  # nowhere
-        ((10.0, 20.0), {}, 20.0),  # too fast
+        ((10.0,), 5.0),  # one waypoint
+        ((10.0, nan), 5.0),  # nowhere
+        ((10.0, 20.0), 20.0),  # too fast
     ],
 )
 def test_settings_that_make_no_sense_are_refused(
-    apron: Make, norths: tuple[float, ...], changes: dict[str, Any], speed: float
+    apron: Make, norths: tuple[float, ...], speed: float
 ) -> None:
     yard = apron("dji_osdk_ros", parameters=M300)
 
     def body() -> None:
         ready(yard)
-        mission = settings(*norths, **changes)
+        mission = settings(*norths)
         mission.autoFlightSpeed = speed
         assert not upload(yard, mission)
         assert not accepts(yard, "uploadMission", "UploadWaypointV2Mission")  # none was stated
