@@ -29,7 +29,7 @@ with atheris.instrument_imports(include=INSTRUMENTED):
     from volery.base.errors import VoleryError
     from volery.base.units import QuantityError, parse
     from volery.cost.catalogue import read_catalogue
-    from volery.links.flight_logs import read_flight_log
+    from volery.links.flight_logs import DATAFLASH_HEAD, ULOG_MAGIC, read_flight_log
     from volery.links.frame import Frame
     from volery.links.mavlink_codec import MavlinkParser, SignedMavlink
     from volery.links.pprzlink_codec import PPRZLINK, PprzlinkParser
@@ -71,12 +71,12 @@ TYPES = (
 )
 
 
-def _file(suffix: str, read: Callable[[Path], object]) -> Callable[[bytes], None]:
-    """Return a target that reads its input from a file."""
+def _file(suffix: str, read: Callable[[Path], object], head: bytes = b"") -> Callable[[bytes], None]:
+    """Return a target that reads its input, after the bytes by which a format is recognised, from a file."""
 
     def run(data: bytes) -> None:
         with suppress(VoleryError):
-            read(_stored(suffix, data))
+            read(_stored(suffix, head + data))
 
     return run
 
@@ -159,7 +159,9 @@ TARGETS: dict[str, Callable[[bytes], None]] = {
     "mcap": _file(".mcap", _bag),
     "rosbag": _file(".bag", _bag),
     "tlog": _file(".tlog", _tlog),
-    "flight-log": _file(".bin", read_flight_log),
+    "dataflash": _file(".bin", read_flight_log, DATAFLASH_HEAD),
+    "dataflash-text": _file(".log", read_flight_log, b"FMT, "),
+    "ulog": _file(".ulg", read_flight_log, ULOG_MAGIC),
     "model": _file(".yaml", lambda path: load(path, VOCABULARY)),
     "catalogue": _file(".yaml", read_catalogue),
 }
@@ -250,11 +252,14 @@ def _written_rosbag() -> list[bytes]:
     return [bag, bytes(short)]
 
 
-def _flight_logs() -> list[bytes]:
+def _dataflash_log() -> list[bytes]:
     tables = {"ATT": ("Roll,Pitch", [(0.1, 1.0, 2.0), (0.2, 1.0, 2.0)])}
+    return [dataflash(FOLDER / "seed.bin", tables).read_bytes().removeprefix(DATAFLASH_HEAD)]
+
+
+def _ulog() -> list[bytes]:
     columns = {"attitude": ("float[4] q", [(0.1, 1.0, 0.0, 0.0, 0.0)])}
-    logs = (dataflash(FOLDER / "seed.bin", tables), ulog(FOLDER / "seed.ulg", columns))
-    return [log.read_bytes() for log in logs]
+    return [ulog(FOLDER / "seed.ulg", columns).read_bytes().removeprefix(ULOG_MAGIC)]
 
 
 SEEDS: dict[str, Callable[[], list[bytes]]] = {
@@ -272,7 +277,11 @@ SEEDS: dict[str, Callable[[], list[bytes]]] = {
     "mcap": _written_mcap,
     "rosbag": _written_rosbag,
     "tlog": lambda: [b"".join(bytes(8) + frame for frame in _recorded()[:10])],
-    "flight-log": _flight_logs,
+    "dataflash": _dataflash_log,
+    "dataflash-text": lambda: [
+        b"128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nFMT, 129, 15, ATT, Qf, TimeUS,Roll\nATT, 5, 1.5\n"
+    ],
+    "ulog": _ulog,
     "model": lambda: [(ROOT / "examples/starter/model.yaml").read_bytes()],
     "catalogue": lambda: [files("volery.cost").joinpath("catalogue.yaml").read_bytes()],
 }

@@ -31,8 +31,8 @@ TIME = "time"
 STATION = "station."
 """Prefix of the messages that a ground station sent."""
 DATAFLASH, ULOG, TLOG = "DataFlash", "ULog", "tlog"
-_ULOG_MAGIC = b"ULog\x01\x12\x35"
-_DATAFLASH_HEAD = b"\xa3\x95"
+ULOG_MAGIC = b"ULog\x01\x12\x35"
+DATAFLASH_HEAD = b"\xa3\x95"
 _FORMAT, _FORMAT_SIZE, _HEAD_SIZE = 0x80, 89, 3
 """Type and length of the message that defines others in a DataFlash log; length of a message's head."""
 _ULOG_START, _ULOG_HEAD = 16, struct.Struct("<HB")
@@ -57,9 +57,9 @@ def log_format(path: Path) -> str:
         raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
     if not head:
         raise UsageError(f"{path} is empty: it has 0 bytes")
-    if head.startswith(_ULOG_MAGIC):
+    if head.startswith(ULOG_MAGIC):
         return ULOG
-    if head.startswith((_DATAFLASH_HEAD, b"FMT, ")):
+    if head.startswith((DATAFLASH_HEAD, b"FMT, ")):
         return DATAFLASH
     if any(head[at] in (0xFD, 0xFE) for at in range(8, min(len(head), 2048))):
         return TLOG
@@ -160,8 +160,8 @@ def _check_formats(path: Path) -> None:
     with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as data:
         lengths, at, size = {_FORMAT: _FORMAT_SIZE}, 0, len(data)
         while 0 <= at <= size - 5:
-            if data[at : at + 2] != _DATAFLASH_HEAD:
-                at = data.find(_DATAFLASH_HEAD, at + 1)
+            if data[at : at + 2] != DATAFLASH_HEAD:
+                at = data.find(DATAFLASH_HEAD, at + 1)
                 continue
             kind = data[at + 2]
             if kind == _FORMAT:
@@ -174,7 +174,7 @@ def _check_formats(path: Path) -> None:
 
 def _dataflash(path: Path, wanted: set[str]) -> Tables:
     with path.open("rb") as file:
-        binary = file.read(2) == _DATAFLASH_HEAD
+        binary = file.read(2) == DATAFLASH_HEAD
     if binary:
         _check_formats(path)
     rows = _Rows()  # times are those since boot
