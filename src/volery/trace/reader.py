@@ -97,12 +97,15 @@ class Reading:
         except OSError as error:
             raise UsageError(f"cannot read {path}: {error.strerror or error}") from error
         self._size = path.stat().st_size
-        if self._file.read(len(MAGIC)) != MAGIC:
-            self._file.close()
-            raise UsageError(f"{path} is not a trace: it does not begin as an MCAP file does")
         self._records = self._walk()
         self._pending: _Record | None = None
-        self.setup = self._read_beginning()
+        try:
+            if self._file.read(len(MAGIC)) != MAGIC:
+                raise UsageError(f"{path} is not a trace: it does not begin as an MCAP file does")
+            self.setup = self._read_beginning()
+        except UsageError:
+            self._file.close()
+            raise
 
     def __enter__(self) -> Reading:
         return self

@@ -1,7 +1,9 @@
 """What is written is what is read, byte for byte the same each time, and whatever happens to the file."""
 
+import gc
 import hashlib
 import struct
+import warnings
 from io import BytesIO
 from pathlib import Path
 from zlib import crc32
@@ -254,8 +256,13 @@ def test_a_message_that_is_shorter_than_its_frame_is_damage(tmp_path: Path) -> N
 def test_other_files_are_refused(tmp_path: Path, content: bytes, says: str) -> None:
     path = tmp_path / "trace.mcap"
     path.write_bytes(content)
-    with pytest.raises(UsageError, match=says):
-        read(path)
+    with warnings.catch_warnings(record=True) as left_open:
+        warnings.simplefilter("always", ResourceWarning)
+        with pytest.raises(UsageError, match=says) as refusal:
+            read(path)
+        del refusal
+        gc.collect()
+    assert not left_open
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
