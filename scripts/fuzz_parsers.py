@@ -23,9 +23,12 @@ from pathlib import Path
 import atheris
 from mcap.writer import CompressionType, IndexType, Writer
 
-INSTRUMENTED = ["volery.base", "volery.links", "volery.model", "volery.ros.messages", "volery.trace", "mcap"]
+INSTRUMENTED = ["volery.base", "volery.links", "volery.model", "volery.ros.messages", "volery.trace"]
+INSTRUMENTED += ["mcap", "pymavlink.DFReader", "pyulog"]
 
 with atheris.instrument_imports(include=INSTRUMENTED):
+    import pyulog  # noqa: F401  # the reader of logs imports it when it is needed
+
     from volery.base.errors import VoleryError
     from volery.base.units import QuantityError, parse
     from volery.cost.catalogue import read_catalogue
@@ -279,7 +282,8 @@ SEEDS: dict[str, Callable[[], list[bytes]]] = {
     "tlog": lambda: [b"".join(bytes(8) + frame for frame in _recorded()[:10])],
     "dataflash": _dataflash_log,
     "dataflash-text": lambda: [
-        b"128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nFMT, 129, 15, ATT, Qf, TimeUS,Roll\nATT, 5, 1.5\n"
+        b"128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n"
+        b"FMT, 129, 15, ATT, Qf, TimeUS,Roll\nATT, 5, 1.5\n"
     ],
     "ulog": _ulog,
     "model": lambda: [(ROOT / "examples/starter/model.yaml").read_bytes()],
