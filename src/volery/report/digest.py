@@ -80,15 +80,15 @@ def thin_curve(values: Floats, stretches: int) -> Indexes:
     count = len(values)
     if count <= 2 * stretches:
         return np.flatnonzero(~np.isnan(values))
+    unknown = np.isnan(values)
+    low, high = np.where(unknown, np.inf, values), np.where(unknown, -np.inf, values)
     keep = {0, count - 1}
     edges = [count * index // stretches for index in range(stretches + 1)]
     for first, last in pairwise(edges):
-        stretch = values[first:last]
-        if not np.isnan(stretch).all():
-            keep.add(first + int(np.nanargmin(stretch)))
-            keep.add(first + int(np.nanargmax(stretch)))
+        keep.add(first + int(low[first:last].argmin()))
+        keep.add(first + int(high[first:last].argmax()))
     found = np.array(sorted(keep), dtype=np.int64)
-    return found[~np.isnan(values[found])]
+    return found[~unknown[found]]
 
 
 _BIN: Ns = 500 * MS  # holds as many activations of the usual periods each time

@@ -13,6 +13,7 @@ from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
@@ -159,7 +160,8 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    scripts = [made.get_template(f"{name}.js").render() for name in SCRIPTS]
+    templates = files("volery.report") / "templates"
+    scripts = [(templates / f"{name}.js").read_text(encoding="utf-8") for name in SCRIPTS]
     made.globals["scripts"] = [Markup(script) for script in scripts]
     made.globals["script_hashes"] = " ".join(map(_content_hash, scripts))
     return made
