@@ -172,6 +172,22 @@ def _check_formats(path: Path) -> None:
             at += lengths.get(kind, 1)
 
 
+class _BinaryReader(DFReader.DFReader_binary):  # type: ignore[misc]  # pymavlink states no types
+    """pymavlink's reader, which takes definitions of messages anywhere in a damaged log."""
+
+    def _parse_next(self) -> DFReader.DFMessage | None:
+        """Read one message.
+
+        Raises:
+            ValueError: The message is as short as none can be: the reader would return it for ever.
+        """
+        begin = self.offset
+        message = super()._parse_next()
+        if message is not None and self.offset <= begin:
+            raise ValueError(f"a message of {message.fmt.len} bytes at byte {begin}")
+        return message
+
+
 def _dataflash(path: Path, wanted: set[str]) -> Tables:
     with path.open("rb") as file:
         binary = file.read(2) == DATAFLASH_HEAD
@@ -180,8 +196,7 @@ def _dataflash(path: Path, wanted: set[str]) -> Tables:
     rows = _Rows()  # times are those since boot
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # it prints what is damaged
         try:
-            kind = DFReader.DFReader_binary if binary else DFReader.DFReader_text
-            reader = kind(str(path))
+            reader = (_BinaryReader if binary else DFReader.DFReader_text)(str(path))
             names = list(wanted) or None
             while (message := reader.recv_match(type=names)) is not None:
                 fields = {key: getattr(message, key) for key in message._fieldnames}

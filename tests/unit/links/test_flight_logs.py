@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +90,16 @@ def test_a_definition_of_a_message_without_length_is_refused_and_not_read_for_ev
     copter.write_bytes(data)
     with pytest.raises(UsageError, match=f"at byte {second} it defines a message of {length} bytes"):
         read_flight_log(copter)
+
+
+def test_a_definition_inside_a_damaged_one_is_not_read_for_ever(tmp_path: Path) -> None:
+    """Found by fuzzing: pymavlink refuses the outer definition and takes the inner one."""
+    inner = struct.pack("<3sBB4s16s64s", b"\xa3\x95\x80", 1, 0, b"ATT", b"", b"")
+    unknown, outer = b"\xa3\x95\x02", b"\xa3\x95\x80"
+    path = tmp_path / "log.bin"
+    path.write_bytes(unknown + outer + inner + b"\xa3\x95\x01" + bytes(8))
+    with pytest.raises(UsageError, match="holds no message"):
+        read_flight_log(path)
 
 
 def test_a_format_that_does_not_exist_ends_the_log_there(copter: Path) -> None:

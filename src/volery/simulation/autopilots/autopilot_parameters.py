@@ -120,7 +120,8 @@ class Parameters:
         return self._now(name) if name in self._index else None
 
     def _now(self, name: str) -> Parameter:
-        return self._order[self._index[name]]._replace(value=self._values[name])
+        parameter, value = self._order[self._index[name]], self._values[name]
+        return parameter if parameter.value == value else parameter._replace(value=value)
 
     def set(self, name: str, value: float) -> Parameter | None:
         """Set a parameter and return it, rounded to its type.
