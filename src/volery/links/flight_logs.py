@@ -172,20 +172,40 @@ def _check_formats(path: Path) -> None:
             at += lengths.get(kind, 1)
 
 
-class _BinaryReader(DFReader.DFReader_binary):  # type: ignore[misc]  # pymavlink states no types
-    """pymavlink's reader, which takes definitions of messages anywhere in a damaged log."""
+_UNREADABLE = object()
 
-    def _parse_next(self) -> DFReader.DFMessage | None:
-        """Read one message.
+
+class _Resilient:
+    """What pymavlink's readers of DataFlash need to read on after any damage."""
+
+    offset: int
+    _reading = False
+
+    def _parse_next(self) -> Any:
+        """Read one message. At one that it cannot read pymavlink calls this method again, at any depth.
 
         Raises:
             ValueError: The message is as short as none can be: the reader would return it for ever.
         """
-        begin = self.offset
-        message = super()._parse_next()
+        if self._reading:
+            return _UNREADABLE
+        begin, self._reading = self.offset, True
+        try:
+            while (message := super()._parse_next()) is _UNREADABLE:  # type: ignore[misc]  # of a reader
+                pass
+        finally:
+            self._reading = False
         if message is not None and self.offset <= begin:
             raise ValueError(f"a message of {message.fmt.len} bytes at byte {begin}")
         return message
+
+
+class _BinaryReader(_Resilient, DFReader.DFReader_binary):  # type: ignore[misc]  # pymavlink states no types
+    """pymavlink's reader of binary logs, which takes definitions of messages anywhere in a damaged log."""
+
+
+class _TextReader(_Resilient, DFReader.DFReader_text):  # type: ignore[misc]
+    """pymavlink's reader of text logs."""
 
 
 def _dataflash(path: Path, wanted: set[str]) -> Tables:
@@ -196,7 +216,7 @@ def _dataflash(path: Path, wanted: set[str]) -> Tables:
     rows = _Rows()  # times are those since boot
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # it prints what is damaged
         try:
-            reader = (_BinaryReader if binary else DFReader.DFReader_text)(str(path))
+            reader = (_BinaryReader if binary else _TextReader)(str(path))
             names = list(wanted) or None
             while (message := reader.recv_match(type=names)) is not None:
                 fields = {key: getattr(message, key) for key in message._fieldnames}

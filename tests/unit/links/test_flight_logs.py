@@ -92,14 +92,45 @@ def test_a_definition_of_a_message_without_length_is_refused_and_not_read_for_ev
         read_flight_log(copter)
 
 
+def _defined(kind: int, length: int, name: bytes, form: bytes, columns: bytes) -> bytes:
+    return struct.pack("<3sBB4s16s64s", b"\xa3\x95\x80", kind, length, name, form, columns)
+
+
 def test_a_definition_inside_a_damaged_one_is_not_read_for_ever(tmp_path: Path) -> None:
     """Found by fuzzing: pymavlink refuses the outer definition and takes the inner one."""
-    inner = struct.pack("<3sBB4s16s64s", b"\xa3\x95\x80", 1, 0, b"ATT", b"", b"")
+    inner = _defined(1, 0, b"ATT", b"", b"")
     unknown, outer = b"\xa3\x95\x02", b"\xa3\x95\x80"
     path = tmp_path / "log.bin"
     path.write_bytes(unknown + outer + inner + b"\xa3\x95\x01" + bytes(8))
     with pytest.raises(UsageError, match="holds no message"):
         read_flight_log(path)
+
+
+UNKNOWN, SHORT = b"XYZ, 1, 2\n", b"ATT, 5\n"
+MADE_OF_TEXT = (
+    b"FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nFMT, 129, 15, ATT, Qf, TimeUS,Roll\n"
+)
+MADE_OF_BYTES = _defined(128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
+MADE_OF_BYTES += _defined(129, 15, b"ATT", b"Qf", b"TimeUS,Roll")
+MADE_OF_BYTES += _defined(130, 5, b"BAD", b"Qf", b"TimeUS,X")  # shorter than its fields
+
+
+@pytest.mark.parametrize(
+    ("definitions", "unreadable", "message"),
+    [
+        (MADE_OF_TEXT, UNKNOWN, b"ATT, 5000000, 1.5\n"),
+        (MADE_OF_TEXT, SHORT, b"ATT, 5000000, 1.5\n"),
+        (MADE_OF_BYTES, b"\xa3\x95\x82\0\0", b"\xa3\x95\x81" + struct.pack("<Qf", 5_000_000, 1.5)),
+    ],
+)
+def test_any_number_of_unreadable_messages_is_passed_over(
+    tmp_path: Path, definitions: bytes, unreadable: bytes, message: bytes
+) -> None:
+    path = tmp_path / "log.bin"
+    path.write_bytes(definitions + 3000 * unreadable + message + bytes(600))
+    table = read_flight_log(path)["ATT"]
+    assert list(table["time"]) == [5.0]
+    assert list(table["Roll"]) == [1.5]
 
 
 def test_a_format_that_does_not_exist_ends_the_log_there(copter: Path) -> None:
