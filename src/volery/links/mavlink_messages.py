@@ -397,23 +397,36 @@ Burst = Callable[[Sequence[str]], None]
 class MessageStreams:
     """Telemetry streams of one link: a period for each message; messages of one period are sent in one burst.
 
-    Requests are stored while the autopilot boots; nothing is sent before ``start``.
+    Requests are stored while the autopilot boots; nothing is sent before ``start``. A burst that the receiver
+    uses nothing of is suspended, until ``resume`` finds that it does.
 
     Args:
         kernel: Clock of the streams.
         order: Names of messages in their order within a burst.
         burst: Sends the messages of one burst.
+        wanted: Returns whether the receiver uses a message; ``None``: all.
         least: Shortest period in ns.
     """
 
-    def __init__(self, kernel: Kernel, order: Sequence[str], burst: Burst, *, least: Ns = 1) -> None:
+    def __init__(
+        self,
+        kernel: Kernel,
+        order: Sequence[str],
+        burst: Burst,
+        *,
+        wanted: Callable[[str], bool] | None = None,
+        least: Ns = 1,
+    ) -> None:
         self._kernel = kernel
         self._least = least
         self._rank = {name: rank for rank, name in enumerate(order)}
         self._burst = burst
+        self._wanted = wanted
         self._periods: dict[str, Ns] = {}
         self._names: dict[Ns, tuple[str, ...]] = {}
         self._handles: dict[Ns, Handle] = {}
+        self._suspended: dict[Ns, Ns] = {}
+        """Period of each suspended burst, and when it was sent first."""
         self._started = False
 
     def period(self, name: str) -> Ns:
@@ -455,16 +468,45 @@ class MessageStreams:
         }
         for period in [period for period in self._handles if period not in groups]:
             self._handles.pop(period).cancel()
+            self._suspended.pop(period, None)
         if self._started:
             for period in groups:
                 if period not in self._handles:
                     self._start_group(period)
+            self.resume()
 
     def _start_group(self, period: Ns) -> None:
         first = self._kernel.now()
 
         def due() -> None:
             if self._kernel.now() > first:
-                self._burst(self._names[period])
+                self._send(period, first)
 
         self._handles[period] = self._kernel.every(period, due)
+
+    def _send(self, period: Ns, first: Ns) -> None:
+        """Send what the receiver uses of a burst; suspend the burst if that is nothing."""
+        names = self._used(period)
+        if names:
+            self._burst(names)
+        else:
+            self._handles[period].cancel()
+            self._suspended[period] = first
+
+    def _used(self, period: Ns) -> Sequence[str]:
+        names, wanted = self._names[period], self._wanted
+        return names if wanted is None else [name for name in names if wanted(name)]
+
+    def resume(self) -> None:
+        """Resume, in phase, the suspended bursts of which the receiver uses something by now."""
+        for period in [period for period in self._suspended if self._used(period)]:
+            first = self._suspended.pop(period)
+            self._resume_group(period, first)
+
+    def _resume_group(self, period: Ns, first: Ns) -> None:
+        now = self._kernel.now()
+
+        def begin() -> None:
+            self._handles[period] = self._kernel.every(period, lambda: self._send(period, first))
+
+        self._handles[period] = self._kernel.call_at(now + period - (now - first) % period, begin)

@@ -19,7 +19,13 @@ class Listener:
     def __init__(self) -> None:
         self.kernel = VirtualKernel()
         self.bursts: list[tuple[int, tuple[str, ...]]] = []
-        self.streams = MessageStreams(self.kernel, ORDER, self.burst)
+        self.wanted = set("ABCX")
+        self.asked = 0
+        self.streams = MessageStreams(self.kernel, ORDER, self.burst, wanted=self.uses)
+
+    def uses(self, name: str) -> bool:
+        self.asked += 1
+        return name in self.wanted
 
     def burst(self, names: Sequence[str]) -> None:
         self.bursts.append((self.kernel.now() // MS, tuple(names)))
@@ -87,3 +93,35 @@ def test_a_stop_forgets_everything(listener: Listener) -> None:
     listener.streams.start()
     listener.run(500)
     assert not listener.bursts
+
+
+def test_a_burst_of_which_nothing_is_used_is_suspended_and_resumes_in_phase(listener: Listener) -> None:
+    listener.streams.start()
+    listener.streams.set(["A", "B"], 100 * MS)
+    listener.wanted = {"B"}
+    listener.run(250)
+    assert listener.bursts == [(100, ("B",)), (200, ("B",))]
+    listener.wanted = set()
+    listener.run(100)
+    asked = listener.asked
+    listener.run(1000)
+    assert listener.asked == asked
+    listener.wanted = {"A"}
+    listener.streams.resume()
+    listener.run(200)
+    assert listener.bursts[2:] == [(1400, ("A",)), (1500, ("A",))]
+
+
+def test_a_suspended_burst_that_is_stopped_does_not_resume(listener: Listener) -> None:
+    listener.streams.start()
+    listener.streams.set(["A"], 100 * MS)
+    listener.wanted = set()
+    listener.run(250)
+    listener.streams.set(["A"], 0)
+    listener.wanted = {"A"}
+    listener.streams.resume()
+    listener.run(250)
+    assert not listener.bursts
+    listener.streams.set(["A"], 100 * MS)
+    listener.run(150)
+    assert listener.bursts == [(600, ("A",))]

@@ -109,6 +109,7 @@ class MavlinkEndpoint:
             self._kernel,
             self.firmware.telemetry.message_order,
             lambda names: self._burst(channel, names),
+            wanted=channel.is_wanted,
             least=self.firmware.telemetry.least_period,
         )
         channel.texts = StatusTextQueue(
@@ -140,9 +141,8 @@ class MavlinkEndpoint:
 
     def _burst(self, channel: MavlinkChannel, names: Sequence[str]) -> None:
         for name in names:
-            if channel.is_wanted(name):
-                for fields in self.firmware.telemetry.build(name, self._vehicle):
-                    channel.send(name, fields)
+            for fields in self.firmware.telemetry.build(name, self._vehicle):
+                channel.send(name, fields)
 
     def _send_bytes(self, data: bytes) -> None:
         """Send bytes that are no message, on all links that carry bytes."""
@@ -266,6 +266,7 @@ class MavlinkEndpoint:
     def _handle(self) -> None:
         channel, frame = self._arrived.popleft()
         fields = frame.fields
+        channel.streams.resume()
         if self._routes is not None:
             self._routes.forward(channel, frame, self.channels)
         if not self.firmware.commands.accepts(self._vehicle, frame.name, frame.system):
