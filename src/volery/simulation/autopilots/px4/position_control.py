@@ -151,6 +151,8 @@ class PositionLoops:
         self._span = np.zeros(2, dtype=np.int64)
         self._advance: Action | None = None
         """Machine code that advances the state over the span; ``None``: nothing has flown yet."""
+        self._tuned: tuple[int, bool] | None = None
+        """Number of parameter changes, and whether a trajectory was followed, when the gains were written."""
         self._trajectory = False
         """Whether the trajectory is where the vehicle is."""
         self._last: Ns = -RESTART_AFTER - 1
@@ -210,7 +212,7 @@ class PositionLoops:
     def _restart(self, here: Vector, velocity: Vector) -> None:
         """Put the airframe where the vehicle is, on the ground without thrust."""
         row, grounded = self._row, self._vehicle.estimate.landed
-        self._trajectory = False
+        self._trajectory, self._tuned = False, None
         self._state[: LOOP_COLUMNS if self._advance is None else E_STATES] = 0.0
         if self._advance is None:
             self._advance = fly_px4_loops.bind(self._state, self._vehicle.flight.keys, self._span)
@@ -243,7 +245,10 @@ class PositionLoops:
         vehicle, row = self._vehicle, self._row
         here, attitude = vehicle.estimate.position, vehicle.estimate.attitude
         row[I_HEADING], row[I_NOISY] = attitude[2], float(self._noisy)
-        _write(row, G_JERK, gains_of(vehicle, row[I_TASK] != DIRECT))
+        tuned = vehicle.parameters.changes, row[I_TASK] != DIRECT
+        if tuned != self._tuned:
+            self._tuned = tuned
+            _write(row, G_JERK, gains_of(vehicle, tuned[1]))
         first = self._last // STEP
         self._span[0], self._span[1] = first, first + steps
         if self._advance is not None:
