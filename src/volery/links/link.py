@@ -57,8 +57,8 @@ class SelectiveLink(Protocol):
     def select(self, wanted: Callable[[str], bool]) -> None:
         """State which messages this end uses, by name.
 
-        The sender calls the function before a message, and for what was not wanted again when it has received
-        a frame: what an end uses changes with what it requests.
+        The sender calls the function each time it has received a frame: what an end uses changes with what it
+        requests.
         """
 
     def is_wanted(self, name: str) -> bool:

@@ -424,6 +424,8 @@ class MessageStreams:
         self._wanted = wanted
         self._periods: dict[str, Ns] = {}
         self._names: dict[Ns, tuple[str, ...]] = {}
+        self._used: dict[Ns, Sequence[str]] = {}
+        """What the receiver uses of each burst, as it was found last."""
         self._handles: dict[Ns, Handle] = {}
         self._suspended: dict[Ns, Ns] = {}
         """Period of each suspended burst, and when it was sent first."""
@@ -473,7 +475,7 @@ class MessageStreams:
             for period in groups:
                 if period not in self._handles:
                     self._start_group(period)
-            self.resume()
+        self.resume()
 
     def _start_group(self, period: Ns) -> None:
         first = self._kernel.now()
@@ -486,22 +488,23 @@ class MessageStreams:
 
     def _send(self, period: Ns, first: Ns) -> None:
         """Send what the receiver uses of a burst; suspend the burst if that is nothing."""
-        names = self._used(period)
+        names = self._used[period]
         if names:
             self._burst(names)
         else:
             self._handles[period].cancel()
             self._suspended[period] = first
 
-    def _used(self, period: Ns) -> Sequence[str]:
-        names, wanted = self._names[period], self._wanted
-        return names if wanted is None else [name for name in names if wanted(name)]
-
     def resume(self) -> None:
-        """Resume, in phase, the suspended bursts of which the receiver uses something by now."""
-        for period in [period for period in self._suspended if self._used(period)]:
-            first = self._suspended.pop(period)
-            self._resume_group(period, first)
+        """Find out what the receiver uses now, and resume, in phase, the bursts of which it is something."""
+        wanted = self._wanted
+        if wanted is None:
+            self._used.update(self._names)
+            return
+        for period, names in self._names.items():
+            self._used[period] = [name for name in names if wanted(name)]
+        for period in [period for period in self._suspended if self._used[period]]:
+            self._resume_group(period, self._suspended.pop(period))
 
     def _resume_group(self, period: Ns, first: Ns) -> None:
         now = self._kernel.now()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,7 @@ from volery.simulation.world.world import STEP, Truth, World
 
 __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
+_NOWHERE: Vector = (nan, nan, nan)
 _FAR = 1e6  # [m] beyond which a point is placed on an unrolled map
 TURNINGS = {
     (False, False): HOLD_HEADING,
@@ -214,6 +215,7 @@ class Flight:
         self._row = memoryview(world.arrays.rows[body])
         self._latest: Estimate | None = None
         self._driven: tuple[float, ...] = ()
+        self._converted: tuple[Vector, Vector] = (_NOWHERE, _NOWHERE)
         self.estimate_error: Sequence[float] = ()
         """Error that the firmware's own estimator adds to the estimate, or empty: of the position [m], then
         of the velocity [m/s], each north, east, down. The inner loops fly without it."""
@@ -411,7 +413,10 @@ class Flight:
     def from_ned(self, ned: Vector) -> Vector:
         """Convert north, east, down about the estimator's present origin [m] to degrees and metres AMSL."""
         origin = self.estimate().origin_ned
-        return self.frame.from_ned((ned[0] + origin[0], ned[1] + origin[1], ned[2] + origin[2]))
+        point = ned[0] + origin[0], ned[1] + origin[1], ned[2] + origin[2]
+        if point != self._converted[0]:  # a target is reported again and again
+            self._converted = point, self.frame.from_ned(point)
+        return self._converted[1]
 
     @property
     def sigma(self) -> Sigma:

@@ -70,6 +70,8 @@ def stored_fence_point(kind: int, item: MissionItem) -> MissionItem | int:
 
 def _within_points(vehicle: Vehicle, point: Vector) -> bool:
     """Return whether a point is in one area of the uploaded fence to stay in, and in none to avoid."""
+    if not vehicle.points.get(FENCE):
+        return True
     kept_in: list[bool] = []
     for command, corners, radius in _areas(vehicle):
         if command in (CIRCLE_INSIDE, CIRCLE_OUTSIDE):
@@ -268,6 +270,8 @@ def _end_of_offboard_on_ground(commander: Commander) -> None:
 
 def _forget_ended_cause(commander: Commander) -> None:
     """Let a failsafe that the user has ended act again once its cause has ended in between."""
+    if not commander.taken_over:
+        return
     causes = {
         STICKS_LOST: lambda: not commander.joystick.valid,
         LINK_LOST: lambda: _link_lost(commander),

@@ -254,23 +254,15 @@ class PositionLoops:
         if self._advance is not None:
             self._advance()
         self._last += steps * STEP
-        moving, lead = list(row[A_MOVING : A_MOVING + 3]), row[A_ACCEL : A_ACCEL + 3]
         if self._noisy:
-            rates = row[E_RATE : E_RATE + 3]
-            moving = [now - rate for now, rate in zip(moving, rates, strict=True)]
             vehicle.flight.estimate_error = tuple(row[E_POSITION : E_POSITION + 6])
         if row[A_GROUNDED]:
             vehicle.drive(IDLE)
             return
-        place = row[A_POSITION : A_POSITION + 3]
-        north, east, down = (
-            v + FOLLOW_LEAD * a + FOLLOW_GAIN * (at - now)
-            for at, v, a, now in zip(place, moving, lead, here, strict=True)
-        )
         vehicle.drive(
             Setpoint(
                 Control.VELOCITY,
-                velocity=(north, east, down),
+                velocity=(self._follow(0, here[0]), self._follow(1, here[1]), self._follow(2, here[2])),
                 yaw=yaw,
                 yaw_rate=yaw_rate,
                 speed=FASTEST,
@@ -282,3 +274,11 @@ class PositionLoops:
                 jerk=FOLLOW_JERK,
             )
         )
+
+    def _follow(self, axis: int, here: float) -> float:
+        """Return the velocity with which the flight stack follows the airframe along an axis [m/s]."""
+        row = self._row
+        moving = row[A_MOVING + axis]
+        if self._noisy:
+            moving -= row[E_RATE + axis]
+        return moving + FOLLOW_LEAD * row[A_ACCEL + axis] + FOLLOW_GAIN * (row[A_POSITION + axis] - here)
