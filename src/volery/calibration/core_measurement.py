@@ -330,7 +330,7 @@ def read_notes(notes: Path) -> dict[str, Timing]:
     try:
         found = json.loads(notes.read_text(encoding="utf-8"))
         return {name: Timing(**one) for name, one in found.items()}
-    except (OSError, ValueError, TypeError):
+    except (OSError, ValueError, TypeError, RecursionError):
         return {}
 
 

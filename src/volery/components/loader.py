@@ -69,6 +69,9 @@ class SourceFile:
         return 1
 
 
+TOO_DEEP = "an expression is nested too deeply to be compiled; split it into several"
+
+
 def parse(path: Path, where: Location | None = None) -> SourceFile:
     """Parse a component's file.
 
@@ -91,6 +94,8 @@ def parse(path: Path, where: Location | None = None) -> SourceFile:
         raise ModelError(f"not Python: {error.msg}", where=Location(str(path), error.lineno or 1)) from error
     except ValueError as error:
         raise ModelError(f"not Python: {error}", where=Location(str(path), 1)) from error
+    except RecursionError as error:
+        raise ModelError(TOO_DEEP, where=Location(str(path), 1)) from error
 
 
 @dataclass
@@ -146,8 +151,11 @@ class Loader:
     def _compile(self, source: SourceFile) -> CodeType:
         code = self._codes.get(source.path)
         if code is None:
-            tree = self.steps.instrument(source.tree) if self.steps else source.tree
-            code = compile(tree, str(source.path), "exec", dont_inherit=True)
+            try:
+                tree = self.steps.instrument(source.tree) if self.steps else source.tree
+                code = compile(tree, str(source.path), "exec", dont_inherit=True)
+            except RecursionError as error:
+                raise ModelError(TOO_DEEP, where=Location(str(source.path), 1)) from error
             self._codes[source.path] = code
         return code
 

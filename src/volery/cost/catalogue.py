@@ -132,7 +132,7 @@ def parse_catalogue(text: str, name: str = "catalogue") -> Catalogue:
 
     try:
         data = YAML(typ="safe").load(text)
-    except YAMLError as error:
+    except (YAMLError, RecursionError) as error:
         raise ModelError(f"not YAML: {error}", name) from error
     entries = data.get("processors", {}) if isinstance(data, dict) else {}
     for kind, entry in entries.items():

@@ -49,7 +49,7 @@ def read_gains(path: Path, loops: Mapping[str, PidGains]) -> dict[str, PidGains]
         stated: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"cannot read gains from {path}: {error}") from error
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise UsageError(f"{path} is no TOML: {error}") from error
     return check_gains(stated, loops, str(path))
 

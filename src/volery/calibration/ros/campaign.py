@@ -85,7 +85,7 @@ class CampaignLog:
         try:
             known = json.loads(lines[0])
             self.rounds = [tuple(Sample(*one) for one in json.loads(line)) for line in _whole(lines[1:])]
-        except (IndexError, ValueError, TypeError) as error:
+        except (IndexError, ValueError, TypeError, RecursionError) as error:
             raise UsageError(f"{file} holds no rounds of a campaign: remove it") from error
         if known != header:
             raise UsageError(f"{file} holds rounds of {known}, not of {header}: remove it or move it away")

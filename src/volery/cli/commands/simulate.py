@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.text import Text
@@ -130,31 +129,23 @@ def _found(folder: Path) -> Iterator[Listed]:
 
 
 def _listed(here: Path, folder: Path) -> Listed:
-    record = _record(here / RUN_FILE)
-    if record is None:
+    from volery.requirements.record import read_record
+
+    try:
+        record = read_record(here)
+    except UsageError:
         return Listed(_name(here, folder), _written(here), outcome=UNFINISHED)
-    outcome = record["outcome"]
     return Listed(
         _name(here, folder),
         _written(here / RUN_FILE),
-        record["system"],
-        record["allocation"],
-        record["scenario"],
-        record["fidelity"],
-        outcome["status"],
-        outcome["requirements_met"],
-        record["sim_s"],
+        record.system,
+        record.allocation,
+        record.scenario,
+        record.fidelity,
+        record.outcome.status,
+        record.outcome.requirements_met,
+        record.sim_s,
     )
-
-
-def _record(file: Path) -> dict[str, Any] | None:
-    """Return the content of a ``run.json``, None if it is missing or is something else."""
-    try:
-        record = json.loads(file.read_bytes())
-        keys = ("outcome", "system", "allocation", "scenario", "fidelity", "sim_s")
-        return record if all(key in record for key in keys) else None
-    except (OSError, ValueError, TypeError):
-        return None
 
 
 def _name(here: Path, folder: Path) -> str:

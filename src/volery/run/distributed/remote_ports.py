@@ -48,7 +48,7 @@ class ValueCodec:
         """Decode the text of ``to_text``. Raises ``UsageError`` for any other text."""
         try:
             return json.loads(text, object_hook=self._made)
-        except (ValueError, TypeError, KeyError, AttributeError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             raise UsageError(f"not the value of a port: {error}") from error
 
     def _made(self, found: dict[str, Any]) -> Any:

@@ -55,5 +55,5 @@ def from_message(message: Any) -> Sent:
     try:
         found = json.loads(message.data)
         return Sent(str(found["from"]), _KINDS[found["kind"]](*found["fields"]))
-    except (ValueError, TypeError, KeyError) as error:
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
         raise UsageError(f"not a message of a deployed component: {error}") from error

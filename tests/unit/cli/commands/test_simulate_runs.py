@@ -6,24 +6,25 @@ import os
 from typer.testing import CliRunner
 
 from volery.cli.main import app
+from volery.requirements.accounts import Accounts
+from volery.requirements.record import write_record
+from volery.trace.attachments import RunSetup
 
 
 def runs(*arguments):
     return CliRunner().invoke(app, ["runs", *map(str, arguments)])
 
 
-def made(folder, at, **changes):
+def made(folder, at, allocation="fast", **outcome):
     folder.mkdir(parents=True)
-    outcome = {"status": "completed", "reason": "", "requirements_met": True} | changes.pop("outcome", {})
-    names = {"system": "patrol", "allocation": "fast", "scenario": "", "fidelity": "code"}
-    file = folder / "run.json"
-    file.write_text(json.dumps({**names, "sim_s": 12.5, "outcome": outcome, **changes}))
-    os.utime(file, (at, at))
+    record = Accounts(RunSetup("patrol", "code", allocation)).record("completed", "")
+    record = record.model_copy(update={"sim_s": 12.5, "outcome": record.outcome.model_copy(update=outcome)})
+    os.utime(write_record(record, folder), (at, at))
 
 
 def test_runs_are_listed_with_their_outcome_the_newest_last(tmp_path):
-    made(tmp_path / "b-1", 1_000_000_000, allocation="slow", outcome={"requirements_met": False})
-    made(tmp_path / "demo" / "fast", 2_000_000_000, outcome={"status": "failed", "requirements_met": None})
+    made(tmp_path / "b-1", 1_000_000_000, allocation="slow", requirements_met=False)
+    made(tmp_path / "demo" / "fast", 2_000_000_000, status="failed")
     cut = tmp_path / "cut"
     cut.mkdir()
     (cut / "trace.mcap").write_bytes(b"")
@@ -41,8 +42,9 @@ def test_runs_are_listed_with_their_outcome_the_newest_last(tmp_path):
 
 def test_a_record_of_something_else_is_unfinished(tmp_path):
     (tmp_path / "x").mkdir()
-    (tmp_path / "x" / "run.json").write_text("[]")
-    assert json.loads(runs(tmp_path, "--json").stdout)[0]["outcome"].startswith("unfinished")
+    for text in ("[]", '{"outcome": 3, "system": ""}', "[" * 20_000):
+        (tmp_path / "x" / "run.json").write_text(text)
+        assert json.loads(runs(tmp_path, "--json").stdout)[0]["outcome"].startswith("unfinished")
 
 
 def test_no_folder_is_bad_input(tmp_path):
