@@ -25,8 +25,11 @@ Multirotor: a rigid body under four rotors, drag, gravity and the ground.
   roots of the thrusts; valid to about 20 m/s. Rotation is damped by -c_w w.
 * Inflow: in a climb along their axis the rotors lose c_3 v_a^2, also those that stand, by that simulator's
   law of the jet, k_T w^2 = c_3 v_out^2 with the speed v_out = 2 P / T of hover at the electrical power P.
-* Ground: a spring and damper under each of four feet, Coulomb friction smoothed below 5 cm/s. Upside down the
-  body lies on four points as far above the centre.
+* Ground: a spring and damper under each of four feet. A foot that rises is damped three times as much: an
+  airframe yields and does not rebound, so that a fall without thrust ends on the feet unless the body leans
+  far. ArduPilot's simulator sets a copter level at the first contact (SIM_Aircraft). Coulomb friction is
+  smoothed below 5 cm/s, and stops a foot within a step at most. Upside down the body lies on four points as
+  far above the centre.
 
 Rover: a kinematic bicycle on the ground (Rajamani, Vehicle Dynamics and Control, 2.2).
 
@@ -146,6 +149,7 @@ def battery_current(open_volts: float, resistance: float, power: float) -> float
 # --- multirotor ---
 
 _SLIP = 0.05  # [m/s] below which friction grows linearly with speed
+_REBOUND = 3.0  # damping of a rising foot over that of a sinking one: no bounce at 15 m/s
 
 
 @numeric
@@ -228,8 +232,10 @@ def _add_foot_contact(row: Array, x: float, y: float, z: float) -> None:
     east += row[W_STATE + S_VELOCITY]
     north += row[W_STATE + S_VELOCITY + 1]
     up += row[W_STATE + S_VELOCITY + 2]
-    normal = max(0.0, row[P_STIFFNESS] * depth - row[P_DAMPING] * up)
+    damping = row[P_DAMPING] * (_REBOUND if up > 0.0 else 1.0)
+    normal = max(0.0, row[P_STIFFNESS] * depth - damping * up)
     grip = row[P_FRICTION] * normal / max(sqrt(east * east + north * north), _SLIP)
+    grip = min(grip, row[P_MASS] / (4.0 * STEP_S))
     row[W_FORCE] -= grip * east
     row[W_FORCE + 1] -= grip * north
     row[W_FORCE + 2] += normal

@@ -6,12 +6,14 @@ import pytest
 
 from volery.base.time import S
 from volery.simulation.world.body_specs import STANDARD_GRAVITY, Multirotor, Rover
-from volery.simulation.world.dynamics import S_SPEED, S_STEER
+from volery.simulation.world.dynamics import S_SPEED, S_STEER, write_quaternion
 from volery.simulation.world.state_layout import (
+    S_ATTITUDE,
     S_ON_GROUND,
     S_POSITION,
     S_RESTING,
     S_ROTORS,
+    S_VELOCITY,
     U_MOTOR_HEALTH,
     U_THROTTLE,
 )
@@ -140,6 +142,27 @@ def test_a_dropped_body_touches_down_with_the_speed_of_its_fall(clock, frame, dr
     assert truth.on_ground
     assert truth.velocity == (0.0, 0.0, 0.0)
     assert truth.position[2] == pytest.approx(dragless.feet[2], abs=0.01)
+
+
+@pytest.mark.parametrize(("roll", "pitch"), [(0.0, 0.0), (-1.2, -13.4), (-5.0, 9.0), (25.0, 10.0)])
+def test_a_fall_of_fifteen_metres_per_second_ends_on_the_feet_without_a_rebound(
+    roll, pitch, clock, frame, dragless
+):
+    world = World(clock, [dragless], frame=frame)
+    in_the_air(world, dragless, 0.4, (0.0,) * 4)
+    row = world.arrays.rows[0]
+    write_quaternion(row, S_ATTITUDE, math.radians(roll), math.radians(pitch), 0.3)
+    row[S_VELOCITY + 2] = -15.0
+    highest, turning = 0.0, 0.0
+    for _ in range(500):
+        clock.now += STEP
+        truth = world.truth(0)
+        if truth.contacts:
+            highest = max(highest, truth.position[2])
+            turning += STEP / S if abs(truth.rates[2]) > math.radians(10.0) else 0.0
+    assert truth.attitude[1:3] == pytest.approx((0.0, 0.0), abs=0.01)
+    assert highest < 0.2
+    assert turning < 0.06
 
 
 def test_a_body_upside_down_lies_on_the_ground_and_not_in_it(clock, frame, dragless):
