@@ -171,7 +171,7 @@ def test_supported_parameters_exist_and_are_read_and_no_others_are() -> None:
         for part in ("FUNCTION", "MIN", "TRIM", "MAX", "REVERSED")
     }
     read |= {f"RELAY{number}_{part}" for number in range(1, 7) for part in ("FUNCTION", "PIN", "DEFAULT")}
-    read |= {f"SERIAL{port}_OPTIONS" for port in range(1, 8)}
+    read |= {f"SERIAL{port}_{part}" for port in range(1, 8) for part in ("OPTIONS", "PROTOCOL")}
     read |= {f"MNT1_{axis}_{end}" for axis in ("ROLL", "PITCH", "YAW") for end in ("MIN", "MAX")}
     read |= {f"MNT1_{place}_{axis}" for place in ("RETRACT", "NEUTRAL") for axis in "XYZ"}
     stated = set(FIRMWARE.kinds["multirotor"].rules.parameters.supported) | set(

@@ -382,6 +382,8 @@ class FailsafeState:
     """Time of the last message of the ground station that controls the vehicle [ns]."""
     simulated: tuple[float, ...] = (0.0, 0.0, 1.0, 0.0, 180.0, 12.6, 0.0, 0.0)
     """Values of the parameters that inject faults, as they were last applied."""
+    no_receiver_since: Ns = NEVER
+    """Since when the parameters have left the autopilot without a receiver of satellites."""
     simulated_at: int = -1
     """Changes of parameters when these were last compared."""
     pushed: bool = False
@@ -410,6 +412,8 @@ class ReportState:
     """Uptime at which operating hours were last stored [ns]."""
     contacts: int = 0
     """Number of touch-downs reported."""
+    high_latency: bool = False
+    """Whether a command has switched the links of high latency on."""
     gauge_offset_mah: float = 0.0
     """Charge that the battery's gauge counts beyond what was drawn [mAh]."""
 

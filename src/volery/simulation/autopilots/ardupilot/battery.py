@@ -1,4 +1,4 @@
-"""ArduPilot's gauge of the battery: the charge used so far, which BATTERY_RESET sets.
+"""ArduPilot's gauge of the battery: what it reports, and the charge used so far, which BATTERY_RESET sets.
 
 The gauge counts apart from the battery itself: a reset changes what is reported and what failsafes and arming
 checks decide by, not the cells.
@@ -6,12 +6,25 @@ checks decide by, not the cells.
 
 from __future__ import annotations
 
-from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, Command
+from volery.base.time import S
+from volery.simulation.autopilots.mavlink.messages import (
+    ACCEPTED,
+    DENIED,
+    Command,
+    Fields,
+    to_int16,
+    to_uint16,
+)
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 FIRST_BATTERY = 1
 """Bit of the only battery in the mask of BATTERY_RESET."""
 LARGEST_MASK = 0xFFFF
+NOT_THERE = 65_535
+"""Voltage of a cell that is not there."""
+
+MEASURED_AFTER = int(2.4 * S)
+"""Uptime [ns] from which battery and compass are read and the copter's terrain follower runs."""
 
 
 def used_mah(vehicle: Vehicle) -> float:
@@ -33,3 +46,45 @@ def on_battery_reset(vehicle: Vehicle, command: Command) -> int:
         used = vehicle.parameters["BATT_CAPACITY"] * (1.0 - left)
         vehicle.reports.gauge_offset_mah = used - vehicle.estimate.battery_used_mah
     return ACCEPTED
+
+
+def gauge(vehicle: Vehicle) -> tuple[int, int, int]:
+    """Return voltage [mV], current [cA] and remaining charge [%]; -1 where unknown."""
+    if vehicle.uptime() < MEASURED_AFTER:
+        return 0, -1, -1
+    estimate = vehicle.estimate
+    capacity = vehicle.parameters["BATT_CAPACITY"]
+    left = 1.0 - used_mah(vehicle) / capacity if capacity > 0.0 else 0.0
+    return (
+        to_uint16(estimate.battery_volts * 1000.0),
+        to_int16(estimate.battery_amps * 100.0),
+        int(max(0.0, left) * 100.0),
+    )
+
+
+def battery_status(vehicle: Vehicle) -> Fields:
+    """Return BATTERY_STATUS."""
+    volts, amps, left = gauge(vehicle)
+    estimate = vehicle.estimate
+    return {
+        "id": 0,
+        "temperature": 32_767,
+        "voltages": (volts or NOT_THERE, *([NOT_THERE] * 9)),
+        "current_battery": max(0, amps),
+        "current_consumed": int(used_mah(vehicle)),
+        "energy_consumed": int(estimate.battery_energy_j / 100.0),
+        "battery_remaining": left,
+        "charge_state": _charge_state(vehicle),
+    }
+
+
+CHARGE_OK, CHARGE_LOW, CHARGE_CRITICAL = 1, 2, 3
+"""MAV_BATTERY_CHARGE_STATE."""
+
+
+def _charge_state(vehicle: Vehicle) -> int:
+    """Return the level that the failsafes of the battery have found."""
+    active = vehicle.failsafes.active
+    if "battery critical" in active:
+        return CHARGE_CRITICAL
+    return CHARGE_LOW if "battery low" in active else CHARGE_OK

@@ -68,17 +68,11 @@ from volery.simulation.autopilots.ardupilot.precision_landing import (
 from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, log_rows, update_proximity
 from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.range_finder import follow_ground, height_above_ground
+from volery.simulation.autopilots.ardupilot.sensor_status import XY_CONTROL, Z_CONTROL, Health
 from volery.simulation.autopilots.ardupilot.servo_outputs import pass_transmitter_through
 from volery.simulation.autopilots.ardupilot.sprayer import update_sprayer
 from volery.simulation.autopilots.ardupilot.takeoff_check import check_takeoff
-from volery.simulation.autopilots.ardupilot.telemetry import (
-    ACTIVE,
-    CRITICAL,
-    STANDBY,
-    XY_CONTROL,
-    Z_CONTROL,
-    Health,
-)
+from volery.simulation.autopilots.ardupilot.telemetry import ACTIVE, CRITICAL, STANDBY
 from volery.simulation.autopilots.ardupilot.throw import Throw
 from volery.simulation.autopilots.ardupilot.weathervane import turn_into_wind
 from volery.simulation.autopilots.ardupilot.winch import no_servo, update_winch

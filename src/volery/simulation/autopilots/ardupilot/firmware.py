@@ -15,6 +15,7 @@ from volery.simulation.autopilots.ardupilot import (
     dataflash,
     fence_points,
     files,
+    high_latency,
     mission,
     mount_control,
     payload,
@@ -23,12 +24,13 @@ from volery.simulation.autopilots.ardupilot import (
     rally,
     telemetry,
 )
+from volery.simulation.autopilots.ardupilot.battery import battery_status
 from volery.simulation.autopilots.ardupilot.commands import go_to_item
 from volery.simulation.autopilots.ardupilot.fence import fence_status
 from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
 from volery.simulation.autopilots.ardupilot.mount import attitude_status
 from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED
-from volery.simulation.autopilots.ardupilot.telemetry import Health
+from volery.simulation.autopilots.ardupilot.sensor_status import Health, sys_status
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.mavlink import messages
 from volery.simulation.autopilots.mavlink.channel import Peer
@@ -106,7 +108,7 @@ BUILDERS: Mapping[str, Builder] = {
     "AHRS2": telemetry.ahrs2,
     "ATTITUDE": messages.attitude,
     "ATTITUDE_QUATERNION": messages.attitude_quaternion,
-    "BATTERY_STATUS": telemetry.battery_status,
+    "BATTERY_STATUS": battery_status,
     "CAMERA_FEEDBACK": camera.feedback,
     "DISTANCE_SENSOR": telemetry.distance_sensor,
     "EKF_STATUS_REPORT": telemetry.ekf_status,
@@ -149,7 +151,6 @@ BUILDERS: Mapping[str, Builder] = {
             "GPS2_RAW",
             "GPS2_RTK",
             "GPS_RTK",
-            "HIGH_LATENCY2",
             "HYGROMETER_SENSOR",
             "MAG_CAL_PROGRESS",
             "MAG_CAL_REPORT",
@@ -284,13 +285,15 @@ def builders(
         health: Sensor bits of SYS_STATUS.
         system_status: Returns the MAV_STATE.
     """
+    sensors = partial(sys_status, health=health)
     return {
         **BUILDERS,
         "AUTOPILOT_VERSION": lambda vehicle: telemetry.autopilot_version(
             vehicle, capabilities, board_id(vehicle).encode()
         ),
         "HEARTBEAT": lambda vehicle: telemetry.heartbeat(vehicle, kind, system_status(vehicle)),
-        "SYS_STATUS": partial(telemetry.sys_status, health=health),
+        "HIGH_LATENCY2": high_latency.report(kind, sensors),
+        "SYS_STATUS": sensors,
     }
 
 
@@ -339,6 +342,7 @@ def ardupilot_mavlink(
         message_order=ORDER,
         streams=streams,
         on_stream_request=on_stream_request,
+        high_latency_links=high_latency.links,
         least_period=least_period,
         intervals_after=100 * MS,
         refuse_interval=refuse_interval,
@@ -348,7 +352,11 @@ def ardupilot_mavlink(
         start=start._replace(timesync_every=10 * S),
         telemetry=sent,
         commands=CommandPolicy(
-            commands={**commands, SEND_BANNER: on_banner},
+            commands={
+                **commands,
+                SEND_BANNER: on_banner,
+                high_latency.CONTROL_HIGH_LATENCY: high_latency.on_control,
+            },
             handlers={**MESSAGE_HANDLERS, **handlers},
             set_mode=set_mode,
             set_mode_ack=11,

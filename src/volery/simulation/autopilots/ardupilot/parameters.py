@@ -45,6 +45,8 @@ _SHARED = {
         for channel in range(5, 17)
     },
     "ARMING_RUDDER": "0: the yaw stick does not arm; 1 arms, 2 disarms, too",
+    "ARSPD_ENABLE": "any value but 0: there may be an airspeed sensor",
+    "ARSPD_TYPE": "any value above 0: there is one, and it is reported; 2: without a thermometer",
     "BATT_ARM_MAH": "charge required for arming",
     "BATT_ARM_VOLT": "voltage required for arming",
     "BATT_CAPACITY": "charge of the full battery; by default that of the simulated battery",
@@ -135,12 +137,17 @@ _SHARED = {
     "SIM_GPS_DISABLE": "any value but 0: the receiver sees no satellites",
     "SIM_GPS_GLITCH_X": "error of the latitude that the receiver reports",
     "SIM_GPS_GLITCH_Y": "error of the longitude that the receiver reports",
+    "SIM_GPS_TYPE": "0: no receiver sends anything",
     "SIM_RC_FAIL": "any value but 0: the transmitter's throttle reads 950",
     "SIM_WIND_DIR": "direction that the wind comes from",
     "SIM_WIND_SPD": "mean speed of the wind",
     "SIM_PIN_MASK": "bits of the pins that are high: relays set them, buttons are read from them",
     **{
         f"SERIAL{port}_OPTIONS": "bit 10: link of that number is private, from the next boot on"
+        for port in range(1, 8)
+    },
+    **{
+        f"SERIAL{port}_PROTOCOL": "43: link of that number is of high latency, from the next boot on"
         for port in range(1, 8)
     },
     **{

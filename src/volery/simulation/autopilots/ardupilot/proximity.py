@@ -65,9 +65,14 @@ def is_healthy(vehicle: Vehicle) -> bool:
     return sensor.kind == FENCE and any(shape.inside for shape in shapes(vehicle))
 
 
+def is_there(vehicle: Vehicle) -> bool:
+    """Return whether the vehicle has booted with a proximity sensor."""
+    return vehicle.proximity.kind in (MESSAGES, FENCE)
+
+
 def lacks_data(vehicle: Vehicle) -> bool:
     """Return whether there is a proximity sensor that does not measure."""
-    return vehicle.proximity.kind in (MESSAGES, FENCE) and not is_healthy(vehicle)
+    return is_there(vehicle) and not is_healthy(vehicle)
 
 
 PROXIMITY_CHECK = Check("PRX1: No Data", lacks_data)

@@ -43,18 +43,20 @@ from volery.simulation.autopilots.ardupilot.parameter_checks import source_probl
 from volery.simulation.autopilots.ardupilot.parameters import ROVER_SUPPORTED, rover_tuning
 from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, log_rows, update_proximity
 from volery.simulation.autopilots.ardupilot.rally import return_point
+from volery.simulation.autopilots.ardupilot.sensor_status import (
+    ATTITUDE_CONTROL,
+    RATE_CONTROL,
+    XY_CONTROL,
+    YAW_CONTROL,
+    Health,
+)
 from volery.simulation.autopilots.ardupilot.servo_outputs import pass_transmitter_through
 from volery.simulation.autopilots.ardupilot.sprayer import update_sprayer
 from volery.simulation.autopilots.ardupilot.telemetry import (
     ACTIVE,
-    ATTITUDE_CONTROL,
     CALIBRATING,
     CRITICAL,
-    RATE_CONTROL,
     STANDBY,
-    XY_CONTROL,
-    YAW_CONTROL,
-    Health,
     nav_controller,
 )
 from volery.simulation.autopilots.autopilot import BootSequence, Firmware, PeriodicWork

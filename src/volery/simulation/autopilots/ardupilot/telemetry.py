@@ -6,13 +6,12 @@ A builder returns None while the firmware does not send its message.
 from __future__ import annotations
 
 from math import degrees, hypot, nan, pi
-from typing import NamedTuple
 
 from volery.base.elementary import atan2
 from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
 from volery.base.time import US, S
-from volery.simulation.autopilots.ardupilot import proximity
-from volery.simulation.autopilots.ardupilot.battery import used_mah
+from volery.simulation.autopilots.ardupilot import airspeed, proximity
+from volery.simulation.autopilots.ardupilot.sensor_status import FIX_AFTER, NO_FIX_AFTER, receiver_is_lost
 from volery.simulation.autopilots.ardupilot.takeoff_check import has_speed_telemetry, reported_rotor_speed
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
@@ -28,10 +27,6 @@ from volery.simulation.autopilots.mavlink.messages import (
 from volery.simulation.autopilots.onboard_mission import OnboardMission
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
-NO_FIX_AFTER = int(9.64 * S)
-"""Uptime [ns] from which the GPS receiver is detected."""
-FIX_AFTER = int(9.85 * S)
-"""Uptime [ns] from which the GPS receiver has a fix."""
 GRAVITY_MILLI = 1000.0 / 9.80665
 ZERO_CELSIUS_RISE = 2850
 """Temperature of the recorded boards in flight [cdegC]."""
@@ -73,12 +68,13 @@ def local_position(vehicle: Vehicle) -> Fields | None:
 
 
 def vfr_hud(vehicle: Vehicle) -> Fields:
-    """Return VFR_HUD."""
+    """Return VFR_HUD: without an airspeed sensor the speed is that of the satellites."""
     estimate = vehicle.estimate
     north, east, down = estimate.velocity
     ground = hypot(north, east)
+    measured = airspeed.speed(vehicle)
     return {
-        "airspeed": hypot(ground, down),
+        "airspeed": hypot(ground, down) if measured is None else measured,
         "groundspeed": ground,
         "heading": int(degrees(estimate.attitude[2]) % 360.0) % 360,
         "throttle": round(abs(estimate.throttle) * 100.0) if vehicle.armed else 0,
@@ -137,6 +133,8 @@ def gps_raw(vehicle: Vehicle) -> Fields:
     """Return GPS_RAW_INT."""
     if vehicle.uptime() < NO_FIX_AFTER:
         return {"eph": 65_535, "epv": 65_535}
+    if receiver_is_lost(vehicle):
+        return {"eph": 9999, "epv": 9999}
     fix = vehicle.estimate.gps
     if fix.fix_type == 0 or not _has_fix(vehicle):
         return {
@@ -324,124 +322,8 @@ ARMED = 128
 CALIBRATING, STANDBY, ACTIVE, CRITICAL = 2, 3, 4, 5
 """MAV_STATE."""
 
-MEASURED_AFTER = int(2.4 * S)
-"""Uptime [ns] from which battery and compass are read and the copter's terrain follower runs."""
-
 ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
 """MAV_LANDED_STATE."""
-
-NOT_THERE = 65_535
-
-# MAV_SYS_STATUS_SENSOR
-MAG, GPS = 1 << 2, 1 << 5
-RATE_CONTROL, ATTITUDE_CONTROL, YAW_CONTROL, Z_CONTROL, XY_CONTROL = (
-    1 << 10,
-    1 << 11,
-    1 << 12,
-    1 << 13,
-    1 << 14,
-)
-GEOFENCE = 1 << 20
-PROXIMITY = 1 << 25
-AHRS, TERRAIN, LOGGING, BATTERY, PREARM = 1 << 21, 1 << 22, 1 << 24, 1 << 25, 1 << 28
-
-
-class Health(NamedTuple):
-    """Sensor bits of SYS_STATUS of a healthy, disarmed vehicle in a mode without controls of its own."""
-
-    present: int
-    enabled: int
-    healthy: int
-    estimator_enabled_after: int
-    """Uptimes [ns] from which the attitude estimator is enabled and healthy."""
-    estimator_healthy_after: int
-
-
-def is_logging(vehicle: Vehicle) -> bool:
-    """Return whether the log is written: armed, and for 15 s after disarming or a refusal to arm."""
-    now = vehicle.kernel.now()
-    return (
-        vehicle.armed or now - vehicle.arming.refused_at < 15 * S or now - vehicle.arming.disarmed_at < 15 * S
-    )
-
-
-def sys_status(vehicle: Vehicle, health: Health) -> Fields:
-    """Return SYS_STATUS."""
-    age, controls = vehicle.uptime(), vehicle.mode.controls
-    present, enabled, healthy = health.present, health.enabled | controls, health.healthy | controls
-    missing = 0
-    if age < NO_FIX_AFTER:
-        missing |= GPS
-    if age < MEASURED_AFTER:
-        missing |= TERRAIN
-        healthy &= ~(MAG | BATTERY)
-    if age < health.estimator_enabled_after:
-        enabled &= ~AHRS
-    if age < health.estimator_healthy_after or not vehicle.estimate.attitude_ok:
-        healthy &= ~AHRS
-    if not is_logging(vehicle):
-        enabled &= ~LOGGING
-    if not vehicle.arming.checks_passed:
-        healthy &= ~PREARM
-    if vehicle.parameters["FENCE_ENABLE"]:
-        enabled |= GEOFENCE if vehicle.parameters["FENCE_ACTION"] else 0
-        healthy = healthy & ~GEOFENCE if vehicle.fence.breached else healthy | GEOFENCE
-    if age > FIX_AFTER and vehicle.estimate.fix_type == 0:
-        healthy &= ~GPS
-    if proximity.lacks_data(vehicle):
-        healthy &= ~PROXIMITY
-    volts, amps, left = _battery(vehicle)
-    return {
-        "onboard_control_sensors_present": present & ~missing,
-        "onboard_control_sensors_enabled": enabled & ~missing,
-        "onboard_control_sensors_health": healthy & ~missing,
-        "load": 0,
-        "voltage_battery": volts,
-        "current_battery": amps,
-        "battery_remaining": left,
-    }
-
-
-def _battery(vehicle: Vehicle) -> tuple[int, int, int]:
-    """Return voltage [mV], current [cA] and remaining charge [%]; -1 where unknown."""
-    if vehicle.uptime() < MEASURED_AFTER:
-        return 0, -1, -1
-    estimate = vehicle.estimate
-    capacity = vehicle.parameters["BATT_CAPACITY"]
-    left = 1.0 - used_mah(vehicle) / capacity if capacity > 0.0 else 0.0
-    return (
-        to_uint16(estimate.battery_volts * 1000.0),
-        to_int16(estimate.battery_amps * 100.0),
-        int(max(0.0, left) * 100.0),
-    )
-
-
-def battery_status(vehicle: Vehicle) -> Fields:
-    """Return BATTERY_STATUS."""
-    volts, amps, left = _battery(vehicle)
-    estimate = vehicle.estimate
-    return {
-        "id": 0,
-        "temperature": 32_767,
-        "voltages": (volts or NOT_THERE, *([NOT_THERE] * 9)),
-        "current_battery": max(0, amps),
-        "current_consumed": int(used_mah(vehicle)),
-        "energy_consumed": int(estimate.battery_energy_j / 100.0),
-        "battery_remaining": left,
-        "charge_state": _charge_state(vehicle),
-    }
-
-
-CHARGE_OK, CHARGE_LOW, CHARGE_CRITICAL = 1, 2, 3
-"""MAV_BATTERY_CHARGE_STATE."""
-
-
-def _charge_state(vehicle: Vehicle) -> int:
-    """Return the level that the failsafes of the battery have found."""
-    active = vehicle.failsafes.active
-    if "battery critical" in active:
-        return CHARGE_CRITICAL
-    return CHARGE_LOW if "battery low" in active else CHARGE_OK
 
 
 def heartbeat(vehicle: Vehicle, kind: int, system_status: int) -> Fields:

@@ -46,6 +46,8 @@ from volery.simulation.world.sensors import Measurement, Sigma, declared_sigma, 
 from volery.simulation.world.state_layout import (
     P_CELLS,
     S_CHARGE,
+    S_GUST,
+    S_VELOCITY,
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
     U_GPS_DRIFT,
@@ -54,6 +56,7 @@ from volery.simulation.world.state_layout import (
     U_MOTOR_HEALTH,
     U_PUSH,
     U_WIND,
+    W_ROTATION,
 )
 from volery.simulation.world.world import STEP, Truth, World
 
@@ -252,6 +255,15 @@ class Flight:
     def truth(self) -> Truth:
         """Return the true state, for recorders and requirements; an autopilot must not use it."""
         return self._world.truth(self._body)
+
+    def air_from_ahead(self) -> float:
+        """Return the true speed of the air along the forward axis [m/s], for a pitot tube."""
+        self._world.advance_to_now(self._body)
+        row, speed = self._world.arrays.rows[self._body], 0.0
+        for axis in range(3):
+            air = float(row[U_WIND + axis]) + float(row[S_GUST + axis])
+            speed += float(row[W_ROTATION + 3 * axis]) * (float(row[S_VELOCITY + axis]) - air)
+        return speed
 
     def measurement(self, sensor: str) -> Measurement:
         """Return the last sample of a sensor that a package added to this vehicle.

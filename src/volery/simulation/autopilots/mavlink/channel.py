@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from volery.base.time import MS, Ns
+from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.frame import Frame
 from volery.links.link import ByteLink, Link, SelectiveLink
@@ -24,6 +24,9 @@ STATION_SILENT: Ns = 2500 * MS
 
 GROUND_STATION = 6
 """MAV_TYPE_GCS."""
+
+HIGH_LATENCY_STREAMS: Mapping[str, Ns] = {"HIGH_LATENCY2": 5 * S}
+"""Periods of the streams that a link of high latency carries without a request, as in ArduPilot."""
 
 Chunks = list[dict[str, Any]]
 
@@ -110,14 +113,24 @@ class MavlinkChannel:
     def __init__(self, link: Link, index: int, system: int, usual: Mapping[str, Ns]) -> None:
         self.link = link
         self.index = index
-        self.usual = usual
+        self._usual = usual
         self.requested: dict[str, Ns] = {}
         """Periods of the streams that were requested as a group."""
         self.streams: MessageStreams
         self.texts: StatusTextQueue
         self.open = True
+        self.silent: Callable[[], bool] | None = None
+        """Whether nothing is sent now: of links of high latency only, which are switched on by a command."""
         self._system = system
         self._selective = link if isinstance(link, SelectiveLink) else None
+
+    @property
+    def usual(self) -> Mapping[str, Ns]:
+        """Periods of the streams that are sent without a request."""
+        return self._usual if self.silent is None else HIGH_LATENCY_STREAMS
+
+    def _carries(self) -> bool:
+        return self.open and (self.silent is None or not self.silent())
 
     def is_wanted(self, name: str) -> bool:
         """Return whether the other end uses the message called *name*, as far as it has stated that."""
@@ -125,12 +138,12 @@ class MavlinkChannel:
 
     def send(self, name: str, fields: dict[str, Any]) -> None:
         """Send a message as the autopilot, while the channel is open."""
-        if self.open:
+        if self._carries():
             self.link.send(Frame(name, fields, self._system, AUTOPILOT))
 
     def pass_on(self, frame: Frame) -> None:
         """Send a message of another system or component, while the channel is open."""
-        if self.open and self.is_wanted(frame.name):
+        if self._carries() and self.is_wanted(frame.name):
             self.link.send(frame)
 
     def stream(self) -> None:

@@ -116,9 +116,20 @@ class MavlinkEndpoint:
             self._kernel, self.firmware.texts, lambda fields: channel.send("STATUSTEXT", fields)
         )
         self.channels.append(channel)
+        self._mark_high_latency([channel])
         if vehicle.uptime() >= vehicle.rules.startup.ready_after:
             channel.stream()
         link.receive(lambda frame: self._receive(channel, frame))
+
+    def _mark_high_latency(self, channels: Sequence[MavlinkChannel]) -> None:
+        """Note which of these links are of high latency."""
+        numbers = self.firmware.telemetry.high_latency_links
+        slow = numbers(self._vehicle) if numbers is not None else frozenset()
+        for channel in channels:
+            channel.silent = self._is_silent if channel.index in slow else None
+
+    def _is_silent(self) -> bool:
+        return not self._vehicle.reports.high_latency
 
     def disconnect(self, link: Link) -> None:
         """Stop serving *link*."""
@@ -157,13 +168,14 @@ class MavlinkEndpoint:
         vehicle, firmware = self._vehicle, self.firmware
         private = firmware.commands.private_links
         self._routes = Routes(vehicle.system, private(vehicle)) if private is not None else None
+        self._mark_high_latency(self.channels)
         age = vehicle.uptime()
         for piece in firmware.start.boot_bytes[1:] if not age else ():
             self._at_uptime(piece.after, partial(self._send_bytes, piece.data))
         for after in firmware.start.heartbeat_first:
             if after >= age:
-                self._at_uptime(after, lambda: self.send_message("HEARTBEAT"))
-        self._regularly(firmware.start.heartbeat_from, S, lambda: self.send_message("HEARTBEAT"))
+                self._at_uptime(after, self._beat)
+        self._regularly(firmware.start.heartbeat_from, S, self._beat)
         if firmware.start.timesync_every:
             self._regularly(firmware.start.timesync_every, firmware.start.timesync_every, self._request_time)
         if age >= vehicle.rules.startup.ready_after:
@@ -193,6 +205,13 @@ class MavlinkEndpoint:
         if age > first:
             first += -(-(age - first) // period) * period
         self._at_uptime(first, lambda: self._timers.append(self._kernel.every(period, action)))
+
+    def _beat(self) -> None:
+        """Send HEARTBEAT on all links but those of high latency."""
+        for fields in self.firmware.telemetry.build("HEARTBEAT", self._vehicle):
+            for channel in self.channels:
+                if channel.silent is None:
+                    channel.send("HEARTBEAT", fields)
 
     def _request_time(self) -> None:
         fields = {"tc1": 0, "ts1": self._vehicle.uptime() // 1000 * 1000 + self._vehicle.system}

@@ -14,7 +14,7 @@ from volery.simulation.autopilots.ardupilot.proximity import edges
 
 ARM, REQUEST, PREARM = 400, 512, 401
 BY_MESSAGES = {"PRX1_TYPE": 2, "ARMING_CHECK": 1}
-PROXIMITY = 1 << 25
+PROXIMITY = 1 << 26
 
 
 @pytest.fixture

@@ -1,0 +1,33 @@
+"""ArduPilot's airspeed sensor: a pitot tube and a thermometer, which are reported and not flown by.
+
+Source: AP_Airspeed, GCS_Common (VFR_HUD, SYS_STATUS) and the sensors of ArduPilot's own simulator, which
+measure without error here; its analogue sensor has no temperature.
+"""
+
+from __future__ import annotations
+
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+ANALOGUE = 2
+"""ARSPD_TYPE without a thermometer."""
+SEA_LEVEL_CELSIUS, LAPSE = 15.0, 0.0065
+"""ISO 2533: temperature at sea level and its fall with the height [degC/m]."""
+SELF_HEATING = 25.0
+"""Temperature of the sensor above that of the air in ArduPilot's simulator [degC] (SIM_Airspeed_DLVR)."""
+
+
+def is_there(vehicle: Vehicle) -> bool:
+    """Return whether the vehicle has an airspeed sensor."""
+    return vehicle.parameters["ARSPD_ENABLE"] != 0.0 and vehicle.parameters["ARSPD_TYPE"] > 0.0
+
+
+def speed(vehicle: Vehicle) -> float | None:
+    """Return the airspeed [m/s], never negative; ``None`` without a sensor."""
+    return max(0.0, vehicle.flight.air_from_ahead()) if is_there(vehicle) else None
+
+
+def temperature(vehicle: Vehicle) -> float | None:
+    """Return the temperature at the sensor [degC]; ``None`` where none is measured."""
+    if not is_there(vehicle) or vehicle.parameters["ARSPD_TYPE"] == ANALOGUE:
+        return None
+    return SEA_LEVEL_CELSIUS - LAPSE * vehicle.estimate.geodetic[2] + SELF_HEATING

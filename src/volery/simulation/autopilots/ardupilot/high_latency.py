@@ -1,0 +1,112 @@
+"""ArduPilot's links of high latency, such as satellite modems: HIGH_LATENCY2, and what switches them on.
+
+A link whose SERIALn_PROTOCOL is 43 at the boot carries HIGH_LATENCY2 every five seconds instead of
+heartbeats, and nothing at all until CONTROL_HIGH_LATENCY. Source: GCS_Common and GCS_Mavlink of the vehicles.
+"""
+
+from __future__ import annotations
+
+from math import hypot
+
+from volery.base.time import MS
+from volery.simulation.autopilots.ardupilot import airspeed, sensor_status, telemetry
+from volery.simulation.autopilots.ardupilot.modes import NOTICE
+from volery.simulation.autopilots.mavlink.firmware import Builder
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields
+from volery.simulation.autopilots.vehicle_state import Vehicle
+
+CONTROL_HIGH_LATENCY = 2600
+PROTOCOL = 43
+"""SERIALn_PROTOCOL of such a link."""
+SERIAL_PORTS = range(1, 8)
+NO_TEMPERATURE = -128
+
+FAILURES = {
+    sensor_status.GPS: 1 << 0,
+    sensor_status.DIFFERENTIAL_PRESSURE: 1 << 1,
+    sensor_status.PRESSURE: 1 << 2,
+    sensor_status.ACCELEROMETERS: 1 << 3,
+    sensor_status.GYROSCOPES: 1 << 4,
+    sensor_status.MAG: 1 << 5,
+    sensor_status.TERRAIN: 1 << 6,
+    sensor_status.BATTERY: 1 << 7,
+    sensor_status.RC_RECEIVER: 1 << 8,
+    sensor_status.GEOFENCE: 1 << 11,
+    sensor_status.AHRS: 1 << 12,
+}
+"""Bit of HL_FAILURE_FLAG by that of MAV_SYS_STATUS_SENSOR."""
+
+
+def links(vehicle: Vehicle) -> frozenset[int]:
+    """Return the numbers of the links that SERIALn_PROTOCOL makes links of high latency."""
+    return frozenset(
+        port for port in SERIAL_PORTS if vehicle.parameters[f"SERIAL{port}_PROTOCOL"] == PROTOCOL
+    )
+
+
+def on_control(vehicle: Vehicle, command: Command) -> int:
+    """Handle CONTROL_HIGH_LATENCY: param1 is 1 to switch the links on, 0 to switch them off."""
+    if command.param1 not in (0.0, 1.0):
+        return FAILED
+    vehicle.reports.high_latency = command.param1 == 1.0
+    vehicle.send_text(NOTICE, f"High Latency {'enabled' if vehicle.reports.high_latency else 'disabled'}")
+    return ACCEPTED
+
+
+def _byte(value: float) -> int:
+    return min(255, max(0, int(value)))
+
+
+def report(kind: int, system_status: Builder) -> Builder:
+    """Return the builder of HIGH_LATENCY2 of a vehicle of that MAV_TYPE; *system_status* is of SYS_STATUS."""
+
+    def build(vehicle: Vehicle) -> Fields:
+        status, hud = system_status(vehicle), telemetry.vfr_hud(vehicle)
+        assert isinstance(status, dict)
+        latitude, longitude, amsl = vehicle.estimate.geodetic
+        celsius = airspeed.temperature(vehicle)
+        base_mode = telemetry.heartbeat(vehicle, kind, 0)["base_mode"]
+        healthy = status["onboard_control_sensors_health"]
+        return {
+            "timestamp": vehicle.uptime() // MS,
+            "type": kind,
+            "autopilot": 3,
+            "custom_mode": vehicle.mode.number,
+            "latitude": round(latitude * 1e7),
+            "longitude": round(longitude * 1e7),
+            "altitude": int(amsl),
+            "heading": hud["heading"] // 2,
+            "throttle": hud["throttle"],
+            "airspeed": _byte(hud["airspeed"] * 5.0),
+            "groundspeed": _byte(hud["groundspeed"] * 5.0),
+            "temperature_air": NO_TEMPERATURE if celsius is None else int(celsius),
+            "battery": status["battery_remaining"],
+            "wp_num": vehicle.mission.current,
+            "failure_flags": sum(flag for sensor, flag in FAILURES.items() if not healthy & sensor),
+            "custom0": (base_mode + 128) % 256 - 128,
+            **(_copter_targets(vehicle) if vehicle.flies else _rover_targets(vehicle)),
+        }
+
+    return build
+
+
+def _copter_targets(vehicle: Vehicle) -> Fields:
+    target = telemetry.nav_controller(vehicle)
+    return {
+        "target_altitude": int(vehicle.estimate.geodetic[2] + target.get("alt_error", 0.0)),
+        "target_heading": target.get("target_bearing", 0) // 2,
+        "target_distance": target.get("wp_dist", 0) // 10,
+        "airspeed_sp": _byte(hypot(*vehicle.setpoint.velocity) * 5.0),
+    }
+
+
+def _rover_targets(vehicle: Vehicle) -> Fields:
+    """Return them in the modes that the autopilot steers; the wanted speed is the measured one, as there."""
+    if not vehicle.mode.controls:
+        return {}
+    target = telemetry.nav_controller(vehicle)
+    return {
+        "target_heading": target.get("target_bearing", 0) // 2,
+        "target_distance": target.get("wp_dist", 0) // 10,
+        "airspeed_sp": _byte(telemetry.vfr_hud(vehicle)["airspeed"] * 5.0),
+    }
