@@ -6,12 +6,12 @@ item NAV_GUIDED_ENABLE the messages are ignored.
 
 from __future__ import annotations
 
-from math import hypot, isfinite
+from math import hypot, isfinite, radians
 from typing import Any, NamedTuple
 
 from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector
-from volery.simulation.autopilots.ardupilot.commands import FARTHEST_POINT
+from volery.simulation.autopilots.ardupilot.commands import FARTHEST_POINT, SLEW_YAW
 from volery.simulation.autopilots.ardupilot.fence import fence_admits
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
 from volery.simulation.autopilots.manoeuvres.rover_driving import GuidedRover
@@ -79,7 +79,7 @@ def _turn(vehicle: Vehicle, fields: dict[str, Any], body: bool) -> Turn:
         yaw += vehicle.estimate.attitude[2]
     rate = None
     if _given(mask, YAW_RATE) and isfinite(fields["yaw_rate"]):
-        fastest = vehicle.tuning.pilot_yaw_rate
+        fastest = radians(SLEW_YAW) if vehicle.flies else vehicle.tuning.pilot_yaw_rate
         rate = min(fastest, max(-fastest, fields["yaw_rate"]))
     return Turn(None if rate is not None else yaw, rate)
 

@@ -1,4 +1,4 @@
-"""Attitude targets of a rover in GUIDED."""
+"""Targets of GUIDED: attitudes of a rover, turns of a copter."""
 
 from __future__ import annotations
 
@@ -28,3 +28,18 @@ def test_a_rover_follows_an_attitude_target(station: Any) -> None:
         rig.send("SET_ATTITUDE_TARGET", **TARGET, type_mask=0b1000_0011, q=q, body_yaw_rate=0.3, thrust=0.5)
         rig.run(0.1)
     assert rig.vehicle.estimate.rates[2] == pytest.approx(0.3, abs=0.06)
+
+
+def test_a_copter_turns_beside_a_velocity_no_faster_than_the_slew_rate(station: Any) -> None:
+    rig = station(parameters={"ARMING_CHECK": 0})
+    rig.run(0.5)
+    for number, params in ((176, (1.0, 4.0)), (400, (1.0,)), (22, (0, 0, 0, 0, 0, 0, 10.0))):
+        assert rig.command(number, *params) == 0
+    rig.run(15.0)
+    mask = 0b0101_1100_0111
+    rates = []
+    for _ in range(40):
+        rig.send("SET_POSITION_TARGET_LOCAL_NED", **TARGET, coordinate_frame=1, type_mask=mask, yaw_rate=-3.0)
+        rig.run(0.1)
+        rates.append(rig.vehicle.estimate.rates[2])
+    assert sum(rates[-20:]) / 20.0 == pytest.approx(radians(-60.0), rel=0.05)
