@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from volery.simulation.autopilots.px4.loop_state import A_POSITION
+
 OFFBOARD, POSCTL, LOITER, RTL, LAND = 0x00060000, 0x00030000, 0x03040000, 0x05040000, 0x06040000
 
 
@@ -69,6 +71,38 @@ def test_a_leg_by_reposition_creeps_up_to_the_cruise_and_ends_too_far(
     if north > 100.0:
         assert flown[60][2] == pytest.approx(4.3, abs=0.2)
         assert flown[250][2] == pytest.approx(4.95, abs=0.15)
+
+
+def test_with_noise_the_airframe_of_the_loops_is_reported(bench: Any) -> None:
+    """The body of the model is up to 0.2 m behind it, which is no error of EKF2."""
+    rig = bench(sensors="sih", seed=2)
+    rig.airborne()
+    rig.offboard(x=0.0, y=0.0, z=-9.0)
+    rig.run(6.0)
+    rig.stream(x=50.0, y=0.0, z=-9.0)
+    reported, flown = [], []
+    for _ in range(120):
+        rig.run(0.1)
+        reported.append(rig.vehicle.estimate.position[0])
+        flown.append(rig.vehicle.firmware_state.control._row[A_POSITION])
+    assert max(flown) > 50.5
+    assert max(reported) == pytest.approx(max(flown), abs=0.015)
+
+
+def test_the_landed_detector_waits_while_the_vertical_estimate_moves(bench: Any) -> None:
+    """Logged of 27 landings: 5.0 to 5.5 s from touch-down to disarming in 21, up to 9.0 s in the others."""
+    moved = 0
+    for seed in range(1, 9):
+        rig = bench(sensors="sih", seed=seed)
+        rig.airborne()
+        assert rig.mode(4, 6) == 0
+        last = 0.0
+        while not rig.vehicle.landed:
+            rig.run(0.1)
+            if rig.vehicle.firmware_state.control.seems_to_move:
+                last, moved = rig.now, moved + 1
+        assert rig.now - last > 2.9
+    assert moved
 
 
 @pytest.mark.parametrize(("place", "crawls"), [(0, True), (1, False)])

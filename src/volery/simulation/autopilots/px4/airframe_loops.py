@@ -201,7 +201,7 @@ def _move(row: Array, north: float, east: float, down: float) -> None:
     """Advance the airframe by a substep under commanded accelerations, which it follows with a lag."""
     row[A_THRUST] += SUBSTEP / LEAN_LAG * (north - row[E_PUSH] - row[A_THRUST])
     row[A_THRUST + 1] += SUBSTEP / LEAN_LAG * (east - row[E_PUSH + 1] - row[A_THRUST + 1])
-    row[A_THRUST + 2] += SUBSTEP / THRUST_LAG * (down - row[A_THRUST + 2])
+    row[A_THRUST + 2] += SUBSTEP / THRUST_LAG * (down - row[E_PUSH + 2] - row[A_THRUST + 2])
     if row[A_GROUNDED] > 0.0 and row[A_THRUST + 2] < 0.0:
         row[A_GROUNDED] = 0.0
     for axis in range(3):

@@ -8,9 +8,9 @@ pushes the aircraft the other way.
 
 The error moves like EKF2's own states, and is corrected by fixes, by the heading of the magnetometer and by
 the barometer with gains from their covariance, which is advanced as well: a wrong bias of the accelerometer
-looks like a tilt until the nose turns, a wrong heading counts as much as the aircraft leans, and so does a
-wrong tilt along the vertical. The field is steep, so a wrong tilt is a wrong heading, too. The output
-predictor passes the errors on with a lag.
+looks like a tilt until the nose turns; a wrong heading counts as much as the aircraft accelerates, and so
+does a wrong tilt along the vertical, because the accelerometer measures the drag, too. The field is steep, so
+a wrong tilt is a wrong heading, too. The output predictor passes the errors on with a lag.
 """
 
 from __future__ import annotations
@@ -156,6 +156,8 @@ def step_errors(row: Array, key: np.uint64, step: int) -> None:
         _use_field_and_baro(row, key, step)
     row[E_PUSH] = row[E_STATES + TILT] - row[E_STATES + YAW] * row[A_THRUST + 1]
     row[E_PUSH + 1] = row[E_STATES + TILT + 1] + row[E_STATES + YAW] * row[A_THRUST]
+    lift = row[A_THRUST] * row[E_STATES + TILT] + row[A_THRUST + 1] * row[E_STATES + TILT + 1]
+    row[E_PUSH + 2] = lift / GRAVITY
     _predict(row, 0, north, kick_north, row[E_STATES + PLACE], row[E_STATES + SPEED])
     _predict(row, 1, east, kick_east, row[E_STATES + PLACE + 1], row[E_STATES + SPEED + 1])
     _predict(row, 2, upright, down, row[E_STATES + HEIGHT], row[E_STATES + CLIMB])
@@ -163,15 +165,20 @@ def step_errors(row: Array, key: np.uint64, step: int) -> None:
 
 @numeric
 def _accel_errors(row: Array, s: float, c: float) -> tuple[float, float, float]:
-    """Return the error of the acceleration that EKF2 sees, north, east, down [m/s^2]."""
+    """Return the error of the acceleration that EKF2 sees, north, east, down [m/s^2].
+
+    A wrong attitude turns the measured specific force, which is the acceleration less gravity; a wrong bias
+    is fixed to the body, which leans as the thrust does.
+    """
     ahead, aside, yaw = row[E_STATES + BIAS], row[E_STATES + BIAS + 1], row[E_STATES + YAW]
     lean_north, lean_east = row[A_THRUST] / GRAVITY, row[A_THRUST + 1] / GRAVITY
     weight = row[E_STATES + WEIGHT]
-    north = row[E_STATES + TILT] + c * ahead - s * aside
-    east = row[E_STATES + TILT + 1] + s * ahead + c * aside
-    down = weight + lean_north * north + lean_east * east
-    north -= weight * lean_north + yaw * row[A_THRUST + 1]
-    east -= weight * lean_east - yaw * row[A_THRUST]
+    bias_north, bias_east = c * ahead - s * aside, s * ahead + c * aside
+    tilt_north, tilt_east = row[E_STATES + TILT], row[E_STATES + TILT + 1]
+    down = weight + lean_north * bias_north + lean_east * bias_east
+    down += (row[A_ACCEL] * tilt_north + row[A_ACCEL + 1] * tilt_east) / GRAVITY
+    north = tilt_north + bias_north - weight * lean_north - yaw * row[A_ACCEL + 1]
+    east = tilt_east + bias_east - weight * lean_east + yaw * row[A_ACCEL]
     return north, east, down
 
 
@@ -194,20 +201,25 @@ def _advance_states(row: Array, s: float, c: float, accel: tuple[float, float, f
 def _advance_covariance(row: Array, s: float, c: float) -> None:
     """Advance the covariance of the states, first by rows, then by columns."""
     lean_north, lean_east = row[A_THRUST] / GRAVITY, row[A_THRUST + 1] / GRAVITY
+    push_north, push_east = row[A_ACCEL], row[A_ACCEL + 1]
     for along, across in ((STATES, 1), (1, STATES)):
         for other in range(STATES):
             at = E_COVARIANCE + other * across
             ahead, aside = row[at + BIAS * along], row[at + (BIAS + 1) * along]
             turn, turn_aside = row[at + TURN * along], row[at + (TURN + 1) * along]
-            yaw, weight = GRAVITY * row[at + YAW * along], row[at + WEIGHT * along]
-            north = row[at + TILT * along] + c * ahead - s * aside
-            east = row[at + (TILT + 1) * along] + s * ahead + c * aside
+            yaw, weight = row[at + YAW * along], row[at + WEIGHT * along]
+            bias_north, bias_east = c * ahead - s * aside, s * ahead + c * aside
+            north, east = row[at + TILT * along], row[at + (TILT + 1) * along]
+            down = weight + lean_north * bias_north + lean_east * bias_east
+            down += (push_north * north + push_east * east) / GRAVITY
+            north += bias_north - weight * lean_north - yaw * push_east
+            east += bias_east - weight * lean_east + yaw * push_north
             row[at + PLACE * along] += SUBSTEP * row[at + SPEED * along]
             row[at + (PLACE + 1) * along] += SUBSTEP * row[at + (SPEED + 1) * along]
             row[at + HEIGHT * along] += SUBSTEP * row[at + CLIMB * along]
-            row[at + CLIMB * along] += SUBSTEP * (weight + lean_north * north + lean_east * east)
-            row[at + SPEED * along] += SUBSTEP * (north - weight * lean_north - lean_east * yaw)
-            row[at + (SPEED + 1) * along] += SUBSTEP * (east - weight * lean_east + lean_north * yaw)
+            row[at + CLIMB * along] += SUBSTEP * down
+            row[at + SPEED * along] += SUBSTEP * north
+            row[at + (SPEED + 1) * along] += SUBSTEP * east
             row[at + TILT * along] += SUBSTEP * (c * turn - s * turn_aside)
             row[at + (TILT + 1) * along] += SUBSTEP * (s * turn + c * turn_aside)
             row[at + YAW * along] += SUBSTEP * row[at + SPIN * along]

@@ -17,7 +17,7 @@ from itertools import pairwise
 from math import dist
 
 from volery.base.frames import Vector
-from volery.base.time import MS, Ns, from_seconds, to_seconds
+from volery.base.time import MS, Ns, S, from_seconds, to_seconds
 from volery.simulation.autopilots.mavlink.microservices import FENCE, MISSION_UNSUPPORTED, RALLY
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.px4 import event_interface, modes
@@ -161,6 +161,10 @@ OUTRANKS = {
 LOSS_DETECTION_DELAY = 145 * MS
 """Recorded: with COM_RC_LOSS_T = 0.5 s the loss was detected 0.63 to 0.65 s after the last sample."""
 
+GROUND_CONTACT = S
+"""Time for which PX4's landed detector waits for the ground contact; LANDED_AFTER is that of its other two
+states."""
+
 ON_GROUND_AFTER: Ns = 300 * MS
 """Without motors the vehicle counts as on the ground, in the air too: reported 0.42 s after a kill."""
 
@@ -204,6 +208,8 @@ def _detect_ground(commander: Commander, now: Ns) -> None:
     vehicle = commander.vehicle
     if not vehicle.flies:
         return
+    if commander.control.seems_to_move:
+        vehicle.ground.touched_at = now + GROUND_CONTACT
     flying = (not vehicle.estimate.landed or commander.control.lifts_off) and not vehicle.landed
     if flying and not commander.flying:
         commander.took_off, commander.lifted_at = True, now

@@ -128,11 +128,13 @@ class Descent(Land):
     def step(self) -> None:
         """Move the trajectory down over the point and follow it."""
         vehicle = self.vehicle
+        control: PositionLoops = vehicle.firmware_state.control
         if not vehicle.has_position or self.point is None or vehicle.estimate.landed:
+            if vehicle.estimate.landed:
+                control.rest()
             super().step()
             return
         p = vehicle.parameters
-        control: PositionLoops = vehicle.firmware_state.control
         limits = Cruise(p["MPC_XY_CRUISE"], p["MPC_Z_V_AUTO_UP"], self.sink(), p["MPC_ACC_UP_MAX"])
         control.fly_to((self.point[0], self.point[1], inf), limits, vehicle.commanded.yaw)
 
