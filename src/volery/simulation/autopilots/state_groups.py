@@ -90,8 +90,8 @@ class GroundState:
     ) -> None:
         """Update the state of an armed vehicle in flight.
 
-        It has landed once the detector has reported ground after flight for *landed_after*, or once it has
-        stood on the ground without a request to take off for *abandoned_after*.
+        It has landed once the detector has reported ground after flight for *landed_after*, or, without a
+        flight, once it has stood on the ground without a request to take off for *abandoned_after*.
 
         Args:
             now: The time [ns].
@@ -107,8 +107,11 @@ class GroundState:
             self.touched_at = now
         if not on_ground or takeoff_requested:
             self.takeoff_last_requested_at = now
-        returned = self.lifted and now - self.touched_at >= landed_after
-        if on_ground and (returned or now - self.takeoff_last_requested_at >= abandoned_after):
+        if self.lifted:
+            ended = now - self.touched_at >= landed_after
+        else:
+            ended = now - self.takeoff_last_requested_at >= abandoned_after
+        if on_ground and ended:
             self.landed = True
             self.landed_at = self.idle_since = now
             self.takeoff_requested_at = NEVER
