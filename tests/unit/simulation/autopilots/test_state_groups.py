@@ -23,6 +23,16 @@ def test_a_vehicle_has_landed_once_the_detector_reports_ground_after_flight() ->
     assert ground.landed_at == ground.idle_since == 9 * S
 
 
+def test_after_a_flight_the_time_of_the_landed_detector_counts_and_no_other() -> None:
+    ground = GroundState(landed=True)
+    ground.leave(0)
+    for second, on_ground in ((1, False), (5, True), (8, True)):
+        ground.update(second * S, on_ground, False, abandoned_after=ABANDONED, landed_after=4 * S)
+    assert not ground.landed
+    ground.update(9 * S, True, False, abandoned_after=ABANDONED, landed_after=4 * S)
+    assert ground.landed
+
+
 def test_a_take_off_that_never_left_the_ground_ends_after_its_time() -> None:
     ground = GroundState(landed=True)
     ground.leave(0)
