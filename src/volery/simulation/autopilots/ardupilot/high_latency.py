@@ -97,6 +97,7 @@ def _copter_targets(vehicle: Vehicle) -> Fields:
         "target_heading": target.get("target_bearing", 0) // 2,
         "target_distance": target.get("wp_dist", 0) // 10,
         "airspeed_sp": _byte(hypot(*vehicle.setpoint.velocity) * 5.0),
+        "wind_heading": 90,  # half the direction of no wind, as sent by the original
     }
 
 

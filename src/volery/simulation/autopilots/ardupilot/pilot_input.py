@@ -118,18 +118,19 @@ def simulate_faults(vehicle: Vehicle) -> None:
     parameters = vehicle.parameters
     motor_and_share = parameters["SIM_ENGINE_FAIL"], parameters["SIM_ENGINE_MUL"]
     wind = parameters["SIM_WIND_SPD"], parameters["SIM_WIND_DIR"]
-    no_receiver = parameters["SIM_GPS_DISABLE"] != 0.0 or not (
-        parameters["GPS_TYPE"] and parameters["SIM_GPS_TYPE"]
-    )
+    no_receiver = parameters["GPS_TYPE"] == 0.0 or parameters["SIM_GPS_TYPE"] == 0.0
+    blocked = no_receiver or parameters["SIM_GPS_DISABLE"] != 0.0
     volts = round(parameters["SIM_BATT_VOLTAGE"], 3)
     glitch = parameters["SIM_GPS_GLITCH_X"], parameters["SIM_GPS_GLITCH_Y"]
-    wanted = (float(no_receiver), *motor_and_share, *wind, volts, *glitch)
+    if not no_receiver:
+        vehicle.failsafes.no_receiver_since = NEVER
+    elif vehicle.failsafes.no_receiver_since == NEVER:
+        vehicle.failsafes.no_receiver_since = vehicle.kernel.now()
+    wanted = (float(blocked), *motor_and_share, *wind, volts, *glitch)
     before = vehicle.failsafes.simulated
     if wanted == before:
         return
     vehicle.failsafes.simulated = wanted
-    if wanted[0] != before[0]:
-        vehicle.failsafes.no_receiver_since = vehicle.kernel.now() if no_receiver else NEVER
     if volts != before[5]:
         vehicle.flight.set_full_voltage(volts)
     if wind != before[3:5]:

@@ -94,6 +94,4 @@ def _of_sensors(vehicle: Vehicle) -> tuple[int, int, int]:
     """Return the bits of sensors that parameters add, those that are used of these, and those that failed."""
     used = PROXIMITY if proximity.is_there(vehicle) else 0
     failed = PROXIMITY if proximity.lacks_data(vehicle) else 0
-    if vehicle.uptime() > FIX_AFTER and vehicle.estimate.fix_type == 0:
-        failed |= GPS
     return used | (DIFFERENTIAL_PRESSURE if airspeed.is_there(vehicle) else 0), used, failed
