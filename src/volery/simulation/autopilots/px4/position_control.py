@@ -70,8 +70,9 @@ FOLLOW_ACCEL, FOLLOW_JERK, FASTEST = 12.0, 100.0, 25.0
 RESTART_AFTER = from_seconds(0.5)
 """Time without a step after which the loops start anew."""
 
-ELSEWHERE = 12.0
-"""Distance of vehicle and loops from which the loops start anew [m]."""
+ELSEWHERE = 3.0
+"""Distance of vehicle and loops from which the loops start anew [m]: far more than in flight, less than what
+a vehicle without the thrust to climb loses in a few seconds."""
 
 STEP: Final[Ns] = from_seconds(SUBSTEP)
 
