@@ -80,7 +80,7 @@ def parse(path: Path, where: Location | None = None) -> SourceFile:
         where: Line of the model that names it, for error messages.
 
     Raises:
-        ModelError: The file is missing or is not Python.
+        ModelError: The file is missing, is not Python or is nested too deeply.
     """
     try:
         text = path.read_text(encoding="utf-8")
