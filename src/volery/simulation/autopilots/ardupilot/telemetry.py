@@ -129,38 +129,63 @@ def pressure(vehicle: Vehicle) -> Fields:
     }
 
 
+EPH, EPV = 121, 200
+ACCURACY_WITHOUT_FIX = {"h_acc": 300, "v_acc": 300, "vel_acc": 40}
+"""Dilutions [1/100] and accuracies [mm, mm/s] that the receiver of the original's simulator always states."""
+
+
 def gps_raw(vehicle: Vehicle) -> Fields:
-    """Return GPS_RAW_INT."""
+    """Return GPS_RAW_INT. Without a fix it still states where it is, like the original's simulator."""
     if vehicle.uptime() < NO_FIX_AFTER:
         return {"eph": 65_535, "epv": 65_535}
     if receiver_is_lost(vehicle):
         return {"eph": 9999, "epv": 9999}
     fix = vehicle.estimate.gps
     if fix.fix_type == 0 or not _has_fix(vehicle):
-        return {
-            "time_usec": boot_us(vehicle),
-            "fix_type": 1,
-            "eph": 9999,
-            "epv": 9999,
-            "satellites_visible": 3,
-        }
-    north, east, _ = fix.velocity
-    speed = hypot(north, east)
+        return _gps_without_fix(vehicle)
     return {
         "time_usec": boot_us(vehicle),
         "fix_type": fix.fix_type,
-        "lat": round(fix.latitude * 1e7),
-        "lon": round(fix.longitude * 1e7),
-        "alt": _cm(fix.amsl),
-        "eph": to_uint16(fix.eph * 100.0),
-        "epv": to_uint16(fix.epv * 100.0),
-        "vel": to_uint16(speed * 100.0),
-        "cog": heading_cdeg(atan2(east, north)) if speed > 0.0 else 0,
         "satellites_visible": fix.satellites,
-        "alt_ellipsoid": _cm(fix.amsl),
+        **_gps_position(fix.latitude, fix.longitude, fix.amsl),
+        **_gps_speed(*fix.velocity[:2]),
         "h_acc": round(fix.h_acc * 1000.0),
         "v_acc": round(fix.v_acc * 1000.0),
         "vel_acc": round(fix.speed_acc * 1000.0),
+    }
+
+
+def _gps_without_fix(vehicle: Vehicle) -> Fields:
+    truth = vehicle.flight.truth()
+    east, north, _ = truth.velocity
+    since = round(vehicle.estimate.gps_age * 1e6)
+    return {
+        "time_usec": boot_us(vehicle) - since if _has_fix(vehicle) else 0,
+        "fix_type": 1,
+        "satellites_visible": 3,
+        **_gps_position(*vehicle.flight.frame.from_enu(truth.position)),
+        **_gps_speed(north, east),
+        **ACCURACY_WITHOUT_FIX,
+    }
+
+
+def _gps_position(latitude: float, longitude: float, amsl: float) -> Fields:
+    """Return the fields of a position [degrees, m], with the dilutions, which never change."""
+    return {
+        "lat": round(latitude * 1e7),
+        "lon": round(longitude * 1e7),
+        "alt": _cm(amsl),
+        "alt_ellipsoid": _cm(amsl),
+        "eph": EPH,
+        "epv": EPV,
+    }
+
+
+def _gps_speed(north: float, east: float) -> Fields:
+    speed = hypot(north, east)
+    return {
+        "vel": to_uint16(speed * 100.0),
+        "cog": heading_cdeg(atan2(east, north)) if speed > 0.0 else 0,
     }
 
 
