@@ -62,6 +62,7 @@ class Scripted:
     system: int = 1
     firmware: int = 0
     version: int = 0
+    clock_rate: float = 0.0  # how fast its time since boot runs; 0: it is not sent
 
     home: ClassVar[tuple[int, int, int]]  # degE7, degE7, mm AMSL
     metres: ClassVar[tuple[float, float]]  # north and east in 1e-7 degrees there
@@ -78,6 +79,8 @@ class Scripted:
     # -- speaking
 
     def say(self, name: str, **fields: Any) -> None:
+        if self.clock_rate and "time_boot_ms" in message_type(name).field_names:
+            fields["time_boot_ms"] = round(self.clock_rate * self.kernel.now()) // MS
         if not self.mute:
             self.link.send(Frame(name, fields, self.system, 1))
 

@@ -16,7 +16,7 @@ from typing import Any
 from volery.base.errors import CapabilityError, UsageError, VehicleError, VoleryError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Altitude, Position
-from volery.base.time import MINUTE, Ns, S, from_seconds
+from volery.base.time import MINUTE, MS, Ns, S, from_seconds
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
@@ -42,6 +42,8 @@ from volery.vehicles.executor import StepExecutor
 from volery.vehicles.telemetry import Telemetry, describe_state
 
 FIRST_MESSAGE_S = 10.0
+LOOKED_AT_EVERY: Ns = 50 * MS
+"""Period at which the clock of a real vehicle is looked at."""
 SEEN_WITHIN: Ns = 5 * S
 """Time within which what one link shows is seen on another."""
 
@@ -261,6 +263,13 @@ class RealStage(Stage):
         link_control = ControlledLink(open_link(self.kernel, address, factory.codec))
         options = {name: value for name, value in address.options.items() if name != "baud"} | more
         return link_control, factory.on_link(self.kernel, link_control, address.driver, options)
+
+    def sleep(self, seconds: float) -> None:
+        """Block the check for `seconds` of the vehicle, whose clock may run faster or slower."""
+        seen: Telemetry = self.drone.telemetry
+        began, wanted = seen.moment(), from_seconds(seconds)
+        while (left := wanted - seen.elapsed(began)) > 0:
+            sleep(self.kernel, min(left, LOOKED_AT_EVERY))
 
     @property
     def link_control(self) -> ControlledLink:

@@ -24,6 +24,7 @@ from volery.trace.events import Text
 from volery.vehicles.driver import Driver, Step
 from volery.vehicles.limits import FLOOR
 from volery.vehicles.telemetry import REFRESHED_AFTER, STALE_AFTER, Telemetry, describe_state, failsafe_cause
+from volery.vehicles.vehicle_clock import COMPARED_AFTER
 
 RESTARTS = 3
 """How often a sequence that is undone before lift-off is started again."""
@@ -31,9 +32,6 @@ REASON_WAIT: Ns = 500 * MS
 """Time to wait for the text with the reason, which often follows a refusal."""
 RECENT_TEXT_S = 3.0
 """Texts older than this are quoted with their age."""
-CLOCKS_COMPARED_AFTER: Ns = 5 * S
-CLOCK_TOLERANCE = 0.25
-"""Share by which the clocks of vehicle and program may differ before that of the vehicle counts."""
 INTERRUPTED_SHOWS_AFTER: Ns = 3 * S
 """Time after which a command that was interrupted on its way shows: two heartbeats and a delay."""
 LINK_TIMEOUT: Ns = 5 * S
@@ -317,8 +315,8 @@ class StepExecutor:
             return
         self._clock_reported = True
         said = (
-            f"its clock runs {rate:.1f} times as fast as this computer's: time-outs are in its seconds; "
-            "durations of the report, of velocities and of lost links are in this computer's"
+            f"its clock runs {rate:.1f} times as fast as this computer's: time-outs and the durations of "
+            "set-points are in its seconds; those of the report and of lost links are in this computer's"
         )
         self._kernel.record(Text(self._kernel.now(), self._driver.name, 5, said))
 
@@ -349,8 +347,8 @@ class _StepRun:
         self._step = step
         self._check = check
         self._telemetry: Telemetry = driver.telemetry
-        self._began: Ns = self._kernel.now()
-        self._boot_began: Ns = self._telemetry.boot_time(self._began)
+        self._began_at = self._telemetry.moment()
+        self._began: Ns = self._began_at.at
         self._mode_before = self._telemetry.mode
         self._was_armed = self._telemetry.armed
         self._taken = ""  # how another station, a pilot or a failsafe has changed it
@@ -438,19 +436,14 @@ class _StepRun:
         return self._over() or self._elapsed() >= self._step.within
 
     def _elapsed(self) -> Ns:
-        """Return the time since the step began, ns, on the vehicle's clock if that runs faster or slower.
+        """Return the time since the step began, ns; after five seconds on the clock that counts.
 
-        A simulated firmware may run at several times real time, or slowly on a busy computer. Where both
-        clocks agree within a quarter, that of the program counts.
+        Shorter time-outs are those of answers, which also take the time of the link.
         """
-        now = self._kernel.now()
-        elapsed = now - self._began
-        if self._boot_began < 0 or elapsed < CLOCKS_COMPARED_AFTER or self._telemetry.stale:
-            return elapsed
-        theirs = self._telemetry.boot_time(now) - self._boot_began
-        if theirs < 0 or abs(theirs - elapsed) <= CLOCK_TOLERANCE * elapsed:
-            return elapsed
-        self._executor.report_clock(theirs / elapsed)
+        mine = self._kernel.now() - self._began
+        theirs = self._telemetry.elapsed(self._began_at) if mine >= COMPARED_AFTER else mine
+        if theirs != mine:
+            self._executor.report_clock(theirs / mine)
         return theirs
 
     def _failed(self) -> VehicleError | None:

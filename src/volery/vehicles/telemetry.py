@@ -12,6 +12,7 @@ from volery.base.position import Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
+from volery.vehicles.vehicle_clock import Moment, VehicleClock
 
 
 class Velocity(NamedTuple):
@@ -71,8 +72,6 @@ POSITION_STALE_AFTER: Ns = 3 * S
 PERIODS_MISSED = 3
 """A position that is reported rarely counts as old after this many of its periods."""
 LONGEST_POSITION_AGE: Ns = 30 * S
-REBOOTED_BEFORE: Ns = 10 * S
-"""A time since boot that is this much less than the last one is that of another boot."""
 FIXED = frozenset(
     {"3d_fix", "dgps", "rtk_float", "rtk_fixed", "static", "ppp", "3d", "rtk", "gps health 4", "gps health 5"}
 )
@@ -131,7 +130,6 @@ class Telemetry:
         rc_ns: time of their last report; -1 before the first.
         obstacles: what range sensors measure, by message and sector; only where a clearance is stated.
         obstacles_ns: time of their last measurement, also of one that sees nothing; -1 before the first.
-        boot_ns: last reported time of the autopilot since its boot; -1 where it sends none.
         home_ns: time since which the present home position is reported; -1 without one.
         detects_silence: whether a silence is one of the link, not of a node that does not run its loop.
         stream_lost: how a stream of this program was interrupted, so that a failsafe of the autopilot acts.
@@ -167,8 +165,7 @@ class Telemetry:
         self.above_home = nan
         self.amsl_known = True
         self.amsl_remedy = ""
-        self.boot_ns: Ns = -1
-        self._boot_at: Ns = -1
+        self._clock = VehicleClock()
         self._home: Position | None = None
         self.home_ns: Ns = -1
         self.velocity = Velocity(nan, nan, nan)
@@ -290,12 +287,18 @@ class Telemetry:
 
     def update_clock(self, boot_ns: Ns) -> None:
         """Store the autopilot's time since boot, unless the message was overtaken on the way."""
-        if boot_ns > self.boot_ns or boot_ns < self.boot_ns - REBOOTED_BEFORE:
-            self.boot_ns, self._boot_at = boot_ns, self._kernel.now()
+        now = self._kernel.now()
+        self._clock.note(boot_ns, now, fresh=now >= self.fresh_from)
 
-    def boot_time(self, now: Ns) -> Ns:
-        """Return the autopilot's time since boot, ns, extrapolated from its last report; -1 without one."""
-        return -1 if self.boot_ns < 0 else self.boot_ns + now - self._boot_at
+    def moment(self) -> Moment:
+        """Return the present moment, from which ``elapsed`` counts."""
+        now = self._kernel.now()
+        return Moment(now, self._clock.time(now))
+
+    def elapsed(self, since: Moment) -> Ns:
+        """Return the time since a moment, ns, on the vehicle's clock where that runs faster or slower."""
+        now = self._kernel.now()
+        return now - since.at if self.stale else self._clock.elapsed(since, now)
 
     def texts_since(self, when: Ns, severity: int = 6) -> list[str]:
         """Return texts received at or after *when*, at least as severe as *severity*, oldest first."""

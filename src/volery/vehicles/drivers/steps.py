@@ -399,15 +399,15 @@ class SetpointRepeater(ABC):
 
         Args:
             send: sends the set-point once.
-            lasting: duration, ns.
+            lasting: duration, ns, of the vehicle where its clock runs faster or slower.
         """
         self.end_velocity()
-        until = self._kernel.now() + lasting
+        began = self._telemetry.moment()
 
         def repeat() -> None:
             if self._telemetry.mode != self._mode:
                 self.end_velocity()
-            elif self._kernel.now() < until:
+            elif self._telemetry.elapsed(began) < lasting:
                 send()
             else:
                 self.send_stop()

@@ -49,7 +49,8 @@ class OffboardStream:
         self._takeover = takeover
         self._telemetry = backend.telemetry
         self._setpoint: Setpoint | AttitudeTarget = STILL
-        self._until: Ns | None = None
+        self._lasting: Ns | None = None
+        self._began_at = self._telemetry.moment()
         self._began: Ns = 0
         self._commanded_at: Ns | None = None  # when OFFBOARD was commanded
         self._hold_commanded_at: Ns = 0
@@ -97,7 +98,7 @@ class OffboardStream:
         """Stream *setpoint*; after *lasting* enter AUTO.LOITER."""
         now = self._kernel.now()
         self._setpoint = setpoint
-        self._until = None if lasting is None else now + lasting
+        self._lasting, self._began_at = lasting, self._telemetry.moment()
         if not self.holds:
             self._entered = False
             self._began = now
@@ -123,8 +124,8 @@ class OffboardStream:
         whose mode no heartbeat has shown yet.
         """
         self._leaving = True
-        if self._until is not None:
-            self._until = max(self._until, self._kernel.now() + ENTERED_WITHIN)
+        if self._lasting is not None:
+            self._lasting = max(self._lasting, self._telemetry.elapsed(self._began_at) + ENTERED_WITHIN)
 
     def _note_gap(self, now: Ns) -> None:
         """Doubt OFFBOARD after a gap in the stream: this program was frozen, or its computer.
@@ -169,7 +170,7 @@ class OffboardStream:
         if self._is_in_doubt():
             return
         self._doubted = False
-        if self._until is not None and now >= self._until:
+        if self._lasting is not None and self._telemetry.elapsed(self._began_at) >= self._lasting:
             self._command_hold(now)
         self._backend.send_setpoint(self._setpoint)
 

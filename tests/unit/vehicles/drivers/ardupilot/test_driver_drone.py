@@ -485,6 +485,22 @@ def test_a_velocity_lasts_and_then_it_stops(bench: Make) -> None:
     assert (sent[-1]["vx"], sent[-1]["vz"]) == (0.0, 0.0)
 
 
+def test_a_velocity_lasts_in_seconds_of_a_vehicle_that_is_thrice_as_fast(bench: Make) -> None:
+    at = bench()
+    at.autopilot.clock_rate = 3.0
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        sleep(at.kernel, 6 * S)
+        drone.set_velocity(north=3.0, lasting=6.0)
+        sleep(at.kernel, 9 * S)
+
+    at.fly(mission)
+    sent = at.autopilot.sent("SET_POSITION_TARGET_LOCAL_NED")
+    assert len(sent) == 11  # each 200 ms for 2 s of the program, and the stop
+    assert sent[-1]["vx"] == 0.0
+
+
 def test_hold_stops_and_stays(bench: Make) -> None:
     at = bench()
 

@@ -236,6 +236,21 @@ def test_a_velocity_is_streamed_while_the_program_is_busy_and_ends_in_hold(bench
     assert len(at.autopilot.since(SETPOINT, at.began)) > 50
 
 
+def test_a_velocity_lasts_in_seconds_of_a_vehicle_that_is_thrice_as_fast(bench: Make) -> None:
+    at = bench()
+    at.autopilot.clock_rate = 3.0
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        sleep(at.kernel, 6 * S)
+        drone.set_velocity(north=3.0, lasting=6.0)
+        sleep(at.kernel, 20 * S)
+
+    at.fly(mission)
+    assert at.craft.mode == HOLD
+    assert 5.0 < at.craft.north < 10.0  # for two of the program's seconds and until the mode is seen
+
+
 def test_a_loop_of_velocities_asks_for_the_mode_once(bench: Make) -> None:
     at = bench()
 

@@ -1,0 +1,73 @@
+"""The clock of an autopilot beside that of the program.
+
+A simulated firmware may run at several times real time, or slowly on a busy computer. Durations in flight are
+therefore counted on the vehicle's clock where it runs faster or slower by more than a quarter; else on that
+of the program, which is exact and does not depend on the delays of a link.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from volery.base.time import Ns, S
+
+COMPARED_AFTER: Ns = 5 * S
+"""Shortest time over which the clocks are compared."""
+COMPARED_ANEW_AFTER: Ns = 10 * S
+TOLERANCE = 0.25
+"""Share by which the clocks of vehicle and program may differ before that of the vehicle counts."""
+REBOOTED_BEFORE: Ns = 10 * S
+"""A time since boot that is this much less than the last one is that of another boot."""
+
+
+class Moment(NamedTuple):
+    """One moment on both clocks, ns; ``boot`` is -1 where the vehicle reports none."""
+
+    at: Ns
+    boot: Ns
+
+
+class VehicleClock:
+    """The autopilot's time since its boot, as last reported."""
+
+    def __init__(self) -> None:
+        self._last = Moment(-1, -1)
+        self._older = self._newer = self._last
+
+    def note(self, boot: Ns, now: Ns, *, fresh: bool = True) -> None:
+        """Note the time since boot in a message that arrives now, unless it was overtaken on the way.
+
+        Args:
+            boot: time since boot, ns.
+            now: the program's time, ns.
+            fresh: the message cannot have been held back on the way: the clocks may be compared from now on.
+        """
+        last = self._last.boot
+        if last - REBOOTED_BEFORE <= boot <= last:
+            return
+        self._last = Moment(now, boot)
+        if last < 0 or boot < last:
+            self._older = self._newer = self._last
+        elif fresh and now - self._newer.at >= COMPARED_ANEW_AFTER:
+            self._older, self._newer = self._newer, self._last
+
+    def time(self, now: Ns) -> Ns:
+        """Return the time since boot, ns, extrapolated from the last report; -1 without one."""
+        return -1 if self._last.boot < 0 else self._last.boot + now - self._last.at
+
+    def elapsed(self, since: Moment, now: Ns) -> Ns:
+        """Return the time from *since* to now, ns, of the vehicle where its clock counts."""
+        mine, theirs = now - since.at, self.time(now) - since.boot
+        if since.boot < 0 or theirs < 0:
+            return mine
+        if _differ(mine, theirs) or (mine < COMPARED_AFTER and self._differs()):
+            return theirs
+        return mine
+
+    def _differs(self) -> bool:
+        """Return whether the clocks have run differently over the last ten to twenty seconds."""
+        return _differ(self._last.at - self._older.at, self._last.boot - self._older.boot)
+
+
+def _differ(mine: Ns, theirs: Ns) -> bool:
+    return mine >= COMPARED_AFTER and abs(theirs - mine) > TOLERANCE * mine
