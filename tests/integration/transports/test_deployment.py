@@ -11,8 +11,10 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Mapping
-from contextlib import suppress
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +34,8 @@ pytestmark = [pytest.mark.integration, pytest.mark.timeout(600)]
 
 DELIVERY = Path(__file__).parents[3] / "examples" / "delivery"
 LIMIT_S = 400
+LEAVE_S = 90
+"""Longest time until the components have ended after their run."""
 SETTINGS = ("--seed", "7", "--speed", "1.5", "--set", "run.duration=300s")
 
 
@@ -103,26 +107,46 @@ def assert_types_are_those_of_the_build(workspace: Path, package: str) -> None:
 def test_pip_installs_it_and_the_entry_points_deliver_the_parcel_on_ros_2(tmp_path: Path) -> None:
     """`ros2 launch` cannot be had from PyPI: what the launch files name is started here one by one."""
     made = deployed(tmp_path / "src", 2)
-    python, installed = python_of("jazzy"), tmp_path / "installed"
+    with started_on_ros_2(made, tmp_path, 23) as (installed, env, started):
+        assert len(started) == 9
+        said = run([str(installed / "bin" / "world"), *SETTINGS, "--out", "out"], env, tmp_path)
+        assert_all_end(started)
+    assert_delivered(tmp_path / "out", said)
+
+
+@contextmanager
+def started_on_ros_2(
+    made: Deployment, folder: Path, domain: int
+) -> Iterator[tuple[Path, dict[str, str], list[subprocess.Popen[str]]]]:
+    """The packages installed, with the environment for their programs, and the components of a simulation."""
+    python, installed = python_of("jazzy"), folder / "installed"
     packages = [str(made.folder / one) for one in (*made.packages.values(), made.verification)]
     pip = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check", "--no-deps"]
-    run([*pip, "--prefix", str(installed), *packages], os.environ, tmp_path)
+    run([*pip, "--prefix", str(installed), *packages], os.environ, folder)
     [site] = installed.glob("lib/python*/site-packages")
-    env = {**surroundings(23), "PYTHONPATH": str(site)}
-    started = []
+    env = {**surroundings(domain), "PYTHONPATH": str(site), "PYTHONFAULTHANDLER": "1"}
+    started: list[subprocess.Popen[str]] = []
     try:
         for package in made.packages.values():
             for executable, parameters in launched(installed / "share" / package, package):
                 command = [installed / "bin" / executable, "--parameters", parameters, "--simulated", "true"]
                 started.append(subprocess.Popen(command, env=env, stderr=subprocess.PIPE, text=True))
-        assert len(started) == 9
-        said = run([str(installed / "bin" / "world"), *SETTINGS, "--out", "out"], env, tmp_path)
-        assert [process.wait(LIMIT_S) for process in started] == [0] * 9
+        yield installed, env, started
     finally:
         for process in started:
             process.kill()
             process.communicate()
-    assert_delivered(tmp_path / "out", said)
+
+
+def assert_all_end(started: list[subprocess.Popen[str]]) -> None:
+    """All processes end with status 0; the stacks of one that does not are in the message."""
+    end = time.monotonic() + LEAVE_S
+    for process in started:
+        try:
+            assert process.wait(max(0.0, end - time.monotonic())) == 0, process.communicate()[1]
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGABRT)  # the fault handler prints where each thread is
+            pytest.fail(f"{process.args}: {process.communicate()[1]}")
 
 
 def launched(share: Path, package: str) -> list[tuple[str, Path]]:
@@ -180,16 +204,45 @@ class Echoer:
 """
 
 
-def test_in_reality_a_component_waits_for_its_services_and_ends_with_sigterm(roscore, tmp_path):
-    model = tmp_path / "model"
-    model.mkdir()
+def pair(folder: Path) -> Path:
+    folder.mkdir()
     for name, text in (
         ("model.yaml", PAIR),
         ("words.py", WORDS),
         ("speaker.py", SPEAKER),
         ("echoer.py", ECHOER),
     ):
-        (model / name).write_text(text)
+        (folder / name).write_text(text)
+    return folder
+
+
+@contextmanager
+def killed_after(seconds: float, process: subprocess.Popen[str]) -> Iterator[None]:
+    timer = threading.Timer(seconds, process.kill)
+    timer.start()
+    yield
+    timer.cancel()
+
+
+def test_components_end_when_their_run_was_killed(tmp_path: Path) -> None:
+    made = deploy(load(pair(tmp_path / "model"), vocabulary()), tmp_path / "src", 2)
+    with started_on_ros_2(made, tmp_path, 24) as (installed, env, started):
+        command = [installed / "bin" / "world", "--out", "out"]
+        world = subprocess.Popen(command, env=env, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+        try:
+            [speaker] = [one for one in started if "speaker" in str(one.args)]
+            assert speaker.stderr is not None
+            with killed_after(LEAVE_S, speaker):
+                said = speaker.stderr.readline()
+        finally:
+            world.kill()
+            complained = world.communicate()[1]
+        assert said == "A\n", complained
+        assert_all_end(started)
+
+
+def test_in_reality_a_component_waits_for_its_services_and_ends_with_sigterm(roscore, tmp_path):
+    model = pair(tmp_path / "model")
     made = deploy(load(model, vocabulary()), tmp_path / "out", 1)
     package = made.folder / made.packages["pc"]
     (package / "config" / "speaker.yaml").write_text("text: good morning\n")

@@ -52,10 +52,11 @@ class DeployedComponent:
     def come_to_rest(self) -> None:
         """Stop the component and block until its node has left the graph, or a minute has passed."""
         kernel = self._run.kernel
-        self._run.send(pipe.Stop("its run has ended"))
         end = kernel.now() + LEAVE_WITHIN
+        self._run.send(pipe.Stop("its run has ended"))
         while self._run.is_there(self.name) and kernel.now() < end:
             kernel.sleep_until(kernel.now() + LEAVE_PERIOD)
+            self._run.send(pipe.Stop("its run has ended"))
 
     def stop(self) -> bool:
         """Return True: it ends by itself."""

@@ -1,8 +1,9 @@
 """The process of one component of a deployed system: what the generated entry points of a package call.
 
 With ``simulated`` a run elsewhere (``volery simulate --deployed``) has the vehicles and the time: the
-component follows ``/clock``, begins with the run and ends with it. Without, it runs in real time, begins as
-soon as the services that it calls are there, and lands its vehicles when it is stopped by a signal.
+component follows ``/clock``, begins with the run and ends with it, or when it is gone. Without, it runs in
+real time, begins as soon as the services that it calls are there, and lands its vehicles when it is stopped
+by a signal.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from volery.model.instances import Instance, TargetKind
 from volery.model.system import System
 from volery.model.system_loader import load
 from volery.model.text import parse
+from volery.ros.graph.interface import full_node_name
 from volery.run.assembly.component_builder import BuiltComponents
 from volery.run.assembly.model_checks import vocabulary
 from volery.run.distributed import pipe, plan
@@ -43,6 +45,10 @@ from volery.trace.events import Event, Failure, Text
 
 REPEAT_S = 0.5
 """Wall seconds between two ``Ready``."""
+WATCH_S = 2.0
+"""Wall seconds between two looks for the node of the run."""
+ABSENT = 3
+"""Looks in a row without the node of the run after which the run is gone."""
 ERROR, WARNING = 3, 4
 """Severities of syslog."""
 
@@ -75,7 +81,8 @@ class Host(Worker):
     def __init__(self, order: pipe.WorkerOrder, *, simulated: bool) -> None:
         self._to_run = _ToRun(order.name)
         super().__init__(order, self._to_run, real_time=not simulated)
-        self._begun = threading.Event()
+        self._begun, self._over = threading.Event(), threading.Event()
+        self._watch = threading.Thread(target=self._watch_run, name="run", daemon=True)
 
     def _record(self, event: Event) -> None:
         self._to_run.send(event)
@@ -108,11 +115,22 @@ class Host(Worker):
         self._to_run.publish = lambda message: self._kernel.post(partial(publisher.publish, message))
         group = node.group(lambda work: work.run())
         node.subscribe(TO_COMPONENTS, MESSAGE_TYPE, partial(self._received, built), QUEUE, group)
-        threading.Thread(target=self._repeat_ready, name="ready", daemon=True).start()
+        self._watch.start()
 
-    def _repeat_ready(self) -> None:
+    def _watch_run(self) -> None:
+        """Send ``Ready`` until the run begins; end the component when the run has left the graph."""
         while not self._begun.wait(REPEAT_S):
             self._to_run.send(pipe.Ready())
+        absent = 0
+        while absent < ABSENT and not self._over.wait(WATCH_S):
+            absent = 0 if self._run_is_there() else absent + 1
+        self._end("its run is gone")
+
+    def _run_is_there(self) -> bool:
+        try:
+            return full_node_name(plan.NODE, "/") in self.graph.node_names()
+        except (OSError, VoleryError):
+            return False  # the ROS master is gone
 
     def _received(self, built: BuiltComponents, message: Any) -> None:
         content = from_message(message).content
@@ -131,6 +149,9 @@ class Host(Worker):
         timer = threading.Timer(ORPHAN_S, partial(os._exit, 1))
         timer.daemon = True
         timer.start()
+        self._begun.set()
+        self._over.set()
+        self._watch.join()
 
     # -- in reality
 
