@@ -16,6 +16,7 @@ from volery.base.position import Position
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.vehicles.limits import Bounds, Path
 from volery.vehicles.telemetry import RECENT_CAUSE, STALE_AFTER, Telemetry, describe_state
+from volery.vehicles.vehicle_clock import Moment
 
 FALLING_M_S = 8.0
 """Sink rate that no autopilot commands by itself, m/s."""
@@ -137,7 +138,7 @@ class TrackMonitor:
         self._path: Path | None = None
         self._at_place = False
         self._stopping_m = 0.0  # what the motion at the start may add
-        self._seen: tuple[Position, Vector, Ns] | None = None  # the last position and its time
+        self._seen: tuple[Position, Vector, Moment] | None = None  # the last position and its time
         self._off_since: Ns | None = None
         self.jumped_m = 0.0
         """Length of a jump of the estimate found by the last check, m; else 0."""
@@ -173,7 +174,7 @@ class TrackMonitor:
         if bounds is None or seen.position is None or not (seen.flying and seen.located):
             self._off_since = self._seen = None
             return None
-        here = self._note_position(bounds, seen.position, now)
+        here = self._note_position(bounds, seen.position)
         if self._path is None or self._sent_elsewhere(bounds):
             return None
         off = dist(here, self._path[0]) if self._at_place else _distance(here, self._path)
@@ -188,17 +189,17 @@ class TrackMonitor:
         limit = f"{allowed:.0f} m (Limits.off_track)"
         return OffTrack(seen.name, operation, f"it is {off:.0f} m off its commanded {of}, beyond {limit}")
 
-    def _note_position(self, bounds: Bounds, position: Position, now: Ns) -> Vector:
+    def _note_position(self, bounds: Bounds, position: Position) -> Vector:
         """Return the position in the local frame; note a jump since the last one."""
-        here, before = bounds.local(position), self._seen
+        here, before, telemetry = bounds.local(position), self._seen, self._telemetry
         if before is not None and before[0] is position:
             return before[1]
-        self._seen = position, here, now
-        if before is None or now - before[2] > STALE_AFTER:
+        self._seen = position, here, telemetry.moment()
+        if before is None or self._seen[2].at - before[2].at > STALE_AFTER:
             return here
-        speed = hypot(*self._telemetry.velocity)
+        speed = hypot(*telemetry.velocity)
         moved = dist(here, before[1])
-        explained = (speed if isfinite(speed) else 0.0) * to_seconds(now - before[2]) + JUMP_M
+        explained = (speed if isfinite(speed) else 0.0) * to_seconds(telemetry.elapsed(before[2])) + JUMP_M
         if moved > explained:
             self.jumped_m = moved
             if self._path is not None:

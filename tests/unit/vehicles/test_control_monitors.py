@@ -102,6 +102,16 @@ def test_what_its_velocity_explains_is_no_jump() -> None:
         assert drone.track.jumped_m == 0.0
 
 
+def test_the_way_of_a_vehicle_that_is_thrice_as_fast_is_no_jump() -> None:
+    drone = Reported()
+    drone.track.stay(BOUNDS)
+    for step in range(80):
+        drone.seen.update_clock(3 * drone.kernel.now())
+        drone.at(0.0, 9.0 * step, speed=30.0)
+        drone.track.check("go", drone.kernel.now(), BOUNDS)
+        assert step < 60 or drone.track.jumped_m == 0.0  # the clocks are compared by then
+
+
 def test_a_target_of_another_station_ends_it() -> None:
     drone = Reported()
     drone.track.stay(BOUNDS)
