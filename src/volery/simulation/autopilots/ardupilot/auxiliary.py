@@ -16,7 +16,7 @@ from volery.simulation.autopilots.ardupilot.camera import picture_by_switch
 from volery.simulation.autopilots.ardupilot.estimator_sources import SOURCES_OPTION, switch_sources
 from volery.simulation.autopilots.ardupilot.fence import enable_fence
 from volery.simulation.autopilots.ardupilot.landing_gear import switch_gear
-from volery.simulation.autopilots.ardupilot.mission import mission_grew
+from volery.simulation.autopilots.ardupilot.mission import mission_grew, path_jerk
 from volery.simulation.autopilots.ardupilot.modes import (
     INFO,
     NOTICE,
@@ -226,7 +226,7 @@ def _zigzag(vehicle: Vehicle, position: int) -> None:
     if not isinstance(manoeuvre, ZigZag):
         return
     if position:
-        manoeuvre.choose("B" if position > 0 else "A")
+        manoeuvre.choose("B" if position > 0 else "A", path_jerk(vehicle))
     else:
         manoeuvre.let_pilot_fly()
 

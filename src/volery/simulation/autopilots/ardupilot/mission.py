@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import dist, isinf, isnan
 
-from volery.base.elementary import cbrt
 from volery.base.time import from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot.camera import DIGICAM_CONTROL, TRIGGER_DISTANCE, act_on_camera
 from volery.simulation.autopilots.ardupilot.commands import HIGHEST, SET_REVERSE, change_speed, turn_to
@@ -26,7 +25,7 @@ from volery.simulation.autopilots.ardupilot.winch import DO_WINCH, act_on_winch
 from volery.simulation.autopilots.manoeuvres.manual_flight import HoldPlace
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Leg, MissionRules, copter_leg
 from volery.simulation.autopilots.manoeuvres.rover_driving import Stand
-from volery.simulation.autopilots.manoeuvres.to_point import ToPoint
+from volery.simulation.autopilots.manoeuvres.to_point import ToPoint, quarter_time
 from volery.simulation.autopilots.mavlink.messages import EPOCH_US, finite
 from volery.simulation.autopilots.onboard_mission import (
     CHANGE_SPEED,
@@ -253,14 +252,17 @@ def leg_of_copter(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
     return leg
 
 
+def path_jerk(vehicle: Vehicle) -> float:
+    """Return the jerk of ways between waypoints [m/s^3]."""
+    return max(LEAST_JERK, vehicle.parameters["WPNAV_JERK"])
+
+
 def _not_before(leg: Leg, vehicle: Vehicle, length: float) -> Leg:
     """Return a leg that takes at least the time for its *length* [m] from rest to rest within WPNAV_JERK.
 
-    A waypoint within the waypoint radius takes a moment, too, as ArduCopter's path of limited jerk does: four
-    equal parts of constant jerk.
+    A waypoint within the waypoint radius takes a moment, too, as ArduCopter's path of limited jerk does.
     """
-    jerk = max(LEAST_JERK, vehicle.parameters["WPNAV_JERK"])
-    earliest = vehicle.kernel.now() + from_seconds(4.0 * cbrt(length / (2.0 * jerk)))
+    earliest = vehicle.kernel.now() + from_seconds(4.0 * quarter_time(length, path_jerk(vehicle)))
     done = leg.done
     return replace(leg, done=lambda: vehicle.kernel.now() >= earliest and done())
 

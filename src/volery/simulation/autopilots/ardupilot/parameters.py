@@ -227,7 +227,7 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "PLDP_SPEED_DN": "rate of descent to put down a load; 0: LAND_SPEED",
         "TKOFF_RPM_MIN": "rotor speed below which a copter does not take off; 0: it always may",
         "TKOFF_RPM_MAX": "rotor speed above which it does not; 0: any",
-        "WPNAV_JERK": "time that a waypoint within the waypoint radius takes",
+        "WPNAV_JERK": "time that a waypoint within the waypoint radius takes; speed of the ways of ZIGZAG",
         **{f"SIM_SHOVE_{axis}": "acceleration by a force from outside" for axis in "XYZ"},
         "SIM_SHOVE_TIME": "time for which that force acts; 0 again when it has ended",
         "SURFTRAK_MODE": "1: modes by hand keep the height above the ground by the range finder",

@@ -6,7 +6,7 @@ from math import dist, hypot, sqrt
 
 from mypy_extensions import mypyc_attr
 
-from volery.base.elementary import atan2
+from volery.base.elementary import atan2, cbrt
 from volery.base.frames import Vector
 from volery.base.time import Ns
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
@@ -66,6 +66,18 @@ def stopping_point(position: Vector, velocity: Vector, accel: float, accel_z: fl
         position[1] + east * share,
         position[2] + (fall if down > 0.0 else -fall),
     )
+
+
+def quarter_time(length: float, jerk: float) -> float:
+    """Return a quarter of the time [s] for a way from rest to rest: four equal parts of constant jerk.
+
+    ArduCopter flies the ways of its modes with waypoints so, where they are short (SCurve).
+
+    Args:
+        length: Length of the way [m].
+        jerk: Jerk [m/s^3].
+    """
+    return cbrt(length / (2.0 * jerk))
 
 
 def direction_of_flight(vehicle: Vehicle) -> float | None:

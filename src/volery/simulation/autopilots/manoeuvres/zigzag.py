@@ -6,9 +6,11 @@ B, and the pilot flies it sideways in between.
 
 from __future__ import annotations
 
+from math import dist
+
 from volery.base.frames import Vector
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
-from volery.simulation.autopilots.manoeuvres.to_point import ToPoint
+from volery.simulation.autopilots.manoeuvres.to_point import ToPoint, quarter_time
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 INFO = 6
@@ -27,8 +29,13 @@ class ZigZag(Loiter):
         self._stored: dict[str, Vector] = {}
         self._going: ToPoint | None = None
 
-    def choose(self, name: str) -> None:
-        """Store the present position as point "A" or "B"; once both are stored, fly to the line of one."""
+    def choose(self, name: str, jerk: float) -> None:
+        """Store the present position as point "A" or "B"; once both are stored, fly to the line of one.
+
+        Args:
+            name: "A" or "B".
+            jerk: Jerk of the way to the line [m/s^3], which limits the speed that a short one reaches.
+        """
         here = self.vehicle.estimate.position
         if len(self._stored) < 2:
             self._stored[name] = here
@@ -38,6 +45,8 @@ class ZigZag(Loiter):
         if point is None:
             return
         self._going = ToPoint(self.vehicle, point)
+        quarter = quarter_time(dist(here, point), jerk)
+        self._going.speed = min(self.vehicle.tuning.speed, jerk * quarter * quarter)
         self._going.enter()
         self.target = point
         self.vehicle.send_text(INFO, f"ZigZag: moving to {name}")

@@ -66,3 +66,28 @@ def test_the_pilot_ends_a_flight_to_a_line(station: Any) -> None:
     rig.run(8.0)
     assert rig.texts()[-1] == "ZigZag: manual control"
     assert rig.vehicle.estimate.position[1] > 3.0
+
+
+@pytest.mark.parametrize(("jerk", "slowest", "fastest"), [(1.0, 4.5, 5.9), (8.0, 6.2, 8.0)])
+def test_the_jerk_of_waypoints_limits_the_speed_to_a_near_line(
+    station: Any, jerk: float, slowest: float, fastest: float
+) -> None:
+    """Some 23 m: with a jerk of 1 m/s^3 the path of ArduCopter has 5.1 m/s in its middle."""
+    rig = station(parameters={"RC8_OPTION": 61, "WPNAV_JERK": jerk})
+    sticks = rig.vehicle.rc.transmitter
+    sticks[7] = 1500
+    in_the_air(rig, ZIGZAG)
+    sticks[7], sticks[0] = 1100, 1700
+    rig.run_until(lambda: rig.vehicle.estimate.position[1] > 17.0, within=20.0)
+    sticks[7], sticks[0] = 1500, 1500
+    rig.run(6.0)
+    sticks[7] = 1900
+    rig.run(0.5)
+    sticks[7] = 1500
+    rig.run(0.5)
+    sticks[7] = 1100
+    speeds: list[float] = []
+    for _ in range(80):
+        rig.run(0.1)
+        speeds.append(-rig.vehicle.estimate.velocity[1])
+    assert slowest < max(speeds) < fastest
