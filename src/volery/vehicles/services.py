@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from volery.base.errors import UsageError
+from volery.base.errors import CapabilityError, UsageError
 from volery.base.time import Ns
 
 
@@ -139,3 +139,67 @@ class Services(Protocol):
 
     def send_corrections(self, message: bytes) -> None:
         """Send one RTCM message to the GPS receivers. It is not acknowledged."""
+
+
+class PartialServices:
+    """``Services`` of a vehicle whose protocol carries few of them: what is not overridden is not offered.
+
+    Every method raises ``CapabilityError``.
+
+    Args:
+        name: The vehicle's name.
+        why: What the protocol offers, for the error.
+    """
+
+    files = None
+    home_first = False
+    sender = None
+
+    def __init__(self, name: str, why: str) -> None:
+        self._name, self._why = name, why
+
+    def _unsupported(self, what: str) -> CapabilityError:
+        return CapabilityError(f"{self._name}: {what}: {self._why}")
+
+    def parameter_name(self, name: str) -> str:
+        """See ``Services``."""
+        raise self._unsupported(f"the parameter {name}")
+
+    def read_parameter(self, name: str) -> Parameter:
+        """See ``Services``."""
+        raise self._unsupported(f"read the parameter {name}")
+
+    def read_parameters(self) -> dict[str, Parameter]:
+        """See ``Services``."""
+        raise self._unsupported("read its parameters")
+
+    def write_parameter(self, name: str, value: float) -> Parameter:
+        """See ``Services``."""
+        raise self._unsupported(f"set the parameter {name}")
+
+    def download_items(self, kind: int) -> list[Item]:
+        """See ``Services``."""
+        raise self._unsupported("read a plan on board")
+
+    def upload_items(self, kind: int, items: Sequence[Item]) -> None:
+        """See ``Services``."""
+        raise self._unsupported("store a plan on board")
+
+    def command(self, asked: str, command: str, *parameters: float, within: Ns = 0) -> None:
+        """See ``Services``."""
+        raise self._unsupported(asked)
+
+    def list_logs(self) -> list[LogEntry]:
+        """See ``Services``."""
+        raise self._unsupported("list its logs")
+
+    def read_log(self, entry: LogEntry, offset: int, count: int) -> bytes:
+        """See ``Services``."""
+        raise self._unsupported("read a log")
+
+    def end_log_transfer(self) -> None:
+        """Do nothing: there is no transfer."""
+
+    def send_corrections(self, message: bytes) -> None:
+        """See ``Services``."""
+        raise self._unsupported("RTK corrections")

@@ -9,22 +9,26 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from math import isnan
 
-from volery.base.errors import CapabilityError, NotArrived, Refused
+from volery.base.errors import NotArrived, Refused
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.ros.graph import ServiceError
 from volery.ros.messages.dji_constants import GIMBAL_PITCHES
 from volery.vehicles.drivers.dji.backend import DjiBackend
 from volery.vehicles.drivers.dji.node_interfaces import ServiceRequest
-from volery.vehicles.services import Item, LogEntry, Parameter
+from volery.vehicles.services import Item, PartialServices
 
 ANSWERED_WITHIN: Ns = 10 * S
 AGAIN: Ns = 2 * S
 TRIES = 3
 NEAR_DEG = 2.0
+_OFFER = (
+    "the SDK node of a DJI offers gimbal and camera only; "
+    "an ArduPilot or PX4 offers it, over MAVLink or MAVROS"
+)
 
 
-class DjiServices:
+class DjiServices(PartialServices):
     """``Services`` of one aircraft: gimbal and camera.
 
     Args:
@@ -32,14 +36,10 @@ class DjiServices:
         backend: the aircraft.
     """
 
-    home_first = False
-    files = None
-    sender = None
-
     def __init__(self, kernel: Kernel, backend: DjiBackend) -> None:
+        super().__init__(backend.telemetry.name, _OFFER)
         self._kernel = kernel
         self._backend = backend
-        self._name = backend.telemetry.name
         self._commands: Mapping[str, Callable[[str, Sequence[float]], None]] = {
             "MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW": self._point,
             "MAV_CMD_IMAGE_START_CAPTURE": self._take_picture,
@@ -88,49 +88,6 @@ class DjiServices:
         if not response.result:
             raise Refused(self._name, asked, refusal)
 
-    # -- what the node does not offer
-
-    def _unsupported(self, what: str) -> CapabilityError:
-        return CapabilityError(
-            f"{self._name}: {what}: the SDK node of a DJI offers gimbal and camera only; "
-            "an ArduPilot or PX4 offers it, over MAVLink or MAVROS"
-        )
-
-    def parameter_name(self, name: str) -> str:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported(f"the parameter {name}")
-
-    def read_parameter(self, name: str) -> Parameter:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported(f"read the parameter {name}")
-
-    def read_parameters(self) -> dict[str, Parameter]:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported("read its parameters")
-
-    def write_parameter(self, name: str, value: float) -> Parameter:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported(f"set the parameter {name}")
-
-    def download_items(self, kind: int) -> list[Item]:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported("read a plan on board")
-
     def upload_items(self, kind: int, items: Sequence[Item]) -> None:
         """Raise ``CapabilityError``: ``upload_mission()`` uploads missions."""
         raise self._unsupported("store a plan on board (upload_mission() stores a mission)")
-
-    def list_logs(self) -> list[LogEntry]:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported("list its logs")
-
-    def read_log(self, entry: LogEntry, offset: int, count: int) -> bytes:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported("read a log")
-
-    def end_log_transfer(self) -> None:
-        """Do nothing: there is no transfer."""
-
-    def send_corrections(self, message: bytes) -> None:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported("RTK corrections")

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isclose, nan
 
-from volery.base.errors import CapabilityError, NotArrived, Refused
+from volery.base.errors import NotArrived, Refused
 from volery.base.time import MS, Ns
 from volery.kernel.api import Action, Kernel
 from volery.links.paparazzi_aircraft import Setting
 from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
 from volery.vehicles.drivers.paparazzi.decoder import AUTO2, KILL_THROTTLE, MODE
-from volery.vehicles.services import Item, LogEntry, Parameter
+from volery.vehicles.services import Parameter, PartialServices
 
 AGAIN: Ns = 800 * MS
 TRIES = 8
@@ -27,7 +27,7 @@ REAL32 = 9
 OWN = (AUTO2, KILL_THROTTLE, MODE)
 
 
-class PaparazziServices:
+class PaparazziServices(PartialServices):
     """``Services`` of one aircraft: its settings.
 
     Args:
@@ -35,14 +35,10 @@ class PaparazziServices:
         backend: the aircraft.
     """
 
-    home_first = False
-    files = None
-    sender = None
-
     def __init__(self, kernel: Kernel, backend: PaparazziBackend) -> None:
+        super().__init__(backend.telemetry.name, "Paparazzi has no messages for it")
         self._kernel = kernel
         self._backend = backend
-        self._name = backend.telemetry.name
         self._own = {backend.aircraft.setting(name).number for name in OWN}
 
     def parameter_name(self, name: str) -> str:
@@ -119,35 +115,3 @@ class PaparazziServices:
         if setting.number not in decoder.values:
             raise NotArrived(self._name, asked, "no value of it arrived")
         raise Refused(self._name, asked, f"the aircraft keeps {decoder.values[setting.number][1]:g}")
-
-    # -- what there is no message for
-
-    def _unsupported(self, what: str) -> CapabilityError:
-        return CapabilityError(f"{self._name}: {what}: Paparazzi has no messages for it")
-
-    def download_items(self, kind: int) -> list[Item]:
-        """Raise ``CapabilityError``: a flight plan is compiled into the aircraft."""
-        raise self._unsupported("read a plan on board")
-
-    def upload_items(self, kind: int, items: Sequence[Item]) -> None:
-        """Raise ``CapabilityError``: a flight plan is compiled into the aircraft."""
-        raise self._unsupported("store a plan on board")
-
-    def command(self, asked: str, command: str, *parameters: float, within: Ns = 0) -> None:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported(asked)
-
-    def list_logs(self) -> list[LogEntry]:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported("list its logs")
-
-    def read_log(self, entry: LogEntry, offset: int, count: int) -> bytes:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported("read a log")
-
-    def end_log_transfer(self) -> None:
-        """Do nothing: there is no transfer."""
-
-    def send_corrections(self, message: bytes) -> None:
-        """Raise ``CapabilityError``."""
-        raise self._unsupported("RTK corrections")
