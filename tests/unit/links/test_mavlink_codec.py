@@ -93,7 +93,7 @@ UNKNOWN_V1 = bytes((0xFE, 3, 0, 1, 1, 145))
 
 def test_noise_that_looks_like_mavlink_1_is_no_frame() -> None:
     parser = MavlinkParser()
-    noise = UNKNOWN_V1 + bytes(11)
+    noise = UNKNOWN_V1 + bytes(11) + bytes((0xFE, 0xFE, 0, 1, 1, 145)) + bytes(11)
     assert len(parser.feed(noise + BEAT)) == 1
     received = parser.statistics
     assert (received.unknown, received.garbage, received.octets) == (0, len(noise), len(noise) + len(BEAT))
