@@ -1,13 +1,13 @@
 """The five-line mission phase by phase: simulated against flown by the real firmware in its own simulator.
 
-The reference is what was recorded of ArduCopter 4.5.6 (SITL), PX4 1.14 (SIH, mean of 51 flights) and
+The reference is what was recorded of ArduCopter 4.5.6 (SITL), PX4 1.14 (SIH, mean of 90 flights) and
 Paparazzi after v6.2 (NPS, `ardrone2`, mean of four), with the same mission file and without wind. The ratio
 is simulated over recorded; PX4's is the mean of as many seeds as flights, with the noise of SIH's sensors. A
 figure marked with * is more than 5 per cent (times) or 10 per cent (others) off. PX4's figures are computed
 from the traces that `volery fly` wrote of the firmware, by the functions that compute the simulated ones. The
 simulated PX4 is recorded as a real vehicle is: armed since the heartbeat that says so, up to a second late.
 SIH starts its random numbers with the same seed, so flights that begin at the same time after the boot have
-the same noise; each of the 51 had a seed of its own.
+the same noise; each of the 90 had a seed of its own.
 
     python bench/phases.py [ardupilot|px4|paparazzi ...]
 """
@@ -18,9 +18,9 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from math import dist, hypot, isnan, nan
+from math import dist, hypot, isnan, nan, sqrt
 from pathlib import Path
-from statistics import fmean
+from statistics import fmean, stdev
 from typing import NamedTuple
 
 import volery
@@ -37,9 +37,13 @@ SENSORS = {"px4": "sih", "paparazzi": "rtk"}
 """The sensors nearest to those of the simulator that was recorded: SIH's noise is larger than that of the
 default ones, the receiver of NPS has none."""
 
-FLIGHTS = {"px4": tuple(range(1, 52))}
-"""Seeds of the flights whose mean is compared; else one flight with seed 1. The noise of SIH's sensors makes
-times of single flights differ by some seconds."""
+FLIGHTS = {"px4": 90, "paparazzi": 4}
+"""Number of flights whose mean is compared, with seeds from 1 on: as many as were recorded; else one. Noise
+of SIH's sensors makes times of single flights differ by some seconds."""
+
+ARMED_AFTER_S = {"px4": 16.2}
+"""Time from the start of the firmware to arming in the recorded flights, where the estimator still converges:
+EKF2 aligns its heading after 6.5 s. Other vehicles have been running."""
 
 OBSERVED = frozenset({"px4"})
 """Autopilots whose recorded figures were computed from what telemetry reported."""
@@ -60,6 +64,8 @@ class Figure(NamedTuple):
     recorded: float
     of: Callable[[Flight], float]
     flown: Callable[[volery.Drone], None] = mission
+    error: float = nan
+    """Standard error of the recorded mean, where it is known."""
 
 
 class Compared(NamedTuple):
@@ -67,6 +73,8 @@ class Compared(NamedTuple):
 
     figure: Figure
     simulated: float
+    error: float
+    """Standard error of the simulated mean; NaN for a single flight."""
 
     @property
     def ratio(self) -> float:
@@ -94,13 +102,15 @@ class Flight:
         self, autopilot: str, seed: int = 1, flown: Callable[[volery.Drone], None] = mission
     ) -> None:
         sensors = SENSORS.get(autopilot, "consumer")
-        url = f"sim:{autopilot}?start=warm&sensors={sensors}"
+        armed_after = ARMED_AFTER_S.get(autopilot, 0.0)
+        url = f"sim:{autopilot}?start={'cold' if armed_after else 'warm'}&sensors={sensors}"
         with tempfile.TemporaryDirectory() as folder:
             observed, origin = autopilot in OBSERVED, [HOME]
 
             def recorded(drone: volery.Drone) -> None:
                 if observed:
                     drone.wait_ready()
+                    volery.sleep(armed_after - drone.kernel.now() / 1e9)
                     ObservedVehicles(drone.kernel, [drone]).sample()
                     origin.append(drone.position)
                 flown(drone)
@@ -230,23 +240,32 @@ RECORDED: Mapping[str, Sequence[Figure]] = {
         Figure("energy", "kJ", 35.0, Flight.energy),
     ),
     "px4": (
-        Figure("9.5 m up", "s", 11.49, lambda flight: flight.rises_to(NEARLY_UP_M)),
-        Figure("goal 1 within 1 m", "s", 26.85, lambda flight: flight.near(0)),
-        Figure("leg 2, from 1 m to 1 m", "s", 51.67, lambda flight: flight.near(1) - flight.near(0)),
-        Figure("leg 3, from 1 m to 1 m", "s", 31.70, lambda flight: flight.near(2) - flight.near(1)),
+        Figure("9.5 m up", "s", 11.47, lambda flight: flight.rises_to(NEARLY_UP_M), error=0.07),
+        Figure("goal 1 within 1 m", "s", 26.86, lambda flight: flight.near(0), error=0.13),
+        Figure(
+            "leg 2, from 1 m to 1 m", "s", 51.30, lambda flight: flight.near(1) - flight.near(0), error=0.29
+        ),
+        Figure(
+            "leg 3, from 1 m to 1 m", "s", 31.81, lambda flight: flight.near(2) - flight.near(1), error=0.21
+        ),
         Figure(
             "goal 3 within 1 m to LAND",
             "s",
-            9.03,
+            8.81,
             lambda flight: (flight.operation("land").start - flight.states[0].at) / 1e9 - flight.near(2),
+            error=0.21,
         ),
-        Figure("LAND to disarmed", "s", 27.98, lambda flight: flight.duration("land")),
-        Figure("armed in all", "s", 147.23, Flight.armed),
-        Figure("distance", "m", 406.7, Flight.distance),
-        Figure("greatest speed", "m/s", 5.09, lambda flight: flight.greatest(speed)),
-        Figure("greatest climb", "m/s", 2.73, lambda flight: flight.greatest(lambda one: one.vz)),
-        Figure("greatest sink", "m/s", 1.55, lambda flight: flight.greatest(lambda one: -one.vz)),
-        Figure("overshoot", "m", 0.93, Flight.overshoot),
+        Figure("LAND to disarmed", "s", 27.84, lambda flight: flight.duration("land"), error=0.2),
+        Figure("armed in all", "s", 146.62, Flight.armed, error=0.41),
+        Figure("distance", "m", 406.6, Flight.distance, error=0.11),
+        Figure("greatest speed", "m/s", 5.1, lambda flight: flight.greatest(speed), error=0.006),
+        Figure(
+            "greatest climb", "m/s", 2.74, lambda flight: flight.greatest(lambda one: one.vz), error=0.009
+        ),
+        Figure(
+            "greatest sink", "m/s", 1.55, lambda flight: flight.greatest(lambda one: -one.vz), error=0.007
+        ),
+        Figure("overshoot", "m", 0.92, Flight.overshoot, error=0.014),
     ),
     "paparazzi": (
         *legs(25.25, 50.75, 25.57),
@@ -268,14 +287,19 @@ def compare(autopilot: str) -> Sequence[Compared]:
     flights = {
         (flown, seed): Flight(autopilot, seed, flown)
         for flown in dict.fromkeys(figure.flown for figure in figures)
-        for seed in FLIGHTS.get(autopilot, (1,))
+        for seed in range(1, FLIGHTS.get(autopilot, 1) + 1)
     }
-    return [
-        Compared(
-            figure, fmean(figure.of(one) for (flown, _), one in flights.items() if flown is figure.flown)
-        )
-        for figure in figures
-    ]
+    compared = []
+    for figure in figures:
+        seen = [figure.of(one) for (flown, _), one in flights.items() if flown is figure.flown]
+        error = stdev(seen) / sqrt(len(seen)) if len(seen) > 1 else nan
+        compared.append(Compared(figure, fmean(seen), error))
+    return compared
+
+
+def with_error(text: str, error: float) -> str:
+    """Return a mean with its standard error, if that is known."""
+    return text if isnan(error) else f"{text} ± {error:.2f}"
 
 
 def main() -> None:
@@ -285,9 +309,10 @@ def main() -> None:
     for autopilot in options.parse_args().autopilots:
         print(f"| {autopilot} | recorded | simulated | ratio |\n|---|---|---|---|")
         for one in compare(autopilot):
-            name, unit, recorded, _, _ = one.figure
+            name, unit, recorded, error = (*one.figure[:3], one.figure.error)
             print(
-                f"| {name} | {recorded:g} {unit} | {one.simulated:.2f} {unit} | "
+                f"| {name} | {with_error(f'{recorded:g}', error)} {unit} | "
+                f"{with_error(f'{one.simulated:.2f}', one.error)} {unit} | "
                 f"{one.ratio:.2f}{'' if one.within else ' *'} |"
             )
         print()

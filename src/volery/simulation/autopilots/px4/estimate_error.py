@@ -6,11 +6,12 @@ noisier than EKF2_GYR_NOISE and EKF2_ACC_NOISE say, so the filter corrects too l
 heading and biases wander. The attitude loops hold the estimated tilt and heading, so what is wrong with them
 pushes the aircraft the other way.
 
-The error moves like EKF2's own states, and is corrected by fixes, by the heading of the magnetometer and by
-the barometer with gains from their covariance, which is advanced as well: a wrong bias of the accelerometer
-looks like a tilt until the nose turns; a wrong heading counts as much as the aircraft accelerates, and so
-does a wrong tilt along the vertical, because the accelerometer measures the drag, too. The field is steep, so
-a wrong tilt is a wrong heading, too. The output predictor passes the errors on with a lag.
+The error moves like EKF2's own states, and is corrected by fixes, by the magnetometer (``field_fusion``) and
+by the barometer with gains from their covariance, which is advanced as well: a wrong bias of the
+accelerometer looks like a tilt until the nose turns; a wrong heading counts as much as the aircraft
+accelerates, and so does a wrong tilt along the vertical, because the accelerometer measures the drag, too.
+Noise about the forward axis turns the heading of an aircraft that leans. The output predictor passes the
+errors on with a lag.
 """
 
 from __future__ import annotations
@@ -22,8 +23,28 @@ import numpy as np
 
 from volery.base.elementary import sine_cosine
 from volery.base.numeric_code import numeric
+from volery.simulation.autopilots.px4.error_states import (
+    BIAS,
+    CLIMB,
+    EKF_STEP,
+    FIELD,
+    HEIGHT,
+    PLACE,
+    SPEED,
+    SPIN,
+    TILT,
+    TURN,
+    WEIGHT,
+    YAW,
+    correct,
+    grow,
+    used_states,
+    variance_at,
+)
+from volery.simulation.autopilots.px4.field_fusion import FIELD_PERIOD, use_field, watch_motion
 from volery.simulation.autopilots.px4.loop_state import (
     A_ACCEL,
+    A_AXES,
     A_FLOWN,
     A_THRUST,
     E_BARO,
@@ -48,19 +69,8 @@ AHEAD: Final = 0.08
 """Time by which EKF2's state is older than a fix of SIH's receiver, which has no delay [s]. For the 110 ms of
 EKF2_GPS_DELAY in steps of EKF2_PREDICT_US (10 ms) EKF2 keeps 11 steps, which are ``EKF_STEP`` long in SIH."""
 
-FIX_PERIOD, FIELD_PERIOD = 0.125, 1.0 / 15.0
-"""Time between two fixes of PX4's simulated receiver; between two readings of the magnetometer,
-SENS_MAG_RATE [s]."""
-
-PLACE, SPEED, TILT, TURN, BIAS, YAW, SPIN = 0, 2, 4, 6, 8, 10, 11
-HEIGHT, CLIMB, WEIGHT = 12, 13, 14
-"""Numbers of the states: position and velocity [m, m/s], the acceleration that a wrong tilt appears as
-[m/s^2], north and east; its rate by a wrong bias of the gyroscope [m/s^3], a wrong bias of the accelerometer
-[m/s^2], forward and right; heading [rad] and its rate by a wrong bias [rad/s]; position and velocity down
-[m, m/s], a wrong bias of the accelerometer there [m/s^2]."""
-
-EKF_STEP: Final = 0.008
-"""Step of EKF2 [s]: two samples of SIH."""
+FIX_PERIOD: Final = 0.125
+"""Time between two fixes of PX4's simulated receiver [s]."""
 
 ACCEL_GROWTH: Final = 0.35 * 0.35 * EKF_STEP
 TILT_GROWTH: Final = (GRAVITY * 0.015) * (GRAVITY * 0.015) * EKF_STEP
@@ -74,21 +84,19 @@ steps of ``EKF_STEP``."""
 LEAST_BIAS: Final = 5e-8 / (EKF_STEP * EKF_STEP)
 """Variance of a bias of the accelerometer below which EKF2 lets none fall [m^2/s^4]."""
 
-FIX_SPEED_VARIANCE, FIX_PLACE_VARIANCE, YAW_VARIANCE = 0.25, 0.81, 0.09
+FIX_SPEED_VARIANCE, FIX_PLACE_VARIANCE = 0.25, 0.81
 FIX_CLIMB_VARIANCE, FIX_HEIGHT_VARIANCE, BARO_VARIANCE = 0.5625, 3.1684, 12.25
-"""What the receiver states of itself; EKF2_HEAD_NOISE, EKF2_BARO_NOISE."""
+"""What the receiver states of itself; EKF2_BARO_NOISE."""
 
 BARO_BIAS_SHARE: Final = 0.0095
 """Share of the barometer's innovation that EKF2 takes for its bias (0.13 m/s over the root of 1 Hz)."""
 
-FIRST = (0.25, 0.25, 0.25, 0.25, 0.96, 0.96, 0.96, 0.96, 0.04, 0.04, 0.09, 0.01, 1.0, 0.25, 0.04)
-"""Variances with which the filter starts: of the tilt EKF2_ANGERR_INIT (0.1 rad), of biases EKF2_GBIAS_INIT
-(0.1 rad/s) and EKF2_ABIAS_INIT (0.2 m/s^2). What a bias of the accelerometer is and what a tilt, it learns
-when the nose turns."""
-
-SLANT_EAST, SLANT_NORTH = 0.289, -0.036
-"""Error of the heading by that of the tilt, as an acceleration to the east and to the north [rad s^2/m]: the
-field where it was recorded is 0.179, 0.023, 0.514 gauss north, east, down."""
+FIRST_DEVIATIONS = (
+    *(0.9, 0.9, 0.5, 0.5, GRAVITY * 0.0356, GRAVITY * 0.0356, GRAVITY * 0.0114, GRAVITY * 0.0114),
+    *(0.25, 0.25, 0.0942, 0.00622, 0.603, 0.75, 0.202),
+)
+"""Deviations of the states when EKF2 has aligned its heading and begins with fixes, as it logs them; mean of
+51 starts. What a bias of the accelerometer is and what a tilt, it learns when the nose turns."""
 
 PREDICTOR_LAG: Final = 0.25
 """EKF2_TAU_VEL, EKF2_TAU_POS [s]."""
@@ -105,9 +113,11 @@ FIX_VELOCITY_NOISE = (0.06, 0.077, 0.158)
 FIX_POSITION_NOISE = (0.2, 0.2, 0.5)
 """Deviation of a fix of PX4's simulated receiver, north, east, down [m/s, m]; from ``SensorGpsSim::Run``."""
 
-FIELD_NOISE, BARO_NOISE = 0.061, 0.09
-"""Deviation of the heading of a reading of PX4's simulated magnetometer [rad]: 0.02 gauss, 3.3 samples; of
-its barometer [m]: 1 Pa."""
+BARO_NOISE: Final = 0.09
+"""Deviation of a reading of PX4's simulated barometer [m]: 1 Pa."""
+
+LEAST_LIFT: Final = 0.1 * GRAVITY
+"""Least upward acceleration of the thrust that its direction is taken from [m/s^2]."""
 
 WALK: Final = sqrt(IMU_PERIOD * SUBSTEP)
 """Deviation of the integral of white samples over a step, over that of a sample [s]."""
@@ -115,9 +125,9 @@ WALK: Final = sqrt(IMU_PERIOD * SUBSTEP)
 
 @numeric
 def start_errors(row: Array) -> None:
-    """Start with variances to which the filter settles, and without errors."""
-    for number in range(STATES):
-        row[E_COVARIANCE + number * STATES + number] = FIRST[number]
+    """Start with the variances of a filter that has aligned its heading, and without errors."""
+    for number in range(FIELD):
+        row[variance_at(number)] = FIRST_DEVIATIONS[number] * FIRST_DEVIATIONS[number]
 
 
 @numeric
@@ -129,23 +139,32 @@ def _noise(row: Array, key: np.uint64, stream: int, step: int) -> float:
 @numeric
 def step_errors(row: Array, key: np.uint64, step: int) -> None:
     """Advance the errors of all states by one step."""
-    along = WALK * ACCEL_NOISE[0] * _noise(row, key, 0, step)
-    across = WALK * ACCEL_NOISE[1] * _noise(row, key, 1, step)
-    down = WALK * ACCEL_NOISE[2] * _noise(row, key, 2, step)
-    pitch = GRAVITY * PITCH_NOISE * WALK * _noise(row, key, 3, step)
-    roll = GRAVITY * ROLL_NOISE * WALK * _noise(row, key, 4, step)
-    yaw = YAW_NOISE * WALK * _noise(row, key, 12, step)
-    s, c = sine_cosine(row[I_HEADING])
-    kick_north, kick_east = c * along - s * across, s * along + c * across
-    north, east, upright = _accel_errors(row, s, c)
-    _advance_states(row, s, c, (north, east, upright))
-    row[E_STATES + SPEED] += kick_north
-    row[E_STATES + SPEED + 1] += kick_east
-    row[E_STATES + TILT] += c * pitch - s * roll
-    row[E_STATES + TILT + 1] += s * pitch + c * roll
-    row[E_STATES + YAW] += yaw
-    row[E_STATES + CLIMB] += down
-    _advance_covariance(row, s, c)
+    _turn_axes(row)
+    kick = _to_earth(
+        row,
+        WALK * ACCEL_NOISE[0] * _noise(row, key, 0, step),
+        WALK * ACCEL_NOISE[1] * _noise(row, key, 1, step),
+        WALK * ACCEL_NOISE[2] * _noise(row, key, 2, step),
+    )
+    tilted = _turned(
+        row,
+        GRAVITY * PITCH_NOISE * WALK * _noise(row, key, 3, step),
+        GRAVITY * ROLL_NOISE * WALK * _noise(row, key, 4, step),
+        YAW_NOISE * WALK * _noise(row, key, 12, step),
+    )
+    accel = _accel_errors(row)
+    _advance_states(row, accel)
+    for axis in range(2):
+        row[E_STATES + SPEED + axis] += kick[axis]
+        row[E_STATES + TILT + axis] += tilted[axis]
+    row[E_STATES + YAW] += tilted[2]
+    row[E_STATES + CLIMB] += kick[2]
+    _advance_covariance(row)
+    watch_motion(
+        row,
+        row[A_ACCEL] + accel[0] + kick[0] / SUBSTEP,
+        row[A_ACCEL + 1] + accel[1] + kick[1] / SUBSTEP,
+    )
     row[E_FIX] += SUBSTEP
     if row[E_FIX] >= FIX_PERIOD:
         row[E_FIX] -= FIX_PERIOD
@@ -153,117 +172,134 @@ def step_errors(row: Array, key: np.uint64, step: int) -> None:
     row[E_FIELD] += SUBSTEP
     if row[E_FIELD] >= FIELD_PERIOD:
         row[E_FIELD] -= FIELD_PERIOD
-        _use_field_and_baro(row, key, step)
+        draws = _noise(row, key, 13, step), _noise(row, key, 15, step), _noise(row, key, 16, step)
+        use_field(row, draws)
+        _use_baro(row, key, step)
     row[E_PUSH] = row[E_STATES + TILT] - row[E_STATES + YAW] * row[A_THRUST + 1]
     row[E_PUSH + 1] = row[E_STATES + TILT + 1] + row[E_STATES + YAW] * row[A_THRUST]
     lift = row[A_THRUST] * row[E_STATES + TILT] + row[A_THRUST + 1] * row[E_STATES + TILT + 1]
     row[E_PUSH + 2] = lift / GRAVITY
-    _predict(row, 0, north, kick_north, row[E_STATES + PLACE], row[E_STATES + SPEED])
-    _predict(row, 1, east, kick_east, row[E_STATES + PLACE + 1], row[E_STATES + SPEED + 1])
-    _predict(row, 2, upright, down, row[E_STATES + HEIGHT], row[E_STATES + CLIMB])
+    _predict(row, 0, accel[0], kick[0], row[E_STATES + PLACE], row[E_STATES + SPEED])
+    _predict(row, 1, accel[1], kick[1], row[E_STATES + PLACE + 1], row[E_STATES + SPEED + 1])
+    _predict(row, 2, accel[2], kick[2], row[E_STATES + HEIGHT], row[E_STATES + CLIMB])
 
 
 @numeric
-def _accel_errors(row: Array, s: float, c: float) -> tuple[float, float, float]:
+def _turn_axes(row: Array) -> None:
+    """Turn the body's axes: down against the thrust, forward to the heading."""
+    north, east, down = -row[A_THRUST], -row[A_THRUST + 1], max(LEAST_LIFT, GRAVITY - row[A_THRUST + 2])
+    length = sqrt(north * north + east * east + down * down)
+    north, east, down = north / length, east / length, down / length
+    s, c = sine_cosine(row[I_HEADING])
+    ahead = -(c * north + s * east) / down
+    level = 1.0 / sqrt(1.0 + ahead * ahead)
+    c, s, ahead = c * level, s * level, ahead * level
+    row[A_AXES], row[A_AXES + 3], row[A_AXES + 6] = c, s, ahead
+    row[A_AXES + 1] = east * ahead - down * s
+    row[A_AXES + 4] = down * c - north * ahead
+    row[A_AXES + 7] = north * s - east * c
+    row[A_AXES + 2], row[A_AXES + 5], row[A_AXES + 8] = north, east, down
+
+
+@numeric
+def _to_earth(row: Array, ahead: float, aside: float, below: float) -> tuple[float, float, float]:
+    """Return a vector of the body's axes, north, east, down."""
+    return (
+        row[A_AXES] * ahead + row[A_AXES + 1] * aside + row[A_AXES + 2] * below,
+        row[A_AXES + 3] * ahead + row[A_AXES + 4] * aside + row[A_AXES + 5] * below,
+        row[A_AXES + 6] * ahead + row[A_AXES + 7] * aside + row[A_AXES + 8] * below,
+    )
+
+
+@numeric
+def _turned(row: Array, ahead: float, aside: float, yaw: float) -> tuple[float, float, float]:
+    """Return a turn about the body's axes as turn of the tilt, north and east, and of the heading.
+
+    The heading turns with the forward axis, too, while the aircraft leans.
+
+    Args:
+        row: The state.
+        ahead: The acceleration forward that the turn of the tilt appears as [m/s^2].
+        aside: Likewise to the right.
+        yaw: Turn about the axis down [rad].
+    """
+    return (
+        row[A_AXES + 4] * ahead - row[A_AXES + 3] * aside - GRAVITY * row[A_AXES + 5] * yaw,
+        row[A_AXES] * aside - row[A_AXES + 1] * ahead + GRAVITY * row[A_AXES + 2] * yaw,
+        (row[A_AXES + 6] * aside - row[A_AXES + 7] * ahead) / GRAVITY + row[A_AXES + 8] * yaw,
+    )
+
+
+@numeric
+def _accel_errors(row: Array) -> tuple[float, float, float]:
     """Return the error of the acceleration that EKF2 sees, north, east, down [m/s^2].
 
     A wrong attitude turns the measured specific force, which is the acceleration less gravity; a wrong bias
     is fixed to the body, which leans as the thrust does.
     """
-    ahead, aside, yaw = row[E_STATES + BIAS], row[E_STATES + BIAS + 1], row[E_STATES + YAW]
-    lean_north, lean_east = row[A_THRUST] / GRAVITY, row[A_THRUST + 1] / GRAVITY
-    weight = row[E_STATES + WEIGHT]
-    bias_north, bias_east = c * ahead - s * aside, s * ahead + c * aside
-    tilt_north, tilt_east = row[E_STATES + TILT], row[E_STATES + TILT + 1]
-    down = weight + lean_north * bias_north + lean_east * bias_east
-    down += (row[A_ACCEL] * tilt_north + row[A_ACCEL + 1] * tilt_east) / GRAVITY
-    north = tilt_north + bias_north - weight * lean_north - yaw * row[A_ACCEL + 1]
-    east = tilt_east + bias_east - weight * lean_east + yaw * row[A_ACCEL]
-    return north, east, down
+    bias = _to_earth(row, row[E_STATES + BIAS], row[E_STATES + BIAS + 1], row[E_STATES + WEIGHT])
+    yaw, north, east = row[E_STATES + YAW], row[E_STATES + TILT], row[E_STATES + TILT + 1]
+    down = (row[A_ACCEL] * north + row[A_ACCEL + 1] * east) / GRAVITY
+    return (
+        north + bias[0] - yaw * row[A_ACCEL + 1],
+        east + bias[1] + yaw * row[A_ACCEL],
+        down + bias[2],
+    )
 
 
 @numeric
-def _advance_states(row: Array, s: float, c: float, accel: tuple[float, float, float]) -> None:
+def _advance_states(row: Array, accel: tuple[float, float, float]) -> None:
     """Advance the errors under errors of the acceleration, north, east, down."""
-    ahead, aside = row[E_STATES + TURN], row[E_STATES + TURN + 1]
-    row[E_STATES + PLACE] += SUBSTEP * row[E_STATES + SPEED]
-    row[E_STATES + PLACE + 1] += SUBSTEP * row[E_STATES + SPEED + 1]
-    row[E_STATES + SPEED] += SUBSTEP * accel[0]
-    row[E_STATES + SPEED + 1] += SUBSTEP * accel[1]
-    row[E_STATES + TILT] += SUBSTEP * (c * ahead - s * aside)
-    row[E_STATES + TILT + 1] += SUBSTEP * (s * ahead + c * aside)
-    row[E_STATES + YAW] += SUBSTEP * row[E_STATES + SPIN]
+    turn = _turned(row, row[E_STATES + TURN], row[E_STATES + TURN + 1], row[E_STATES + SPIN])
+    for axis in range(2):
+        row[E_STATES + PLACE + axis] += SUBSTEP * row[E_STATES + SPEED + axis]
+        row[E_STATES + SPEED + axis] += SUBSTEP * accel[axis]
+        row[E_STATES + TILT + axis] += SUBSTEP * turn[axis]
+    row[E_STATES + YAW] += SUBSTEP * turn[2]
     row[E_STATES + HEIGHT] += SUBSTEP * row[E_STATES + CLIMB]
     row[E_STATES + CLIMB] += SUBSTEP * accel[2]
 
 
 @numeric
-def _advance_covariance(row: Array, s: float, c: float) -> None:
+def _advance_covariance(row: Array) -> None:
     """Advance the covariance of the states, first by rows, then by columns."""
-    lean_north, lean_east = row[A_THRUST] / GRAVITY, row[A_THRUST + 1] / GRAVITY
     push_north, push_east = row[A_ACCEL], row[A_ACCEL + 1]
+    states = used_states(row)
     for along, across in ((STATES, 1), (1, STATES)):
-        for other in range(STATES):
+        for other in range(states):
             at = E_COVARIANCE + other * across
-            ahead, aside = row[at + BIAS * along], row[at + (BIAS + 1) * along]
-            turn, turn_aside = row[at + TURN * along], row[at + (TURN + 1) * along]
-            yaw, weight = row[at + YAW * along], row[at + WEIGHT * along]
-            bias_north, bias_east = c * ahead - s * aside, s * ahead + c * aside
-            north, east = row[at + TILT * along], row[at + (TILT + 1) * along]
-            down = weight + lean_north * bias_north + lean_east * bias_east
-            down += (push_north * north + push_east * east) / GRAVITY
-            north += bias_north - weight * lean_north - yaw * push_east
-            east += bias_east - weight * lean_east + yaw * push_north
+            yaw, north, east = (
+                row[at + YAW * along],
+                row[at + TILT * along],
+                row[at + (TILT + 1) * along],
+            )
+            bias = _to_earth(
+                row, row[at + BIAS * along], row[at + (BIAS + 1) * along], row[at + WEIGHT * along]
+            )
+            turn = _turned(row, row[at + TURN * along], row[at + (TURN + 1) * along], row[at + SPIN * along])
             row[at + PLACE * along] += SUBSTEP * row[at + SPEED * along]
             row[at + (PLACE + 1) * along] += SUBSTEP * row[at + (SPEED + 1) * along]
             row[at + HEIGHT * along] += SUBSTEP * row[at + CLIMB * along]
-            row[at + CLIMB * along] += SUBSTEP * down
-            row[at + SPEED * along] += SUBSTEP * north
-            row[at + (SPEED + 1) * along] += SUBSTEP * east
-            row[at + TILT * along] += SUBSTEP * (c * turn - s * turn_aside)
-            row[at + (TILT + 1) * along] += SUBSTEP * (s * turn + c * turn_aside)
-            row[at + YAW * along] += SUBSTEP * row[at + SPIN * along]
+            down = (push_north * north + push_east * east) / GRAVITY
+            row[at + CLIMB * along] += SUBSTEP * (down + bias[2])
+            row[at + SPEED * along] += SUBSTEP * (north + bias[0] - yaw * push_east)
+            row[at + (SPEED + 1) * along] += SUBSTEP * (east + bias[1] + yaw * push_north)
+            row[at + TILT * along] += SUBSTEP * turn[0]
+            row[at + (TILT + 1) * along] += SUBSTEP * turn[1]
+            row[at + YAW * along] += SUBSTEP * turn[2]
     for axis in range(2):
-        _grow(row, SPEED + axis, ACCEL_GROWTH)
-        _grow(row, TILT + axis, TILT_GROWTH)
-        _grow(row, TURN + axis, TURN_GROWTH)
-        _grow(row, BIAS + axis, BIAS_GROWTH)
-    _grow(row, YAW, YAW_GROWTH)
-    _grow(row, SPIN, SPIN_GROWTH)
-    _grow(row, CLIMB, ACCEL_GROWTH)
-    _grow(row, WEIGHT, BIAS_GROWTH)
-    largest = max(row[_at(BIAS)], row[_at(BIAS + 1)], row[_at(WEIGHT)])
+        grow(row, SPEED + axis, ACCEL_GROWTH)
+        grow(row, TILT + axis, TILT_GROWTH)
+        grow(row, TURN + axis, TURN_GROWTH)
+        grow(row, BIAS + axis, BIAS_GROWTH)
+    grow(row, YAW, YAW_GROWTH)
+    grow(row, SPIN, SPIN_GROWTH)
+    grow(row, CLIMB, ACCEL_GROWTH)
+    grow(row, WEIGHT, BIAS_GROWTH)
+    largest = max(row[variance_at(BIAS)], row[variance_at(BIAS + 1)], row[variance_at(WEIGHT)])
     least = max(LEAST_BIAS, 0.01 * largest)
     for number in (BIAS, BIAS + 1, WEIGHT):
-        row[_at(number)] = max(row[_at(number)], least)
-
-
-@numeric
-def _at(number: int) -> int:
-    """Return the column of the variance of a state."""
-    return E_COVARIANCE + number * (STATES + 1)
-
-
-@numeric
-def _grow(row: Array, number: int, rate: float) -> None:
-    row[_at(number)] += SUBSTEP * rate
-
-
-@numeric
-def _correct(row: Array, measured: int, innovation: float, variance: float) -> None:
-    """Correct the states by the innovation of one of them, and their covariance."""
-    first = E_COVARIANCE + measured * STATES
-    total = row[first + measured] + variance
-    for number in range(STATES):
-        row[E_STATES + number] += row[first + number] / total * innovation
-    for number in range(STATES):
-        if number != measured:
-            gain = row[first + number] / total
-            for other in range(STATES):
-                row[E_COVARIANCE + number * STATES + other] -= gain * row[first + other]
-    gain = row[first + measured] / total
-    for other in range(STATES):
-        row[first + other] -= gain * row[first + other]
+        row[variance_at(number)] = max(row[variance_at(number)], least)
 
 
 @numeric
@@ -272,27 +308,24 @@ def _use_fix(row: Array, key: np.uint64, step: int) -> None:
     for axis in range(2):
         speed = AHEAD * row[A_ACCEL + axis]
         speed += FIX_VELOCITY_NOISE[axis] * _noise(row, key, 5 + axis, step)
-        _correct(row, SPEED + axis, speed - row[E_STATES + SPEED + axis], FIX_SPEED_VARIANCE)
+        correct(row, SPEED + axis, speed - row[E_STATES + SPEED + axis], FIX_SPEED_VARIANCE)
     for axis in range(2):
         place = AHEAD * row[A_FLOWN + axis]
         place += FIX_POSITION_NOISE[axis] * _noise(row, key, 8 + axis, step)
-        _correct(row, PLACE + axis, place - row[E_STATES + PLACE + axis], FIX_PLACE_VARIANCE)
+        correct(row, PLACE + axis, place - row[E_STATES + PLACE + axis], FIX_PLACE_VARIANCE)
     climb = AHEAD * row[A_ACCEL + 2] + FIX_VELOCITY_NOISE[2] * _noise(row, key, 7, step)
-    _correct(row, CLIMB, climb - row[E_STATES + CLIMB], FIX_CLIMB_VARIANCE)
+    correct(row, CLIMB, climb - row[E_STATES + CLIMB], FIX_CLIMB_VARIANCE)
     height = AHEAD * row[A_FLOWN + 2] + FIX_POSITION_NOISE[2] * _noise(row, key, 10, step)
-    _correct(row, HEIGHT, height - row[E_STATES + HEIGHT], FIX_HEIGHT_VARIANCE)
+    correct(row, HEIGHT, height - row[E_STATES + HEIGHT], FIX_HEIGHT_VARIANCE)
 
 
 @numeric
-def _use_field_and_baro(row: Array, key: np.uint64, step: int) -> None:
-    """Correct by the heading of the magnetometer and by the barometer."""
-    heading = SLANT_NORTH * row[E_STATES + TILT] + SLANT_EAST * row[E_STATES + TILT + 1]
-    heading += FIELD_NOISE * _noise(row, key, 13, step)
-    _correct(row, YAW, heading - row[E_STATES + YAW], YAW_VARIANCE)
+def _use_baro(row: Array, key: np.uint64, step: int) -> None:
+    """Correct by the barometer."""
     height = BARO_NOISE * _noise(row, key, 14, step) - row[E_STATES + HEIGHT]
     innovation = height - row[E_BARO]
     row[E_BARO] += BARO_BIAS_SHARE * innovation
-    _correct(row, HEIGHT, innovation, BARO_VARIANCE)
+    correct(row, HEIGHT, innovation, BARO_VARIANCE)
 
 
 @numeric

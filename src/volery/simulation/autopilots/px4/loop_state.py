@@ -15,7 +15,7 @@ SUBSTEP: Final = 0.02
 
 GRAVITY: Final = 9.80665
 
-STATES: Final = 15
+STATES: Final = 21
 """Number of the states of EKF2 whose errors matter."""
 
 DIRECT, TO_POINT, SINK, REST = 0.0, 1.0, 2.0, 3.0
@@ -36,6 +36,7 @@ I_DOWN = _add("I_DOWN", "m/s", "limit of its descent; SINK: the descent")
 I_LIFT = _add("I_LIFT", "m/s^2", "limit of its acceleration while it climbs")
 I_AT_VEHICLE = _add("I_AT_VEHICLE", "1", "1: its height is that of the vehicle, as while taking off")
 I_HEADING = _add("I_HEADING", "rad", "heading of the vehicle")
+I_TURN = _add("I_TURN", "rad/s", "its rate")
 I_NOISY = _add("I_NOISY", "1", "1: the sensors have the noise of SIH's")
 
 # --- limits and gains ---
@@ -67,6 +68,7 @@ A_FLOWN = _add("A_FLOWN", "m/s", "true velocity", 3, NED)
 A_ACCEL = _add("A_ACCEL", "m/s^2", "true acceleration", 3, NED)
 A_SLOPE = _add("A_SLOPE", "m/s^2", "derivative of the stated velocity, filtered", 3, NED)
 A_THRUST = _add("A_THRUST", "m/s^2", "acceleration by the thrust; down: gravity included", 3, NED)
+A_AXES = _add("A_AXES", "1", "of its forward, right and down axis what points north, then east, down", 9)
 A_INTEGRAL = _add("A_INTEGRAL", "m/s^2", "integral of the velocity loop", 3, NED)
 A_GROUNDED = _add("A_GROUNDED", "1", "1 while it stands on the ground")
 A_RAMP = _add("A_RAMP", "1", "progress of the take-off's ramp; 1 in flight")
@@ -86,5 +88,21 @@ E_VELOCITY = _add("E_VELOCITY", "m/s", "error of the stated velocity", 3, NED)
 E_RATE = _add("E_RATE", "m/s", "rate of the stated position's error", 3, NED)
 E_FIX = _add("E_FIX", "s", "time since the last fix")
 E_FIELD = _add("E_FIELD", "s", "time since the last readings of magnetometer and barometer")
+E_PRODUCT = _add("E_PRODUCT", "SI", "covariance times what a measurement sees", STATES)
+E_SEEN = _add("E_SEEN", "SI", "how much a measurement sees of each state", STATES)
+
+# --- fusion of the magnetometer ---
+E_FUSES_FIELD = _add("E_FUSES_FIELD", "1", "1: its three axes are fused; 0: its heading")
+E_ALIGNED = _add("E_ALIGNED", "1", "1: the heading has been set anew in this flight")
+E_KNOWS_DECLINATION = _add("E_KNOWS_DECLINATION", "1", "1: the declination has been fused since then")
+E_KEPT = _add("E_KEPT", "gauss^2", "variances of field and bias, covariance of north and east, kept", 7)
+E_FILTERED = _add("E_FILTERED", "gauss", "filtered readings, less Earth's field", 3, NED)
+E_GROUND = _add("E_GROUND", "m", "height of the ground, downwards")
+E_ACCEL = _add("E_ACCEL", "m/s^2", "filtered acceleration as EKF2 sees it, north, east", 2)
+E_ACCELERATES = _add("E_ACCELERATES", "1", "1: that is large")
+E_TURN = _add("E_TURN", "rad/s", "filtered turn rate")
+E_TURNED = _add("E_TURNED", "rad", "turn since the last reading")
+E_TURNS = _add("E_TURNS", "1", "1: it turns")
+E_STEADY_FOR = _add("E_STEADY_FOR", "s", "time since it last turned or accelerated")
 
 LOOP_COLUMNS: Final = LOOP_LAYOUT.end

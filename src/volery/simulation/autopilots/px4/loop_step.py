@@ -33,7 +33,15 @@ def _compose(digest: str) -> Callable[..., int]:
 
 _SOURCES = tuple(
     Path(__file__).with_name(name)
-    for name in ("loop_step.py", "loop_state.py", "trajectory.py", "airframe_loops.py", "estimate_error.py")
+    for name in (
+        "loop_step.py",
+        "loop_state.py",
+        "trajectory.py",
+        "airframe_loops.py",
+        "error_states.py",
+        "field_fusion.py",
+        "estimate_error.py",
+    )
 )
 fly_px4_loops = NumericCode(
     "fly_px4_loops", _compose, (*world_sources(), *_SOURCES), ("float64[::1]", "uint64[::1]", "int64[::1]")

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
-from math import dist, inf
+from math import dist, inf, remainder, tau
 from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -44,6 +44,7 @@ from volery.simulation.autopilots.px4.loop_state import (
     I_POSITION,
     I_SPEED,
     I_TASK,
+    I_TURN,
     LOOP_COLUMNS,
     REST,
     SINK,
@@ -76,9 +77,13 @@ a vehicle without the thrust to climb loses in a few seconds."""
 
 STEP: Final[Ns] = from_seconds(SUBSTEP)
 
-SETTLING = 10**9, 10**9 + 1500
-"""Numbers of the substeps before the first flight in which the errors of the estimate grow: 30 s. They are
-no other's, because the noise of a step follows from its number."""
+ALIGNED_AFTER, SETTLED_AFTER = from_seconds(6.5), from_seconds(66.5)
+"""Times after the boot at which EKF2 has aligned its heading, as logged of 51 starts, and from which on its
+variances hardly change any more."""
+
+SETTLING = 10**9
+"""Number of the first of the substeps before the first flight, in which the errors of the estimate grow. The
+noise of a step follows from its number, so no other step has these."""
 
 STRETCH = 1.2
 """Share of the automatic modes' descent that the loops may fly to correct a height."""
@@ -140,6 +145,16 @@ def gains_of(vehicle: Vehicle, automatic: bool) -> tuple[float, ...]:
         p["MPC_TKO_RAMP_T"],
         p["MPC_THR_HOVER"],
     )
+
+
+def settling(uptime: Ns) -> tuple[int, int]:
+    """Return the bounds of the substeps for which EKF2 has run before a first flight.
+
+    Args:
+        uptime: Time since the boot [ns].
+    """
+    run = min(uptime, SETTLED_AFTER) - ALIGNED_AFTER
+    return SETTLING, SETTLING + max(0, run) // STEP
 
 
 def _by_axis(plane: float, height: float) -> Vector:
@@ -247,6 +262,7 @@ class PositionLoops:
         row, grounded = self._row, self._vehicle.estimate.landed
         self._trajectory, self._tuned = False, None
         self._state[: LOOP_COLUMNS if self._advance is None else E_STATES] = 0.0
+        row[I_HEADING] = self._vehicle.estimate.attitude[2]
         if self._advance is None:
             self._advance = fly_px4_loops.bind(self._state, self._vehicle.flight.keys, self._span)
             start_errors(self._state)
@@ -267,10 +283,10 @@ class PositionLoops:
         _write(row, A_HOVER, (HOVER, HOVER, FIRST_VARIANCE))
 
     def _settle(self, advance: Action) -> None:
-        """Let the errors of the estimate become those of a filter that has been running."""
+        """Let the errors of the estimate become those of a filter that has run since the boot."""
         row = self._row
-        row[I_TASK], row[I_NOISY], row[I_HEADING] = REST, 1.0, self._vehicle.estimate.attitude[2]
-        self._span[:] = SETTLING
+        row[I_TASK], row[I_NOISY] = REST, 1.0
+        self._span[:] = settling(self._vehicle.uptime())
         advance()
 
     def _fly(self, steps: int, yaw: float | None, yaw_rate: float | None) -> None:
@@ -278,6 +294,8 @@ class PositionLoops:
         vehicle, row = self._vehicle, self._row
         estimate = vehicle.estimate
         here, velocity = estimate.position, estimate.velocity
+        turned = remainder(estimate.attitude[2] - row[I_HEADING], tau)
+        row[I_TURN] = turned / (steps * SUBSTEP) if steps else 0.0
         row[I_HEADING], row[I_NOISY] = estimate.attitude[2], float(self._noisy)
         tuned = vehicle.parameters.changes, row[I_TASK] != DIRECT
         if tuned != self._tuned:

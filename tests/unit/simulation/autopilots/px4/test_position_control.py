@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from volery import Drone, Options, Position, fly, sleep
+from volery.base.time import from_seconds
 from volery.simulation.autopilots.px4.airframe_loops import HOVER, step_loops
-from volery.simulation.autopilots.px4.estimate_error import TILT, start_errors
+from volery.simulation.autopilots.px4.error_states import TILT
+from volery.simulation.autopilots.px4.estimate_error import start_errors
 from volery.simulation.autopilots.px4.loop_state import (
     A_FLOWN,
     A_GROUNDED,
@@ -40,7 +42,7 @@ from volery.simulation.autopilots.px4.loop_state import (
     T_VELOCITY,
     TO_POINT,
 )
-from volery.simulation.autopilots.px4.position_control import gains_of
+from volery.simulation.autopilots.px4.position_control import gains_of, settling
 from volery.simulation.autopilots.px4.trajectory import move_trajectory, shortest, straight, within
 from volery.simulation.world.state_layout import Array
 
@@ -93,6 +95,12 @@ def cruising(seconds: float) -> Array:
     for step in range(round(seconds / SUBSTEP)):
         step_loops(row, KEY, step)
     return row
+
+
+@pytest.mark.parametrize(("uptime", "seconds"), [(3.0, 0.0), (16.5, 10.0), (66.5, 60.0), (4000.0, 60.0)])
+def test_the_estimate_has_run_since_the_heading_was_aligned(uptime: float, seconds: float) -> None:
+    first, end = settling(from_seconds(uptime))
+    assert (end - first) * SUBSTEP == pytest.approx(seconds)
 
 
 def test_a_fast_limit_keeps_the_direction() -> None:
