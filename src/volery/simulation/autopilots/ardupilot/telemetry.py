@@ -158,9 +158,9 @@ def gps_raw(vehicle: Vehicle) -> Fields:
 def _gps_without_fix(vehicle: Vehicle) -> Fields:
     truth = vehicle.flight.truth()
     east, north, _ = truth.velocity
-    since = round(vehicle.estimate.gps_age * 1e6)
+    last = boot_us(vehicle) - round(vehicle.estimate.gps_age * 1e6)
     return {
-        "time_usec": boot_us(vehicle) - since if _has_fix(vehicle) else 0,
+        "time_usec": max(0, last) if _has_fix(vehicle) else 0,  # the age may be that of another boot
         "fix_type": 1,
         "satellites_visible": 3,
         **_gps_position(*vehicle.flight.frame.from_enu(truth.position)),

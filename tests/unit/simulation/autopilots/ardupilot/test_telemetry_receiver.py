@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-GPS_RAW_INT, REQUEST_MESSAGE, SET_MODE, GUIDED, ARM, TAKE_OFF = 24, 512, 176, 4, 400, 22
+GPS_RAW_INT, REQUEST_MESSAGE, SET_MODE, GUIDED, ARM, TAKE_OFF, REBOOT = 24, 512, 176, 4, 400, 22, 246
 ONE_METRE = 90  # in 1e-7 degrees of latitude
 
 
@@ -45,3 +45,12 @@ def test_a_receiver_that_boots_has_had_no_fix(station: Any) -> None:
     found = receiver(rig)
     assert (found["fix_type"], found["time_usec"]) == (1, 0)
     assert abs(found["lat"] - 460_000_000) < ONE_METRE
+
+
+def test_without_a_fix_since_the_boot_its_time_is_none(station: Any) -> None:
+    rig = station(parameters={"SIM_GPS_DISABLE": 1.0, "ARMING_CHECK": 0.0})
+    rig.run(30.0)
+    rig.command(REBOOT, 1)
+    rig.run(10.0)
+    found = receiver(rig)
+    assert (found["fix_type"], found["time_usec"]) == (1, 0)
