@@ -142,9 +142,9 @@ class Services(Protocol):
 
 
 class PartialServices:
-    """``Services`` of a vehicle whose protocol carries few of them: what is not overridden is not offered.
+    """``Services`` of a vehicle whose protocol carries few of them.
 
-    Every method raises ``CapabilityError``.
+    What a subclass does not override raises ``CapabilityError``.
 
     Args:
         name: The vehicle's name.

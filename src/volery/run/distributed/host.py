@@ -1,9 +1,9 @@
 """The process of one component of a deployed system: what the generated entry points of a package call.
 
 With ``simulated`` a run elsewhere (``volery simulate --deployed``) has the vehicles and the time: the
-component follows ``/clock``, begins with the run and ends with it, or when it is gone. Without, it runs in
-real time, begins as soon as the services that it calls are there, and lands its vehicles when it is stopped
-by a signal.
+component follows ``/clock``, begins with the run, and ends with it or when the node of the run has left the
+graph. Without, it runs in real time, begins as soon as the services that it calls are there, and lands its
+vehicles when it is stopped by a signal.
 """
 
 from __future__ import annotations
@@ -118,7 +118,10 @@ class Host(Worker):
         self._watch.start()
 
     def _watch_run(self) -> None:
-        """Send ``Ready`` until the run begins; end the component when the run has left the graph."""
+        """Send ``Ready`` until the run begins; end the component when the run's node has left the graph.
+
+        On ROS 1 the master keeps the node of a run that was killed; there roslaunch ends the component.
+        """
         while not self._begun.wait(REPEAT_S):
             self._to_run.send(pipe.Ready())
         absent = 0
