@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from package_map import package_map
 from typer.main import get_command
 
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.cost import load_catalogue
 from volery.drawing.deployment import deployment_svg
 from volery.drawing.page import page
@@ -124,7 +124,7 @@ def command_line() -> str:
         for name, below in getattr(command, "commands", {}).items():
             describe(below, f"{path} {name}")
 
-    describe(get_command(app), "volery")
+    describe(get_command(application()), "volery")
     return "\n".join(lines) + "\n"
 
 

@@ -2,7 +2,8 @@
 
 A file in ``volery.cli.commands`` declares its commands with a ``Commands`` object, and one more for each
 group such as ``volery bag``. ``volery.cli.main`` finds all of them, so a new command changes one file. They
-import the library inside their functions: ``volery --help`` imports all of them and must stay quick.
+import the library inside their functions: ``volery --help`` imports all of them and must stay quick. A file
+with the name of its command or group, such as ``fly.py``, is the only one that this command imports.
 
 A command is a function of an ``Output`` and of its options, and returns its exit status. The options that
 control the output (``--quiet``, ``--json``, ``--debug``) are added here. Options that several commands share
@@ -66,6 +67,10 @@ class Commands:
             return function
 
         return register
+
+    def has(self, word: str) -> bool:
+        """Return whether *word* is the name of the group, or of a command at the top level."""
+        return word == self.group or (not self.group and word in dict(self.members))
 
     def add_to(self, app: typer.Typer) -> None:
         """Add the commands to *app*."""

@@ -9,9 +9,11 @@ since a misspelt default would have no effect without a word.
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import typer
 from typer.core import TyperGroup, TyperOption
 
 from volery.base.errors import UsageError, did_you_mean
@@ -20,11 +22,11 @@ from volery.base.files import read_text
 OWN_FILE, SHARED_FILE = "volery.toml", "pyproject.toml"
 
 
-def read_defaults(group: TyperGroup, folder: Path) -> dict[str, Any]:
+def read_defaults(application: Callable[[], typer.Typer], folder: Path) -> dict[str, Any]:
     """Return the defaults for click's ``default_map``; empty where no file states any.
 
     Args:
-        group: The application, against which names are checked.
+        application: Returns the application, against which the names in a file are checked.
         folder: Where to look first.
 
     Raises:
@@ -36,7 +38,7 @@ def read_defaults(group: TyperGroup, folder: Path) -> dict[str, Any]:
             if file.is_file():
                 stated = _tables(file)
                 if stated is not None:
-                    return _of_group(group, stated, f"{file}: ")
+                    return _of_group(typer.main.get_group(application()), stated, f"{file}: ")
     return {}
 
 

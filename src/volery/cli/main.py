@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import cache
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -39,7 +40,14 @@ def _root(
     """Model a drone-and-rover service once, simulate it, fly it, and know what it costs the computers."""
 
 
-def _application() -> typer.Typer:
+@cache
+def application(word: str = "") -> typer.Typer:
+    """Return the application.
+
+    Args:
+        word: First word of the command line. If a file of commands has that name and declares a command of
+            that name, the other files are not imported.
+    """
     app = typer.Typer(
         callback=_root,
         no_args_is_help=True,
@@ -47,23 +55,28 @@ def _application() -> typer.Typer:
         rich_markup_mode="markdown",
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    modules = [import_module(f"{commands.__name__}.{one.name}") for one in iter_modules(commands.__path__)]
-    found = [one for module in modules for one in vars(module).values() if isinstance(one, Commands)]
+    files = [one.name for one in iter_modules(commands.__path__)]
+    found = [one for file in files if file == word for one in _declared(file)]
+    if not any(one.has(word) for one in found):
+        found = [one for file in files for one in _declared(file)]
     for one in sorted(found, key=lambda one: SECTIONS.index(one.section)):
         one.add_to(app)
     return app
 
 
-app = _application()
+def _declared(file: str) -> list[Commands]:
+    """Return what a file of commands declares."""
+    module = import_module(f"{commands.__name__}.{file}")
+    return [one for one in vars(module).values() if isinstance(one, Commands)]
 
 
 @seldom_collected()
 def main() -> None:
     """Run the command line of this process, with the defaults of the nearest configuration file."""
-    command = typer.main.get_group(app)
+    command = typer.main.get_group(application(next(iter(sys.argv[1:]), "")))
     defaults: dict[str, Any] = {}
     try:
-        defaults = read_defaults(command, Path.cwd())
+        defaults = read_defaults(application, Path.cwd())
     except (UsageError, OSError) as error:
         Output().complain(f"volery: {error}")
         if not INFORMATION.intersection(sys.argv[1:]) and sys.argv[1:]:

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from volery.calibration.host_machine import this_machine
 from volery.calibration.ros.call_costs import Round, Sample
 from volery.calibration.ros.campaign import CampaignLog, Conditions
-from volery.cli.main import app
+from volery.cli.main import application
 
 pytestmark = pytest.mark.integration
 
@@ -94,6 +94,6 @@ def test_the_sequence_runs_as_printed(ros: None, tmp_path: Path, monkeypatch: py
     assert [command[0] for command in commands] == ["calibrate", "calibrate", "calibrate", "validate"]
     for command in commands:
         short = next(more for start, more in QUICK.items() if " ".join(command).startswith(start))
-        done = CliRunner().invoke(app, [one.replace("MODEL", ".") for one in command] + short)
+        done = CliRunner().invoke(application(), [one.replace("MODEL", ".") for one in command] + short)
         assert done.exit_code in (0, 1), (command, done.output)  # 1: not as certain as required
     assert "talker" in done.output

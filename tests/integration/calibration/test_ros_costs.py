@@ -20,7 +20,7 @@ from volery.calibration.node_processes import measurement_session
 from volery.calibration.ros.call_costs import CallCost, call_costs
 from volery.calibration.ros.campaign import Conditions, ros_law, write_entry
 from volery.calibration.ros.probe_environment import Pace, own_master, probe_setup
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.cost import load_catalogue
 from volery.model.system_loader import load
 from volery.run.assembly.model_checks import vocabulary
@@ -129,7 +129,7 @@ def model(folder: Path, text: str) -> Path:
 
 def test_a_models_nodes_are_measured_and_estimated(ros: None, tmp_path: Path) -> None:
     command = ["validate", str(model(tmp_path, MODEL)), "--runs", "1", "--seconds", "1", "--json"]
-    done = CliRunner().invoke(app, command)
+    done = CliRunner().invoke(application(), command)
     [talker] = json.loads(done.stdout)["nodes"]
     assert (talker["node"], talker["language"]) == ("talker", "rospy")
     assert talker["calls"]["publish"] == pytest.approx(20, abs=1)

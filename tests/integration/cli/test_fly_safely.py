@@ -13,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.base.position import AboveHome
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.run.assembly.fences import read_fence
 
 FAILED, BAD = 1, 2
@@ -61,7 +61,7 @@ def fly(tmp_path: Path) -> Any:
             path.write_text(fence if isinstance(fence, str) else json.dumps(fence))
             given += ["--fence", str(path)]
         arguments = ["fly", str(file), "--on", url, "--out", str(tmp_path / "run"), *given]
-        result = CliRunner().invoke(app, arguments)
+        result = CliRunner().invoke(application(), arguments)
         assert "Traceback" not in result.output + result.stderr
         said = " ".join((result.output + result.stderr).split())
         return result.exit_code, said

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from volery.cli.main import app
+from volery.cli.main import application
 
 pytestmark = pytest.mark.integration
 
@@ -61,7 +61,7 @@ def test_everything_that_does_not_fit_is_found_at_once(tmp_path: Path) -> None:
     (tmp_path / "model.yaml").write_text(MODEL, encoding="utf-8")
     for name, text in FILES.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    done = CliRunner().invoke(app, ["model", "check", str(tmp_path)])
+    done = CliRunner().invoke(application(), ["model", "check", str(tmp_path)])
     said = " ".join(done.output.split())
     assert done.exit_code == 2, said
     assert "Right:" not in said

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from rigs.requirements import lacking
 from volery.base.errors import UsageError
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.cost import load_catalogue
 from volery.cost.native import CompilerError, compile_program, instrument
 from volery.cost.native.compilation import llvm_toolchain
@@ -141,7 +141,9 @@ def test_kept_costs_are_used_for_the_same_code(source, tmp_path):
 
 
 def test_the_command_gives_time_and_energy(source):
-    done = CliRunner().invoke(app, ["cost", str(source), "--on", "rpi4-cortex-a72@600MHz", "--json"])
+    done = CliRunner().invoke(
+        application(), ["cost", str(source), "--on", "rpi4-cortex-a72@600MHz", "--json"]
+    )
     report = json.loads(done.stdout)
     assert done.exit_code == 0
     assert report["time_s"] == pytest.approx(report["cycles"] / 600e6)

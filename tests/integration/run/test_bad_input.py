@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.base.errors import UsageError
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.run.fly import fly
 
 pytestmark = pytest.mark.integration
@@ -88,7 +88,7 @@ ON_THE_WAY = {
 
 
 def volery(*arguments):
-    done = CliRunner().invoke(app, [str(one) for one in arguments])
+    done = CliRunner().invoke(application(), [str(one) for one in arguments])
     said = " ".join(done.output.split())
     assert "Traceback" not in said
     assert done.exception is None or isinstance(done.exception, SystemExit)

@@ -1,41 +1,34 @@
 """Defaults from a file: which file, which names, and what the command line still decides."""
 
 import pytest
-import typer
-from typer.core import TyperGroup
 from typer.testing import CliRunner
 
 from volery.base.errors import UsageError
 from volery.cli.configuration import read_defaults
-from volery.cli.main import app, main
+from volery.cli.main import application, main
 
 
-@pytest.fixture
-def command() -> TyperGroup:
-    return typer.main.get_group(app)
-
-
-def test_the_nearest_file_counts_and_its_names_are_those_of_the_options(tmp_path, command):
+def test_the_nearest_file_counts_and_its_names_are_those_of_the_options(tmp_path):
     below = tmp_path / "service" / "models"
     below.mkdir(parents=True)
     (tmp_path / "volery.toml").write_text("[simulate]\nseed = 3\n")
-    assert read_defaults(command, below) == {"simulate": {"seed": "3"}}
+    assert read_defaults(application, below) == {"simulate": {"seed": "3"}}
     (tmp_path / "service" / "pyproject.toml").write_text("[project]\nname = 'x'\n")
-    assert read_defaults(command, below) == {"simulate": {"seed": "3"}}
+    assert read_defaults(application, below) == {"simulate": {"seed": "3"}}
     (tmp_path / "service" / "pyproject.toml").write_text(
         "[tool.volery.simulate]\nfidelity = 'times'\nset = ['run.duration=1 min']\nquiet = true\n"
     )
     assert (
-        read_defaults(command, below)
+        read_defaults(application, below)
         == {"simulate": {"fidelity": "times", "overrides": ["run.duration=1 min"], "quiet": True}}
-        or read_defaults(command, below)["simulate"]["fidelity"] == "times"
+        or read_defaults(application, below)["simulate"]["fidelity"] == "times"
     )
     (below / "volery.toml").write_text("")
-    assert read_defaults(command, below) == {}
+    assert read_defaults(application, below) == {}
 
 
-def test_without_a_file_there_are_no_defaults(tmp_path, command):
-    assert read_defaults(command, tmp_path) == {}
+def test_without_a_file_there_are_no_defaults(tmp_path):
+    assert read_defaults(application, tmp_path) == {}
 
 
 @pytest.mark.parametrize(
@@ -52,21 +45,21 @@ def test_without_a_file_there_are_no_defaults(tmp_path, command):
         ("[simulate\n", "cannot be read"),
     ],
 )
-def test_what_is_wrong_is_named_with_its_file(tmp_path, command, text, said):
+def test_what_is_wrong_is_named_with_its_file(tmp_path, text, said):
     (tmp_path / "volery.toml").write_text(text)
     with pytest.raises(UsageError, match=said) as caught:
-        read_defaults(command, tmp_path)
+        read_defaults(application, tmp_path)
     assert str(caught.value).startswith(str(tmp_path / "volery.toml"))
 
 
-def test_the_command_line_wins_and_a_wrong_value_is_refused(tmp_path, command):
+def test_the_command_line_wins_and_a_wrong_value_is_refused(tmp_path):
     (tmp_path / "volery.toml").write_text("[simulate]\nseed = 'many'\n")
-    defaults = read_defaults(command, tmp_path)
+    defaults = read_defaults(application, tmp_path)
     nowhere = str(tmp_path / "none")
-    wrong = CliRunner().invoke(app, ["simulate", nowhere], default_map=defaults)
+    wrong = CliRunner().invoke(application(), ["simulate", nowhere], default_map=defaults)
     assert wrong.exit_code == 2
     assert "'--seed'" in wrong.output
-    right = CliRunner().invoke(app, ["simulate", nowhere, "--seed", "3"], default_map=defaults)
+    right = CliRunner().invoke(application(), ["simulate", nowhere, "--seed", "3"], default_map=defaults)
     assert "'--seed'" not in right.output
     assert "none" in right.output
 

@@ -20,12 +20,12 @@ from volery.base.errors import (
 from volery.cli.command import BAD_INPUT, FAILED, OK, exit_status
 from volery.cli.commands.first_steps import PARTS, Part, doctor, example, module, program
 from volery.cli.console import Output
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.cli.run_display import next_folder
 
 
 def run(*arguments: str):
-    return CliRunner().invoke(app, list(arguments))
+    return CliRunner().invoke(application(), list(arguments))
 
 
 def text(result) -> str:
@@ -66,9 +66,25 @@ def test_debug_shows_where(capsys):
 def test_help_is_quick_to_import():
     """The commands import what they call when they are called."""
     heavy = ("numba", "jinja2", "pydantic", "pymavlink", "rosbags", "shapely", "numpy", "matplotlib")
-    script = f"import sys, volery.cli.main; print([name for name in {heavy} if name in sys.modules])"
+    listing = f"print([name for name in {heavy} if name in sys.modules])"
+    script = f"import sys; from volery.cli.main import application; application(); {listing}"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("word", "imported"),
+    [("fly", {"fly"}), ("calibrate", {"calibrate"}), ("ros", None), ("model", None), ("--help", None)],
+)
+def test_a_command_imports_its_own_file_only(word, imported):
+    """``ros`` is the name of a file, but of no command."""
+    package = "volery.cli.commands."
+    script = (
+        f"import sys; from volery.cli.main import application; application({word!r}); print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    found = {name.removeprefix(package) for name in done.stdout.split() if name.startswith(package)}
+    assert found == imported or (imported is None and {"fly", "ros", "simulate"} < found)
 
 
 @pytest.mark.parametrize(

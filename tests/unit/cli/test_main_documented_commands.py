@@ -11,7 +11,7 @@ import click
 import pytest
 import typer
 
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.model.system_loader import load
 from volery.run.assembly.model_checks import vocabulary
 
@@ -37,7 +37,7 @@ COMMANDS = list(written())
 
 def parsed(words: list[str]) -> click.Context:
     """As the command line takes it; what it does not know raises."""
-    command, context = typer.main.get_command(app), None
+    command, context = typer.main.get_command(application()), None
     while isinstance(command, click.Group):
         context = click.Context(command, parent=context)
         name, command, words = command.resolve_command(context, words)

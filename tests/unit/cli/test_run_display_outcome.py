@@ -3,7 +3,7 @@
 import pytest
 from typer.testing import CliRunner
 
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.cli.run_display import run_folder
 
 
@@ -34,6 +34,6 @@ def test_a_folder_that_was_there_stays_though_it_is_empty(tmp_path):
 def test_a_mission_that_cannot_be_loaded_leaves_no_folder(tmp_path, monkeypatch, text):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "wrong.py").write_text(text)
-    result = CliRunner().invoke(app, ["fly", "wrong.py", "--on", "sim:ardupilot"])
+    result = CliRunner().invoke(application(), ["fly", "wrong.py", "--on", "sim:ardupilot"])
     assert result.exit_code == 2, result.output
     assert not (tmp_path / "runs").exists()

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.base.errors import UsageError
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.simulation.autopilots.ardupilot import FIRMWARE
 from volery.simulation.autopilots.autopilot import firmwares
 from volery.testing import Outcome, conformance
@@ -138,7 +138,7 @@ def test_demands() -> None:
 
 
 def run(*arguments: str) -> Any:
-    return CliRunner().invoke(app, ["conformance", *arguments])
+    return CliRunner().invoke(application(), ["conformance", *arguments])
 
 
 def test_the_command_line_reports_the_results(tmp_path: Path) -> None:

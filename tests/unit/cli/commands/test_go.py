@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from typer.testing import CliRunner
 
-from volery.cli.main import app
+from volery.cli.main import application
 
 ON = ("--on", "sim:ardupilot")
 
@@ -28,7 +28,7 @@ ON = ("--on", "sim:ardupilot")
     ],
 )
 def test_wrong_options_are_named(arguments: tuple[str, ...], said: str) -> None:
-    result = CliRunner().invoke(app, ["go", *arguments])
+    result = CliRunner().invoke(application(), ["go", *arguments])
     assert result.exit_code == 2
     assert said in result.stderr
     assert "Traceback" not in result.stderr

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from volery.cli.main import app
+from volery.cli.main import application
 
 DELIVERY = Path(__file__).parents[4] / "examples" / "delivery"
 
@@ -27,7 +27,7 @@ allocations: {only: {a: pc, b: pc}}
 
 
 def analyse(*arguments):
-    return CliRunner().invoke(app, ["model", "analyse", *map(str, arguments)])
+    return CliRunner().invoke(application(), ["model", "analyse", *map(str, arguments)])
 
 
 def test_what_the_model_leaves_open_is_named():

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from volery.cli.main import app
+from volery.cli.main import application
 
 DELIVERY = Path(__file__).parents[4] / "examples" / "delivery"
 
 
 def volery(*arguments):
-    return CliRunner().invoke(app, ["model", *map(str, arguments)])
+    return CliRunner().invoke(application(), ["model", *map(str, arguments)])
 
 
 def test_all_views_and_the_page_are_written(tmp_path):

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from typer.testing import CliRunner, Result
 
-from volery.cli.main import app
+from volery.cli.main import application
 
 
 def volery(*words: object) -> Result:
-    return CliRunner().invoke(app, [str(word) for word in words])
+    return CliRunner().invoke(application(), [str(word) for word in words])
 
 
 def test_parameters_are_saved_compared_and_set(tmp_path: Path) -> None:

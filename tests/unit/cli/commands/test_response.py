@@ -11,11 +11,11 @@ import pytest
 from typer.testing import CliRunner
 
 from rigs.flight_log_files import dataflash
-from volery.cli.main import app
+from volery.cli.main import application
 
 
 def run(*arguments: object) -> Any:
-    return CliRunner().invoke(app, ["response", *(str(one) for one in arguments)])
+    return CliRunner().invoke(application(), ["response", *(str(one) for one in arguments)])
 
 
 def turn(path: Path, lag: float) -> Path:

@@ -9,13 +9,13 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.ros import messages
 from volery.ros.messages.bags import create_bag, open_bag
 
 
 def run(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(one) for one in arguments])
+    return CliRunner().invoke(application(), [str(one) for one in arguments])
 
 
 @pytest.fixture

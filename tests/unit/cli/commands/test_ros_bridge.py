@@ -6,12 +6,12 @@ from typer.testing import CliRunner
 from volery.cli.command import BAD_INPUT
 from volery.cli.commands.ros import BridgeNotes
 from volery.cli.console import Output
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.trace.events import LinkState, Text
 
 
 def said_of(*arguments: str) -> str:
-    done = CliRunner().invoke(app, ["bridge", *arguments])
+    done = CliRunner().invoke(application(), ["bridge", *arguments])
     assert done.exit_code == BAD_INPUT
     return " ".join(done.output.split())
 

@@ -7,7 +7,7 @@ import pytest
 from rich.console import Console
 from typer.testing import CliRunner
 
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.report.html_report import recover
 from volery.report.terminal import comparison_table
 from volery.requirements.accounts import Accounts
@@ -33,7 +33,7 @@ def make_run(folder, megahertz=1500.0):
 
 
 def report(*arguments):
-    return CliRunner().invoke(app, ["report", *map(str, arguments)])
+    return CliRunner().invoke(application(), ["report", *map(str, arguments)])
 
 
 @pytest.fixture

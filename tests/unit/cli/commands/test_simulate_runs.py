@@ -5,14 +5,14 @@ import os
 
 from typer.testing import CliRunner
 
-from volery.cli.main import app
+from volery.cli.main import application
 from volery.requirements.accounts import Accounts
 from volery.requirements.record import write_record
 from volery.trace.attachments import RunSetup
 
 
 def runs(*arguments):
-    return CliRunner().invoke(app, ["runs", *map(str, arguments)])
+    return CliRunner().invoke(application(), ["runs", *map(str, arguments)])
 
 
 def made(folder, at, allocation="fast", **outcome):

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from volery.cli.commands.first_steps import example
-from volery.cli.main import app
+from volery.cli.main import application
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def starter(tmp_path):
             text = path.read_text()
             assert old in text
             path.write_text(text.replace(old, new))
-        result = CliRunner().invoke(app, ["model", "check", str(folder)])
+        result = CliRunner().invoke(application(), ["model", "check", str(folder)])
         return result.exit_code, " ".join(result.output.split())
 
     return check
