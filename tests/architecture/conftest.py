@@ -1,4 +1,4 @@
-"""The script that checks the sources, as a module."""
+"""Scripts as modules."""
 
 from __future__ import annotations
 
@@ -8,14 +8,23 @@ from types import ModuleType
 
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "scripts/check_sources.py"
+SCRIPTS = Path(__file__).parents[2] / "scripts"
 
 
-@pytest.fixture(scope="module")
-def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("check_sources", SCRIPT)
+def _loaded(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, SCRIPTS / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def script() -> ModuleType:
+    return _loaded("check_sources")
+
+
+@pytest.fixture(scope="module")
+def compiler() -> ModuleType:
+    return _loaded("compile_modules")

@@ -47,3 +47,24 @@ def test_harmless_relatives_pass(script: ModuleType) -> None:
 
 def test_no_module_that_is_compiled_has_one(script: ModuleType) -> None:
     assert list(script.compiled_modules()) == []
+
+
+@pytest.mark.parametrize(
+    ("statement", "compiled"),
+    [
+        ("LIMIT = 3  # of a list", "LIMIT: _Final = 3  # of a list"),
+        ("LIMIT: int = f()", "LIMIT: _Final[int] = f()"),
+        ("LOW, _HIGH = 1, 2.5", "LOW: _Final = 1; _HIGH: _Final = 2.5"),
+        ("NAMES = {'µ': 1}\nLIMIT = 3", "NAMES: _Final = {'µ': 1}\nLIMIT: _Final = 3"),
+        ("POINT = (1.0, 2.0)", None),
+        ("POINT: Vector = (nan, nan)", None),
+        ("LIMIT: Final = 3", None),
+        ("LIMIT = 3\nLIMIT = 4", None),
+        ("LIMIT = 3\ndef f() -> None:\n    global LIMIT", None),
+        ("T = TypeVar('T')\nlimit = 3", None),
+    ],
+)
+def test_a_constant_is_final_in_what_is_compiled(compiler, statement, compiled):
+    future = "from __future__ import annotations"
+    found = compiler.with_final_constants(f"{future}\n{statement}\n")
+    assert found == f"{future}; from typing import Final as _Final\n{compiled or statement}\n"
