@@ -62,8 +62,8 @@ def quantised(frame: Frame) -> Frame:
 
     Floats have 32 bits, strings are cut to their field, and all fields are present.
     """
-    kind = message_type(frame.name)
-    return Frame(frame.name, kind.unpack(kind.pack(frame.fields)), frame.system, frame.component)
+    fields = message_type(frame.name).quantised(frame.fields)
+    return frame if fields is frame.fields else Frame(frame.name, fields, frame.system, frame.component)
 
 
 class _Header:

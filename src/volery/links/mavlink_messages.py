@@ -162,6 +162,7 @@ class MessageType:
         self._names = tuple(field.name for field in self._fields)
         self._known = frozenset(self._names)
         self._plain = all(field.length == 0 for field in self._fields)
+        self._whole = self._plain and not any("float" in kind or "double" in kind for kind in types.values())
         several = self._plain and len(self._names) > 1
         self._values: Callable[[Any], tuple[Any, ...]] | None = itemgetter(*self._names) if several else None
         self._make_dict: Callable[..., dict[str, Any]] | None = None  # made when the first one is decoded
@@ -188,6 +189,21 @@ class MessageType:
             return self._struct.pack(*self._flat_values(fields))
         except (struct.error, OverflowError, TypeError, ValueError) as error:
             raise UsageError(f"{self.name}: a field does not fit ({error}): {dict(fields)}") from None
+
+    def quantised(self, fields: dict[str, Any]) -> dict[str, Any]:
+        """Return *fields* as they are after packing and unpacking; the same object where nothing changes.
+
+        Raises:
+            UsageError: A field does not exist or does not fit; the error names it.
+        """
+        payload = self.pack(fields)
+        if (
+            self._whole
+            and len(fields) == len(self._names)
+            and all(type(one) is int for one in fields.values())
+        ):
+            return fields
+        return self.unpack(payload)
 
     def _flat_values(self, fields: Mapping[str, Any]) -> list[Any]:
         values: list[Any] = []

@@ -354,6 +354,7 @@ class _StepRun:
         self._taken = ""  # how another station, a pilot or a failsafe has changed it
         self._stopped: VehicleError | None = None  # error returned by *check*
         self._check_due: Ns = self._began
+        self._late = False  # at the last check
         self._repeated = False
 
     def run(self) -> str:
@@ -430,10 +431,11 @@ class _StepRun:
         if not self._taken and self._stopped is None and now >= self._check_due:
             self._check_due = now + MONITOR_PERIOD
             self._stopped = self._check(self._asked, now) or self._failed()
+            self._late = self._elapsed() >= self._step.within
         return bool(self._taken) or self._stopped is not None
 
     def _over_or_late(self) -> bool:
-        return self._over() or self._elapsed() >= self._step.within
+        return self._over() or (self._late and self._elapsed() >= self._step.within)
 
     def _elapsed(self) -> Ns:
         """Return the time since the step began, ns; after five seconds on the clock that counts.

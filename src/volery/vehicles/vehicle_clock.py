@@ -31,8 +31,10 @@ class VehicleClock:
     """The autopilot's time since its boot, as last reported."""
 
     def __init__(self) -> None:
-        self._last = Moment(-1, -1)
-        self._older = self._newer = self._last
+        self._at: Ns = -1
+        self._boot: Ns = -1
+        """The last report, on both clocks."""
+        self._older = self._newer = Moment(-1, -1)
 
     def note(self, boot: Ns, now: Ns, *, fresh: bool = True) -> None:
         """Note the time since boot in a message that arrives now, unless it was overtaken on the way.
@@ -42,18 +44,18 @@ class VehicleClock:
             now: the program's time, ns.
             fresh: the message cannot have been held back on the way: the clocks may be compared from now on.
         """
-        last = self._last.boot
+        last = self._boot
         if last - REBOOTED_BEFORE <= boot <= last:
             return
-        self._last = Moment(now, boot)
+        self._at, self._boot = now, boot
         if last < 0 or boot < last:
-            self._older = self._newer = self._last
+            self._older = self._newer = Moment(now, boot)
         elif fresh and now - self._newer.at >= COMPARED_ANEW_AFTER:
-            self._older, self._newer = self._newer, self._last
+            self._older, self._newer = self._newer, Moment(now, boot)
 
     def time(self, now: Ns) -> Ns:
         """Return the time since boot, ns, extrapolated from the last report; -1 without one."""
-        return -1 if self._last.boot < 0 else self._last.boot + now - self._last.at
+        return -1 if self._boot < 0 else self._boot + now - self._at
 
     def elapsed(self, since: Moment, now: Ns) -> Ns:
         """Return the time from *since* to now, ns, of the vehicle where its clock counts."""
@@ -66,7 +68,7 @@ class VehicleClock:
 
     def _differs(self) -> bool:
         """Return whether the clocks have run differently over the last ten to twenty seconds."""
-        return _differ(self._last.at - self._older.at, self._last.boot - self._older.boot)
+        return _differ(self._at - self._older.at, self._boot - self._older.boot)
 
 
 def _differ(mine: Ns, theirs: Ns) -> bool:

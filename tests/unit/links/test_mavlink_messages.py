@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
@@ -43,6 +44,17 @@ def test_an_in_process_value_is_the_value_after_the_wire() -> None:
 def test_a_text_is_cut_to_its_field_and_at_zero() -> None:
     assert quantised(Frame("STATUSTEXT", {"text": "x" * 60}, 1, 1)).fields["text"] == "x" * 50
     assert message_type("STATUSTEXT").unpack(b"\x06ab\0cd")["text"] == "ab"
+
+
+def test_whole_numbers_arrive_as_they_are_and_as_int():
+    """A message that is complete and of ints alone is not unpacked; any other is."""
+    complete = {"tc1": 3, "ts1": -7}
+    assert quantised(Frame("TIMESYNC", complete, 1, 1)).fields is complete
+    odd = quantised(Frame("TIMESYNC", {"tc1": np.int64(3), "ts1": True}, 1, 1)).fields
+    assert {name: type(value) for name, value in odd.items()} == {"tc1": int, "ts1": int}
+    assert quantised(Frame("TIMESYNC", {"tc1": 3}, 1, 1)).fields == {"tc1": 3, "ts1": 0}
+    with pytest.raises(UsageError, match="does not fit"):
+        quantised(Frame("TIMESYNC", {"tc1": 1 << 63, "ts1": 0}, 1, 1))
 
 
 @pytest.mark.parametrize(

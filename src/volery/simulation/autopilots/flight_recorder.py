@@ -6,12 +6,15 @@ so that a flight whose log is never read costs next to nothing. Logs persist ove
 
 from __future__ import annotations
 
+from struct import Struct
+
 from volery.base.time import US
 from volery.simulation.autopilots.onboard_log import FlightLog, LogSample
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 EACH = 2
 """One tick of the autopilot in so many is recorded."""
+_SAMPLE = Struct(f"{len(LogSample._fields)}d")
 
 
 class FlightRecorder:
@@ -37,7 +40,7 @@ class FlightRecorder:
         if self._open is None:
             self._open = self._begin()
         if self._ticks % EACH == 0:
-            self._open.values.extend(self._sample())
+            self._open.values.frombytes(self._sample())
             self._open.extras.append(self._vehicle.rules.log_extras(self._vehicle))
         self._ticks += 1
 
@@ -52,16 +55,30 @@ class FlightRecorder:
             tuple(vehicle.parameters),
         )
 
-    def _sample(self) -> LogSample:
+    def _sample(self) -> bytes:
+        """Return the values of a ``LogSample``."""
         vehicle = self._vehicle
         estimate = vehicle.estimate
-        return LogSample(
+        north, east, down = estimate.position
+        v_north, v_east, v_down = estimate.velocity
+        roll, pitch, yaw = estimate.attitude
+        roll_rate, pitch_rate, yaw_rate = estimate.rates
+        latitude, longitude, amsl = estimate.geodetic
+        return _SAMPLE.pack(
             vehicle.uptime() / US,
             vehicle.mode.number,
-            *estimate.position,
-            *estimate.velocity,
-            *estimate.attitude,
-            *estimate.rates,
+            north,
+            east,
+            down,
+            v_north,
+            v_east,
+            v_down,
+            roll,
+            pitch,
+            yaw,
+            roll_rate,
+            pitch_rate,
+            yaw_rate,
             estimate.battery_volts,
             estimate.battery_amps,
             estimate.battery_used_mah,
@@ -69,5 +86,7 @@ class FlightRecorder:
             estimate.fix_type,
             estimate.satellites,
             min(estimate.horizontal_dilution, 99.99),
-            *estimate.geodetic,
+            latitude,
+            longitude,
+            amsl,
         )

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 STEP_S = 0.002
 """Grid step of the world [s]: 500 Hz."""
+OCTETS = 8
+"""Size of a value in a row."""
 
 
 class Field(NamedTuple):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from struct import pack_into
+from struct import Struct, pack_into
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ from volery.simulation.world.environment_models import Terrain, Wind
 from volery.simulation.world.sensors import Measurement, MountedSensor, SensorInput, added_sensor
 from volery.simulation.world.state_layout import (
     ACTIVE_STEPS,
+    OCTETS,
     P_CAPACITY,
     S_AMPS,
     S_ATTITUDE,
@@ -55,8 +56,7 @@ from volery.simulation.world.state_layout import (
 
 STEP: Final[Ns] = 2 * MS
 """Grid step: 500 Hz."""
-OCTETS: Final = 8
-"""Size of a value in a row."""
+_COLUMN, _STATE = Struct("d"), Struct(f"{STATE}d")
 
 
 class Truth(NamedTuple):
@@ -220,26 +220,27 @@ class World:
     def truth(self, body: int) -> Truth:
         """Return the true state of *body* now."""
         step = self.advance_to_now(body)
-        row = self.arrays.rows[body, :STATE].tolist()
-        capacity = float(self.arrays.rows[body, P_CAPACITY])
+        start = self._row_octets * body
+        row = _STATE.unpack_from(self._octets, start)
+        (capacity,) = _COLUMN.unpack_from(self._octets, start + OCTETS * P_CAPACITY)
         return Truth(
-            time=step * STEP,
-            position=tuple(row[S_POSITION : S_POSITION + 3]),
-            velocity=tuple(row[S_VELOCITY : S_VELOCITY + 3]),
-            attitude=tuple(row[S_ATTITUDE : S_ATTITUDE + 4]),
-            rates=tuple(row[S_RATES : S_RATES + 3]),
-            rotors=tuple(row[S_ROTORS : S_ROTORS + 4]),
-            battery_left=max(0.0, 1.0 - row[S_CHARGE] / capacity),
-            charge_as=row[S_CHARGE],
-            energy_j=row[S_ENERGY],
-            payload_j=row[S_PAYLOAD_ENERGY],
-            volts=row[S_VOLTS],
-            amps=row[S_AMPS],
-            on_ground=row[S_ON_GROUND] > 0.5,
-            contact_speed=row[S_CONTACT_SPEED],
-            contacts=int(row[S_CONTACTS]),
-            ground=row[S_GROUND],
-            distance=row[S_DISTANCE],
+            step * STEP,
+            row[S_POSITION : S_POSITION + 3],
+            row[S_VELOCITY : S_VELOCITY + 3],
+            row[S_ATTITUDE : S_ATTITUDE + 4],
+            row[S_RATES : S_RATES + 3],
+            row[S_ROTORS : S_ROTORS + 4],
+            max(0.0, 1.0 - row[S_CHARGE] / capacity),
+            row[S_CHARGE],
+            row[S_ENERGY],
+            row[S_PAYLOAD_ENERGY],
+            row[S_VOLTS],
+            row[S_AMPS],
+            row[S_ON_GROUND] > 0.5,
+            row[S_CONTACT_SPEED],
+            int(row[S_CONTACTS]),
+            row[S_GROUND],
+            row[S_DISTANCE],
         )
 
     def measurement(self, body: int, sensor: str) -> Measurement:
@@ -261,9 +262,10 @@ class World:
 
     def _catch_up(self, step: int) -> None:
         """Advance every active body to *step*: those with stops one by one, then all in one call."""
-        for body in [*self._pending, *(self._mounted.keys() - self._pending.keys())]:
-            if step - self._read[body] < ACTIVE_STEPS:
-                self._catch_up_by_stops(body, step)
+        if self._pending or self._mounted:
+            for body in [*self._pending, *(self._mounted.keys() - self._pending.keys())]:
+                if step - self._read[body] < ACTIVE_STEPS:
+                    self._catch_up_by_stops(body, step)
         self._advance_span(0, len(self.specs), step)
 
     def _catch_up_by_stops(self, body: int, step: int) -> None:

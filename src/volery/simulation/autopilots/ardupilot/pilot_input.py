@@ -12,7 +12,6 @@ from math import radians
 from typing import Any
 
 from volery.base.elementary import cos, sin
-from volery.base.frames import Vector
 from volery.base.time import MS, Ns, S, from_seconds
 from volery.simulation.autopilots.ardupilot.failsafes import radio_lost
 from volery.simulation.autopilots.ardupilot.modes import WARNING, arm, change_mode, disarm
@@ -304,11 +303,6 @@ def read_rudder(
         disarm(vehicle, words[1], force=False)
 
 
-def _is_near(here: Vector, point: Vector) -> bool:
-    north, east, down = here[0] - point[0], here[1] - point[1], here[2] - point[2]
-    return north * north + east * east + down * down < TRACK_SPACING * TRACK_SPACING
-
-
 def keep_track(vehicle: Vehicle) -> None:
     """Add the position of an armed vehicle to its track; a point near an earlier one cuts the loop.
 
@@ -328,12 +322,12 @@ def keep_track(vehicle: Vehicle) -> None:
     ground.track_lost_since = NEVER
     if vehicle.mode.name == "SMART_RTL":
         return
-    here, track = vehicle.estimate.position, ground.track
-    if track and _is_near(here, track[-1]):
-        return
-    for place, point in enumerate(track):
-        if _is_near(here, point):
-            del track[place + 1 :]
+    (x, y, z), track = vehicle.estimate.position, ground.track
+    near = TRACK_SPACING * TRACK_SPACING
+    for place in range(-1, len(track) - 1):  # the last point first
+        north, east, down = track[place]
+        if (x - north) * (x - north) + (y - east) * (y - east) + (z - down) * (z - down) < near:
+            del track[place % len(track) + 1 :]
             return
     if len(track) < TRACK_POINTS:
-        track.append(here)
+        track.append((x, y, z))

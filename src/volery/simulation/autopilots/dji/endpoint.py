@@ -68,23 +68,32 @@ class Topic(NamedTuple):
     qos: QoS = DEFAULT
 
 
+_time: Any = message_class("builtin_interfaces/msg/Time")
+_header_of: Any = message_class("std_msgs/msg/Header")
+_vector3: Any = message_class("geometry_msgs/msg/Vector3")
+_quaternion_of: Any = message_class("geometry_msgs/msg/Quaternion")
+_quaternion_stamped: Any = message_class("geometry_msgs/msg/QuaternionStamped")
+_vector_stamped: Any = message_class("geometry_msgs/msg/Vector3Stamped")
+_uint8: Any = message_class("std_msgs/msg/UInt8")
+_nav_sat_fix: Any = message_class("sensor_msgs/msg/NavSatFix")
+_joy: Any = message_class("sensor_msgs/msg/Joy")
+
+
 def _header(stamp: Ns, frame: str) -> Any:
-    time = message_class("builtin_interfaces/msg/Time")(stamp // S, stamp % S)
-    return message_class("std_msgs/msg/Header")(time, frame)
+    return _header_of(_time(stamp // S, stamp % S), frame)
 
 
 def _vector(values: tuple[float, float, float]) -> Any:
-    return message_class("geometry_msgs/msg/Vector3")(*values)
+    return _vector3(*values)
 
 
 def _quaternion(controller: FlightController) -> Any:
     w, x, y, z = attitude_ned_to_enu(controller.vehicle.estimate.quaternion)
-    return message_class("geometry_msgs/msg/Quaternion")(x, y, z, w)
+    return _quaternion_of(x, y, z, w)
 
 
 def _attitude(controller: FlightController, stamp: Ns) -> Any:
-    kind = message_class("geometry_msgs/msg/QuaternionStamped")
-    return kind(_header(stamp, "body_FLU"), _quaternion(controller))
+    return _quaternion_stamped(_header(stamp, "body_FLU"), _quaternion(controller))
 
 
 def _imu(controller: FlightController, stamp: Ns) -> Any:
@@ -101,7 +110,7 @@ def _rates(controller: FlightController, stamp: Ns) -> Any:
     if controller.aircraft == M100:
         return None
     rates = frd_to_flu(controller.vehicle.estimate.rates)
-    return message_class("geometry_msgs/msg/Vector3Stamped")(_header(stamp, "body_FLU"), _vector(rates))
+    return _vector_stamped(_header(stamp, "body_FLU"), _vector(rates))
 
 
 def _acceleration(controller: FlightController, stamp: Ns) -> Any:
@@ -109,24 +118,21 @@ def _acceleration(controller: FlightController, stamp: Ns) -> Any:
     if controller.aircraft == M100:
         return None
     acceleration = ned_to_enu(controller.vehicle.estimate.acceleration)
-    kind = message_class("geometry_msgs/msg/Vector3Stamped")
-    return kind(_header(stamp, "ground_ENU"), _vector(acceleration))
+    return _vector_stamped(_header(stamp, "ground_ENU"), _vector(acceleration))
 
 
 def _velocity(controller: FlightController, stamp: Ns) -> Any:
     velocity = ned_to_enu(controller.vehicle.estimate.velocity)
-    kind = message_class("geometry_msgs/msg/Vector3Stamped")
-    return kind(_header(stamp, "ground_ENU"), _vector(velocity))
+    return _vector_stamped(_header(stamp, "ground_ENU"), _vector(velocity))
 
 
 def _gimbal_angle(controller: FlightController, stamp: Ns) -> Any:
     """Return roll, pitch and yaw of the gimbal in degrees, as the flight controller sends them."""
-    kind = message_class("geometry_msgs/msg/Vector3Stamped")
-    return kind(_header(stamp, "ground_ENU"), _vector(controller.gimbal.angles()))
+    return _vector_stamped(_header(stamp, "ground_ENU"), _vector(controller.gimbal.angles()))
 
 
 def _byte(value: int) -> Any:
-    return message_class("std_msgs/msg/UInt8")(value)
+    return _uint8(value)
 
 
 def _display_mode(controller: FlightController, _stamp: Ns) -> Any:
@@ -135,7 +141,7 @@ def _display_mode(controller: FlightController, _stamp: Ns) -> Any:
 
 
 def _fix(stamp: Ns, place: tuple[float, float, float]) -> Any:
-    made: Any = message_class("sensor_msgs/msg/NavSatFix")(_header(stamp, "/gps"))
+    made = _nav_sat_fix(_header(stamp, "/gps"))
     made.status.status, made.status.service = FIX, GPS
     made.latitude, made.longitude, made.altitude = place
     return made
@@ -176,7 +182,7 @@ def _rc(controller: FlightController, stamp: Ns) -> Any:
     switch *= SWITCH_AT_F.get(controller.aircraft, OTHER_AT_F)
     axes = [roll, pitch, yaw, throttle, switch]
     axes += [0.0] * (AXES.get(controller.aircraft, 6) - len(axes))
-    return message_class("sensor_msgs/msg/Joy")(_header(stamp, ""), axes, [])
+    return _joy(_header(stamp, ""), axes, [])
 
 
 def _rc_connection(controller: FlightController, _stamp: Ns) -> Any:

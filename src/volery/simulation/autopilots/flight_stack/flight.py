@@ -175,10 +175,16 @@ class Setpoint:
     def row(self) -> tuple[float, ...]:
         """Return the values in the order of the command columns, from ``C_CONTROL`` on."""
         turning = TURNINGS[self.yaw is not None, self.yaw_rate is not None]
+        north, east, down = self.position
+        v_north, v_east, v_down = self.velocity
         return (
             float(self.control),
-            *self.position,
-            *self.velocity,
+            north,
+            east,
+            down,
+            v_north,
+            v_east,
+            v_down,
             self.roll,
             self.pitch,
             self.yaw or 0.0,

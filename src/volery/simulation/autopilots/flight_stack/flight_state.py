@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from math import inf, sqrt
+from struct import Struct
 
 from volery.base.frames import LocalFrame, Quaternion, Vector
 from volery.base.time import Ns
@@ -28,6 +29,7 @@ from volery.simulation.world.state_layout import (
     M_RANGE,
     MOTORS,
     NED,
+    OCTETS,
     S_AMPS,
     S_CHARGE,
     S_ENERGY,
@@ -177,6 +179,8 @@ K_MISS_DERIVATIVE = _add("K_MISS_DERIVATIVE", "m/s^2", "its filtered derivative"
 FLIGHT = FLIGHT_LAYOUT.end - FLIGHT_LAYOUT.start
 """Number of columns that the flight stack adds to a row."""
 
+_THREE, _FOUR = Struct("3d"), Struct("4d")
+
 
 @dataclass(frozen=True)
 class GpsFix:
@@ -264,35 +268,36 @@ class Estimate:
         row: The vehicle's row, as the bytes of its doubles; copying them is cheaper than making numbers.
     """
 
-    __slots__ = ("_about", "_fix", "_geodetic", "_row", "time")
+    __slots__ = ("_about", "_fix", "_geodetic", "_octets", "_position", "_row", "time")
 
     def __init__(self, about: Airframe, time: Ns, row: bytes) -> None:
         self._about = about
         self.time = time
+        self._octets = row
         self._row: Sequence[float] = memoryview(row).cast("d")
+        self._position: Vector | None = None
         self._geodetic: Vector | None = None
         self._fix: GpsFix | None = None
 
     def _vector(self, column: int) -> Vector:
-        row = self._row
-        return row[column], row[column + 1], row[column + 2]
+        x, y, z = _THREE.unpack_from(self._octets, OCTETS * column)
+        return x, y, z
 
     def _four(self, column: int) -> tuple[float, float, float, float]:
-        row = self._row
-        return row[column], row[column + 1], row[column + 2], row[column + 3]
+        first, second, third, fourth = _FOUR.unpack_from(self._octets, OCTETS * column)
+        return first, second, third, fourth
 
     def _about_origin(self, column: int) -> Vector:
-        row = self._row
-        return (
-            row[column] - row[K_ORIGIN],
-            row[column + 1] - row[K_ORIGIN + 1],
-            row[column + 2] - row[K_ORIGIN + 2],
-        )
+        x, y, z = self._vector(column)
+        north, east, down = self._vector(K_ORIGIN)
+        return x - north, y - east, z - down
 
     @property
     def position(self) -> Vector:
         """Position north, east, down about the estimator's origin [m]."""
-        return self._about_origin(K_POSITION)
+        if self._position is None:
+            self._position = self._about_origin(K_POSITION)
+        return self._position
 
     @property
     def geodetic(self) -> Vector:

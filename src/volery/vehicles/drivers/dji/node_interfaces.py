@@ -41,6 +41,7 @@ GIMBAL_TURNS_S = 1
 """Time in which a gimbal turns to an angle, s."""
 
 JOY = "sensor_msgs/msg/Joy"
+_joy: Any = message_class(JOY)
 SECOND_KIND = f"{NEW_NAMES}/msg/WaypointV2InitSetting"
 """Type of a mission of the second kind."""
 
@@ -213,7 +214,7 @@ class DjiSdkInterface(_CommonInterface):
         """Publish on the topic of the flag, or on the generic one."""
         publisher = self._publishers.get(flag)
         axes = list(numbers) if publisher is not None else [*numbers, float(flag)]
-        joy: Any = message_class(JOY)()
+        joy = _joy()
         joy.axes = axes
         self._node.publish_all([(publisher or self._generic, joy)], _raise)
 
