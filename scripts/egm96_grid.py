@@ -1,4 +1,4 @@
-"""Make src/volery/base/egm96.xz from EGM96's 5' grid, and say how far the two are apart.
+"""Make src/volery/base/egm96.grid from EGM96's 5' grid, and say how far the two are apart.
 
 Usage: scripts/egm96_grid.py EGM96-5.NPZ, the file in the PyPI package egm96 (0.3.0): second differences of
 centimetres, from the south pole northwards and from 180 degrees west eastwards.
@@ -26,7 +26,7 @@ def main(source: Path) -> None:
     coarse = np.round(metres[::FINER, :-1:FINER] * 10.0).astype(np.int16)
     target = Path(__file__).parents[1] / "src" / "volery" / "base" / GRID_FILE
     target.write_bytes(pack(coarse))
-    grid, drawn = Egm96Grid(coarse), np.random.default_rng(1)
+    grid, drawn = Egm96Grid(target.read_bytes()), np.random.default_rng(1)
     rows, columns = (drawn.integers(0, size, TRIED) for size in metres.shape)
     errors = np.array(
         [

@@ -5,7 +5,7 @@ and autopilots report AMSL, MAVROS reports ellipsoidal; both sides must use the 
 
 EGM96 is read from a grid of a quarter of a degree. Source: Lemoine et al., The Development of the Joint NASA
 GSFC and NIMA Geopotential Model EGM96, NASA/TP-1998-206861; public domain. ``scripts/egm96_grid.py`` makes
-``egm96.xz`` from the 5' grid: whole decimetres, bicubic in between. Against that grid it errs by at most
+``egm96.grid`` from the 5' grid: whole decimetres, bicubic in between. Against that grid it errs by at most
 0.19 m, by 0.06 m at 99 % of all places and by 0.025 m root mean square; EGM96 itself errs by 0.5 to 1 m.
 """
 
@@ -17,15 +17,15 @@ from functools import cache, lru_cache
 from importlib.resources import files
 
 from volery.base.errors import UsageError
-from volery.base.geoid_grid import Egm96Grid, unpack
+from volery.base.geoid_grid import Egm96Grid
 
-GRID_FILE = "egm96.xz"
+GRID_FILE = "egm96.grid"
 
 
 @cache
 def read_grid() -> Egm96Grid:
     """Return the grid of the package; it is read once a process."""
-    return Egm96Grid(unpack(files("volery.base").joinpath(GRID_FILE).read_bytes()))
+    return Egm96Grid(files("volery.base").joinpath(GRID_FILE).read_bytes())
 
 
 @lru_cache(maxsize=64)

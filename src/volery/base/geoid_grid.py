@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import lzma
 from math import floor, isfinite
+from struct import Struct
 
 import numpy as np
 import numpy.typing as npt
@@ -14,17 +15,28 @@ ROWS, COLUMNS = 180 * PER_DEGREE + 1, 360 * PER_DEGREE
 DECIMETRE = 0.1
 
 
+BAND = 60
+"""Rows that are compressed together: 15 degrees of latitude, since a run flies in one place."""
+_BANDS = -(-ROWS // BAND)
+_SIZES = Struct(f"<{_BANDS}I")
+
+
 def pack(decimetres: npt.NDArray[np.int16]) -> bytes:
-    """Compress a grid for the file: second differences, low bytes before high bytes."""
-    steps = np.diff(np.diff(decimetres, axis=1, prepend=np.int16(0)), axis=0, prepend=np.int16(0))
+    """Return the file of a grid: the sizes of its bands, then the bands from the south pole northwards."""
+    bands = [_packed(decimetres[row : row + BAND]) for row in range(0, ROWS, BAND)]
+    return _SIZES.pack(*map(len, bands)) + b"".join(bands)
+
+
+def _packed(band: npt.NDArray[np.int16]) -> bytes:
+    """Compress a band: second differences, low bytes before high bytes."""
+    steps = np.diff(np.diff(band, axis=1, prepend=np.int16(0)), axis=0, prepend=np.int16(0))
     octets = np.frombuffer(steps.astype("<i2").tobytes(), np.uint8).reshape(-1, 2)
     return lzma.compress(octets.T.tobytes(), preset=9)
 
 
-def unpack(data: bytes) -> npt.NDArray[np.int16]:
-    """Return the grid in the compressed bytes of the file."""
+def _unpacked(data: bytes) -> npt.NDArray[np.int16]:
     octets = np.frombuffer(lzma.decompress(data), np.uint8).reshape(2, -1)
-    steps = np.ascontiguousarray(octets.T).view("<i2").reshape(ROWS, COLUMNS)
+    steps = np.ascontiguousarray(octets.T).view("<i2").reshape(-1, COLUMNS)
     return np.cumsum(np.cumsum(steps, axis=0, dtype=np.int16), axis=1, dtype=np.int16)
 
 
@@ -32,10 +44,15 @@ _Posts = tuple[tuple[int, ...], ...]
 
 
 class Egm96Grid:
-    """Heights of the geoid, interpolated between the points of the grid."""
+    """Heights of the geoid, interpolated between the points of the grid.
 
-    def __init__(self, decimetres: npt.NDArray[np.int16]) -> None:
-        self._decimetres = decimetres
+    Args:
+        data: The file's content; a band is decompressed when a place in it is read.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        self._bands: dict[int, npt.NDArray[np.int16]] = {}
         self._cells: dict[tuple[int, int], _Posts] = {}
 
     def height(self, latitude: float, longitude: float) -> float:
@@ -56,9 +73,17 @@ class Egm96Grid:
         rows = [min(max(row + step, 0), ROWS - 1) for step in (-1, 0, 1, 2)]
         columns = [(column + step) % COLUMNS for step in (-1, 0, 1, 2)]
         found = self._cells[row, column] = tuple(
-            tuple(int(self._decimetres[one, other]) for other in columns) for one in rows
+            tuple(int(self._band(one // BAND)[one % BAND, other]) for other in columns) for one in rows
         )
         return found
+
+    def _band(self, number: int) -> npt.NDArray[np.int16]:
+        band = self._bands.get(number)
+        if band is None:
+            sizes = _SIZES.unpack_from(self._data)
+            start = _SIZES.size + sum(sizes[:number])
+            band = self._bands[number] = _unpacked(self._data[start : start + sizes[number]])
+        return band
 
 
 def _weights(f: float) -> tuple[float, float, float, float]:
