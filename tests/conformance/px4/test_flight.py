@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import cos, degrees, radians, remainder, sin, tau
 from typing import Any
 
 import pytest
@@ -71,6 +72,26 @@ def test_a_leg_by_reposition_creeps_up_to_the_cruise_and_ends_too_far(
     if north > 100.0:
         assert flown[60][2] == pytest.approx(4.3, abs=0.2)
         assert flown[250][2] == pytest.approx(4.95, abs=0.15)
+
+
+def test_the_nose_swings_past_a_new_course(bench: Any) -> None:
+    """Logged of 40 flights in SIH past a turn of 49 degrees: by 15.6, for 1.12 s by more than 3."""
+    rig = bench()
+    rig.airborne(30.0)
+    rig.run(8.0)
+    latitude, longitude, amsl = rig.vehicle.estimate.geodetic
+    heading = rig.vehicle.estimate.attitude[2]
+    there = [way / 111_200.0 for way in (100.0 * cos(heading + 0.85), 100.0 * sin(heading + 0.85))]
+    x, y = (latitude + there[0]) * 1e7, (longitude + there[1] / cos(radians(latitude))) * 1e7
+    place = {"x": round(x), "y": round(y), "z": amsl, "param4": float("nan")}
+    assert rig.command_int(192, param1=-1, param2=1, **place) == 0
+    past = []
+    for _ in range(80):
+        rig.run(0.1)
+        past.append(degrees(remainder(rig.vehicle.estimate.attitude[2] - heading - 0.85, tau)))
+    assert max(past) == pytest.approx(15.6, rel=0.1)
+    assert 0.1 * sum(angle > 3.0 for angle in past) == pytest.approx(1.12, rel=0.1)
+    assert past[-1] == pytest.approx(0.0, abs=1.0)
 
 
 def test_with_noise_the_airframe_of_the_loops_is_reported(bench: Any) -> None:

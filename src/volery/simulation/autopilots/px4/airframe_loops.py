@@ -14,6 +14,7 @@ import numpy as np
 
 from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.px4.estimate_error import step_errors
+from volery.simulation.autopilots.px4.heading_loop import FULL_THRUST, turn_heading
 from volery.simulation.autopilots.px4.loop_state import (
     A_ACCEL,
     A_ESTIMATE,
@@ -60,8 +61,8 @@ from volery.simulation.world.state_layout import Array
 DRAG: Final = 1.0
 """Drag of the recorded airframe divided by its mass: SIH_KDV / SIH_MASS [1/s]."""
 
-HOVER: Final = GRAVITY / 20.0
-"""Thrust with which it hovers: SIH_MASS and four times SIH_T_MAX [1]."""
+HOVER: Final = GRAVITY / FULL_THRUST
+"""Thrust with which it hovers [1]."""
 
 LEAN_LAG: Final = 0.15
 THRUST_LAG: Final = 0.06
@@ -112,6 +113,7 @@ def step_loops(row: Array, key: np.uint64, step: int) -> None:
     pe = _controlled(row, 1, east, place, speed, row[push + 1])
     pd = _controlled(row, 2, down, place, speed, 0.0 if ramping else row[push + 2])
     _fly(row, (north, east, down), (pn, pe, pd), place, speed)
+    turn_heading(row)
     step_errors(row, key, step)
     for axis in range(3):
         row[A_MOVING + axis] = row[A_MOVING + axis] + row[E_RATE + axis]

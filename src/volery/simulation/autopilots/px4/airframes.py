@@ -107,6 +107,7 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "MPC_XY_VEL_I_ACC": "gain on the integral of the velocity error in the plane",
         "MPC_XY_VEL_MAX": "largest speed in the plane",
         "MPC_XY_VEL_P_ACC": "gain on the velocity error in the plane",
+        "MPC_YAWRAUTO_MAX": "largest rate of the heading set-point in the automatic modes",
         "MPC_Z_P": "gain on a height error",
         "MPC_Z_VEL_D_ACC": "gain on the derivative of the climb",
         "MPC_Z_VEL_I_ACC": "gain on the integral of the climb error",

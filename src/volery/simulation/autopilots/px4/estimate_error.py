@@ -21,7 +21,6 @@ from typing import Final
 
 import numpy as np
 
-from volery.base.elementary import sine_cosine
 from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.px4.error_states import (
     BIAS,
@@ -42,6 +41,7 @@ from volery.simulation.autopilots.px4.error_states import (
     variance_at,
 )
 from volery.simulation.autopilots.px4.field_fusion import FIELD_PERIOD, use_field, watch_motion
+from volery.simulation.autopilots.px4.heading_loop import write_axes
 from volery.simulation.autopilots.px4.loop_state import (
     A_ACCEL,
     A_AXES,
@@ -57,7 +57,6 @@ from volery.simulation.autopilots.px4.loop_state import (
     E_STATES,
     E_VELOCITY,
     GRAVITY,
-    I_HEADING,
     I_NOISY,
     STATES,
     SUBSTEP,
@@ -116,9 +115,6 @@ FIX_POSITION_NOISE = (0.2, 0.2, 0.5)
 BARO_NOISE: Final = 0.09
 """Deviation of a reading of PX4's simulated barometer [m]: 1 Pa."""
 
-LEAST_LIFT: Final = 0.1 * GRAVITY
-"""Least upward acceleration of the thrust that its direction is taken from [m/s^2]."""
-
 WALK: Final = sqrt(IMU_PERIOD * SUBSTEP)
 """Deviation of the integral of white samples over a step, over that of a sample [s]."""
 
@@ -139,7 +135,7 @@ def _noise(row: Array, key: np.uint64, stream: int, step: int) -> float:
 @numeric
 def step_errors(row: Array, key: np.uint64, step: int) -> None:
     """Advance the errors of all states by one step."""
-    _turn_axes(row)
+    write_axes(row)
     kick = _to_earth(
         row,
         WALK * ACCEL_NOISE[0] * _noise(row, key, 0, step),
@@ -182,23 +178,6 @@ def step_errors(row: Array, key: np.uint64, step: int) -> None:
     _predict(row, 0, accel[0], kick[0], row[E_STATES + PLACE], row[E_STATES + SPEED])
     _predict(row, 1, accel[1], kick[1], row[E_STATES + PLACE + 1], row[E_STATES + SPEED + 1])
     _predict(row, 2, accel[2], kick[2], row[E_STATES + HEIGHT], row[E_STATES + CLIMB])
-
-
-@numeric
-def _turn_axes(row: Array) -> None:
-    """Turn the body's axes: down against the thrust, forward to the heading."""
-    north, east, down = -row[A_THRUST], -row[A_THRUST + 1], max(LEAST_LIFT, GRAVITY - row[A_THRUST + 2])
-    length = sqrt(north * north + east * east + down * down)
-    north, east, down = north / length, east / length, down / length
-    s, c = sine_cosine(row[I_HEADING])
-    ahead = -(c * north + s * east) / down
-    level = 1.0 / sqrt(1.0 + ahead * ahead)
-    c, s, ahead = c * level, s * level, ahead * level
-    row[A_AXES], row[A_AXES + 3], row[A_AXES + 6] = c, s, ahead
-    row[A_AXES + 1] = east * ahead - down * s
-    row[A_AXES + 4] = down * c - north * ahead
-    row[A_AXES + 7] = north * s - east * c
-    row[A_AXES + 2], row[A_AXES + 5], row[A_AXES + 8] = north, east, down
 
 
 @numeric

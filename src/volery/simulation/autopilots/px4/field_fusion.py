@@ -29,6 +29,7 @@ from volery.simulation.autopilots.px4.loop_state import (
     A_GROUNDED,
     A_POSITION,
     A_THRUST,
+    A_TURN,
     E_ACCEL,
     E_ACCELERATES,
     E_ALIGNED,
@@ -47,7 +48,6 @@ from volery.simulation.autopilots.px4.loop_state import (
     E_TURNS,
     GRAVITY,
     I_TASK,
-    I_TURN,
     REST,
     STATES,
     SUBSTEP,
@@ -111,7 +111,7 @@ def watch_motion(row: Array, accel_north: float, accel_east: float) -> None:
     """
     row[E_ACCEL] += SUBSTEP / ACCEL_LAG * (accel_north - row[E_ACCEL])
     row[E_ACCEL + 1] += SUBSTEP / ACCEL_LAG * (accel_east - row[E_ACCEL + 1])
-    turn = 0.0 if row[I_TASK] == REST else row[I_TURN]
+    turn = 0.0 if row[I_TASK] == REST else row[A_TURN]
     row[E_TURN] += TURN_SHARE * (turn - row[E_TURN])
     row[E_TURNED] += SUBSTEP * turn
     if row[I_TASK] == REST or row[A_GROUNDED] > 0.0:

@@ -37,6 +37,7 @@ _SOURCES = tuple(
         "loop_step.py",
         "loop_state.py",
         "trajectory.py",
+        "heading_loop.py",
         "airframe_loops.py",
         "error_states.py",
         "field_fusion.py",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
-from math import dist, inf, remainder, tau
+from math import dist, inf, nan, radians, remainder, tau
 from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -21,17 +21,21 @@ from volery.kernel.api import Action
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.px4.airframe_loops import DRAG, FIRST_VARIANCE, HOVER
 from volery.simulation.autopilots.px4.estimate_error import start_errors
+from volery.simulation.autopilots.px4.heading_loop import DAMPING, FASTEST_TURN, INERTIA
 from volery.simulation.autopilots.px4.loop_state import (
     A_ACCEL,
     A_FLOWN,
     A_GROUNDED,
+    A_HEADING,
     A_HOVER,
     A_INTEGRAL,
     A_MOVING,
     A_POSITION,
     A_RAMP,
     A_THRUST,
+    A_TURN,
     A_VELOCITY,
+    A_YAWING,
     DIRECT,
     E_POSITION,
     E_RATE,
@@ -39,12 +43,11 @@ from volery.simulation.autopilots.px4.loop_state import (
     E_VELOCITY,
     G_JERK,
     GRAVITY,
-    I_HEADING,
     I_NOISY,
     I_POSITION,
     I_SPEED,
     I_TASK,
-    I_TURN,
+    I_YAW,
     LOOP_COLUMNS,
     REST,
     SINK,
@@ -52,6 +55,7 @@ from volery.simulation.autopilots.px4.loop_state import (
     T_ACCEL,
     T_POSITION,
     T_VELOCITY,
+    T_YAW,
     TO_POINT,
 )
 from volery.simulation.autopilots.px4.loop_step import fly_px4_loops
@@ -64,6 +68,12 @@ FOLLOW_LEAD = 0.25
 FOLLOW_GAIN = 0.5 / FOLLOW_LEAD
 """Gain on the distance of flight stack and airframe [1/s]: the magnitude optimum of an integrator behind that
 lag. The flight stack stays within 3 cm in the mean and 17 cm at most in the plane."""
+
+TURN_LEAD, TURN_GAIN, TARGET_GAIN = 0.25, 4.0, 4.0
+"""Time by which the flight stack's turn is behind a set rate [s], half a manoeuvre's step included; gain on
+the distance of both headings; gain of its attitude loop on its heading target, which the rate would count
+twice [1/s]. The swing past turns of 28 to 160 degrees is within 10 per cent of the airframe's; the heading
+within 0.4 degrees in the mean on the five-line mission, and within 7 degrees at the begin of a turn."""
 
 FOLLOW_ACCEL, FOLLOW_JERK, FASTEST = 12.0, 100.0, 25.0
 """Limits of the flight stack [m/s^2, m/s^3, m/s]; the loops limit the motion."""
@@ -144,6 +154,7 @@ def gains_of(vehicle: Vehicle, automatic: bool) -> tuple[float, ...]:
         max(vehicle.tuning.speed_down, STRETCH * p["MPC_Z_V_AUTO_DN"] if automatic else 0.0),
         p["MPC_TKO_RAMP_T"],
         p["MPC_THR_HOVER"],
+        radians(max(0.0, p["MPC_YAWRAUTO_MAX"])),
     )
 
 
@@ -206,6 +217,7 @@ class PositionLoops:
             row[T_POSITION : T_POSITION + 3] = row[A_POSITION : A_POSITION + 3]
             row[T_VELOCITY : T_VELOCITY + 3] = row[A_VELOCITY : A_VELOCITY + 3]
             _write(row, T_ACCEL, (0.0, 0.0, 0.0))
+            _write(row, T_YAW, (row[A_HEADING], 0.0))
             if row[A_GROUNDED]:
                 _write(row, T_VELOCITY, (0.0, 0.0, FIRST_SINK))
         row[I_TASK] = SINK if point[2] == inf else TO_POINT
@@ -219,7 +231,7 @@ class PositionLoops:
         Args:
             wanted: What is controlled.
             yaw: Heading [rad], or
-            yaw_rate: turn rate [rad/s]; neither: keep the heading.
+            yaw_rate: turn rate [rad/s]; neither: do not turn.
         """
         steps = self._begin()
         self._trajectory = False
@@ -262,7 +274,7 @@ class PositionLoops:
         row, grounded = self._row, self._vehicle.estimate.landed
         self._trajectory, self._tuned = False, None
         self._state[: LOOP_COLUMNS if self._advance is None else E_STATES] = 0.0
-        row[I_HEADING] = self._vehicle.estimate.attitude[2]
+        row[A_HEADING] = self._vehicle.estimate.attitude[2]
         if self._advance is None:
             self._advance = fly_px4_loops.bind(self._state, self._vehicle.flight.keys, self._span)
             start_errors(self._state)
@@ -294,9 +306,8 @@ class PositionLoops:
         vehicle, row = self._vehicle, self._row
         estimate = vehicle.estimate
         here, velocity = estimate.position, estimate.velocity
-        turned = remainder(estimate.attitude[2] - row[I_HEADING], tau)
-        row[I_TURN] = turned / (steps * SUBSTEP) if steps else 0.0
-        row[I_HEADING], row[I_NOISY] = estimate.attitude[2], float(self._noisy)
+        _write(row, I_YAW, (nan if yaw is None else yaw, nan if yaw_rate is None else yaw_rate))
+        row[I_NOISY] = float(self._noisy)
         tuned = vehicle.parameters.changes, row[I_TASK] != DIRECT
         if tuned != self._tuned:
             self._tuned = tuned
@@ -318,8 +329,7 @@ class PositionLoops:
                     0.0 if touches else self._follow(1, here[1]),
                     self._follow(2, here[2]),
                 ),
-                yaw=yaw,
-                yaw_rate=yaw_rate,
+                yaw_rate=self._follow_heading(),
                 speed=FASTEST,
                 speed_up=FASTEST,
                 speed_down=FASTEST,
@@ -360,3 +370,13 @@ class PositionLoops:
         if self._noisy:
             moving, place = moving - row[E_RATE + axis], place - row[E_POSITION + axis]
         return moving + FOLLOW_LEAD * row[A_ACCEL + axis] + FOLLOW_GAIN * (place - here)
+
+    def _follow_heading(self) -> float:
+        """Return the rate of turn with which the flight stack follows the airframe's heading [rad/s]."""
+        row, estimate = self._row, self._vehicle.estimate
+        heading = estimate.attitude[2]
+        behind = remainder(row[A_HEADING] - heading, tau)
+        ahead = remainder(estimate.target_attitude[2] - heading, tau)
+        accel = (row[A_YAWING + 1] - DAMPING * row[A_YAWING]) / INERTIA
+        rate = row[A_TURN] + TURN_LEAD * accel + TURN_GAIN * behind - TARGET_GAIN * ahead
+        return max(-FASTEST_TURN, min(FASTEST_TURN, rate))

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from typing import Final
 
+from volery.simulation.autopilots.px4.airframe_loops import HOVER
+from volery.simulation.autopilots.px4.heading_loop import HEADING_GAIN, advance_turn
+
 STEP: Final = 0.01
 """Step of the integration [s]."""
 
@@ -16,21 +19,6 @@ STICK_LAG: Final = 0.08
 
 ENDED: Final = 1.2e-7
 """Filtered rate below which the stick counts as centred [rad/s]: FLT_EPSILON."""
-
-HEADING_GAIN: Final = 2.8
-"""MC_YAW_P [1/s]."""
-
-RATE_GAIN, RATE_INTEGRAL, MOST_INTEGRAL = 0.2, 0.1, 0.3
-"""MC_YAWRATE_P, MC_YAWRATE_I, MC_YR_INT_LIM."""
-
-TORQUE: Final = 0.4
-"""Torque of a full command, four times SIH_Q_MAX [N m]."""
-
-MOTOR_LAG: Final = 0.05
-"""SIH_T_TAU [s]."""
-
-INERTIA, DAMPING = 0.03, 0.025
-"""SIH_IZZ [kg m^2] and SIH_KDW [N m s]."""
 
 
 class YawStick:
@@ -41,11 +29,16 @@ class YawStick:
 
     def reset(self) -> None:
         """End the turn."""
-        self.rate = 0.0
-        """Rate of turn [rad/s, clockwise]."""
-        self._wanted = self._integral = self._torque = 0.0
+        self._wanted = 0.0
+        self._turn = (0.0, 0.0, 0.0)
+        """Rate, torque and integral, as in ``advance_turn``."""
         self._turned = 0.0
         """Turn since the heading is held [rad]."""
+
+    @property
+    def rate(self) -> float:
+        """Rate of turn [rad/s, clockwise]."""
+        return self._turn[0]
 
     def step(self, commanded: float, passed: float) -> float:
         """Advance the turn and return its rate [rad/s].
@@ -64,10 +57,5 @@ class YawStick:
             self._turned, wanted = 0.0, self._wanted
         else:
             wanted = -HEADING_GAIN * self._turned
-        miss = wanted - self.rate
-        command = RATE_GAIN * miss + self._integral
-        grown = self._integral + RATE_INTEGRAL * miss * STEP
-        self._integral = max(-MOST_INTEGRAL, min(MOST_INTEGRAL, grown))
-        self._torque += STEP / MOTOR_LAG * (TORQUE * command - self._torque)
-        self.rate += STEP * (self._torque - DAMPING * self.rate) / INERTIA
+        self._turn = advance_turn(wanted, self._turn, HOVER, STEP)
         self._turned += STEP * self.rate

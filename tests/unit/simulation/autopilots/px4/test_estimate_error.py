@@ -10,6 +10,7 @@ from volery.simulation.autopilots.px4.estimate_error import AHEAD, start_errors
 from volery.simulation.autopilots.px4.loop_state import (
     A_ACCEL,
     A_FLOWN,
+    A_HEADING,
     A_THRUST,
     E_COVARIANCE,
     E_POSITION,
@@ -18,7 +19,6 @@ from volery.simulation.autopilots.px4.loop_state import (
     E_STATES,
     E_VELOCITY,
     GRAVITY,
-    I_HEADING,
     I_NOISY,
     I_TASK,
     LOOP_COLUMNS,
@@ -117,7 +117,7 @@ def test_a_bias_is_distinguished_from_a_tilt_once_the_nose_turns() -> None:
     estimate = Estimate()
     estimate.run(30.0)
     assert estimate.deviations[8:10] == pytest.approx(0.205, abs=0.005)
-    estimate.row[I_HEADING] = 2.0
+    estimate.row[A_HEADING] = 2.0
     estimate.run(30.0)
     assert max(estimate.deviations[8:10]) < 0.06
 
@@ -172,7 +172,7 @@ def test_the_estimate_wanders_as_logged(heading: float) -> None:
     0.21 m, 0.16 m/s.
     """
     estimate = Estimate(noisy=True)
-    estimate.row[I_HEADING] = heading
+    estimate.row[A_HEADING] = heading
     estimate.run(60.0)
     seen = []
     for _ in range(10_000):

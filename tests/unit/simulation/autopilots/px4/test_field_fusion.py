@@ -10,18 +10,18 @@ from volery.simulation.autopilots.px4.estimate_error import start_errors, step_e
 from volery.simulation.autopilots.px4.field_fusion import DOWN, EAST, NORTH, use_field, watch_motion
 from volery.simulation.autopilots.px4.loop_state import (
     A_ACCEL,
+    A_HEADING,
     A_POSITION,
     A_THRUST,
+    A_TURN,
     E_ALIGNED,
     E_COVARIANCE,
     E_FUSES_FIELD,
     E_KEPT,
     E_STATES,
     GRAVITY,
-    I_HEADING,
     I_NOISY,
     I_TASK,
-    I_TURN,
     LOOP_COLUMNS,
     REST,
     STATES,
@@ -46,7 +46,7 @@ class Filter:
         """Advance at the motion that is set."""
         for _ in range(round(seconds / SUBSTEP)):
             step_errors(self.row, self.key, self.step)
-            self.row[I_HEADING] += SUBSTEP * self.row[I_TURN]
+            self.row[A_HEADING] += SUBSTEP * self.row[A_TURN]
             self.step += 1
         return self
 
@@ -57,9 +57,9 @@ class Filter:
 
     def turn(self, angle: float) -> "Filter":
         """Turn with 45 degrees/s."""
-        self.row[I_TURN] = pi / 4.0
+        self.row[A_TURN] = pi / 4.0
         self.run(angle / (pi / 4.0))
-        self.row[I_TURN] = 0.0
+        self.row[A_TURN] = 0.0
         return self
 
     def deviation(self, number: int) -> float:
@@ -69,7 +69,7 @@ class Filter:
 
 def test_on_the_ground_the_heading_alone_is_fused() -> None:
     on_ground = Filter().run(1.0)
-    on_ground.row[I_TURN] = 1.0
+    on_ground.row[A_TURN] = 1.0
     assert on_ground.run(1.0).row[[E_ALIGNED, E_FUSES_FIELD]].tolist() == [0.0, 0.0]
 
 
@@ -124,7 +124,7 @@ def test_field_and_bias_are_as_unsure_as_ekf2_logs_after_a_turn() -> None:
 def test_an_unsure_bias_leaves_the_attitude_alone() -> None:
     flying = Filter().run(10.0).climb().run(1.0)
     flying.row[E_STATES + YAW] = 0.1
-    flying.row[I_TURN] = 0.5
+    flying.row[A_TURN] = 0.5
     flying.run(0.4)
     assert flying.row[E_FUSES_FIELD] == 1.0
     attitude = flying.row[E_STATES : E_STATES + FIELD].copy()
@@ -140,7 +140,7 @@ def test_a_wrong_bias_is_a_wrong_heading_that_turns_with_the_nose(heading: float
     """18 milligauss to the right are a tenth of the field in the plane."""
     flying = Filter().run(10.0).climb().run(1.0)
     flying.row[E_STATES + IRON + 1] = 0.018
-    flying.row[I_HEADING] = heading
+    flying.row[A_HEADING] = heading
     flying.run(60.0)
     assert flying.row[E_STATES + YAW] == pytest.approx(sign * 0.018 * NORTH / (NORTH**2 + EAST**2), rel=0.1)
 
@@ -148,7 +148,7 @@ def test_a_wrong_bias_is_a_wrong_heading_that_turns_with_the_nose(heading: float
 def test_variances_are_kept_until_three_axes_are_fused_again() -> None:
     flying = Filter().run(10.0).climb().run(1.0).turn(pi / 2.0).run(2.5)
     kept = flying.row[E_KEPT : E_KEPT + 7].copy()
-    flying.row[I_TURN] = 0.5
+    flying.row[A_TURN] = 0.5
     flying.run(0.4)
     fused = np.array([flying.row[variance_at(number)] for number in range(FIELD, STATES)])
     assert np.all(fused <= kept[:6])

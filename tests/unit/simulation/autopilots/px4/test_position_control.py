@@ -24,8 +24,8 @@ from volery.simulation.autopilots.px4.loop_state import (
     E_COVARIANCE,
     E_POSITION,
     E_STATES,
-    G_HOVER,
     G_JERK,
+    G_TURN,
     GRAVITY,
     I_AT_VEHICLE,
     I_DOWN,
@@ -62,6 +62,7 @@ PARAMETERS = {
     "MPC_Z_V_AUTO_DN": 1.5,
     "MPC_TKO_RAMP_T": 3.0,
     "MPC_THR_HOVER": 0.5,
+    "MPC_YAWRAUTO_MAX": 45.0,
 }
 KEY = np.uint64(7)
 
@@ -72,7 +73,7 @@ def airborne() -> Array:
     tuning = SimpleNamespace(tilt=0.785, speed=12.0, speed_up=3.0, speed_down=1.5)
     vehicle: Any = SimpleNamespace(parameters=PARAMETERS, tuning=tuning)
     gains = gains_of(vehicle, automatic=True)
-    assert G_JERK + len(gains) == G_HOVER + 1
+    assert G_JERK + len(gains) == G_TURN + 1
     row[G_JERK : G_JERK + len(gains)] = gains
     row[[I_SPEED, I_UP, I_DOWN, I_LIFT]] = 5.0, 3.0, 1.5, 4.0
     row[[A_RAMP, A_HOVER, A_HOVER + 1]] = 1.0, HOVER, HOVER
