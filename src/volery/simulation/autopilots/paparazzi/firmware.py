@@ -86,15 +86,15 @@ def set_ground_reference(nav: Navigation) -> None:
         nav.vehicle.set_home_here()
 
 
-def on_ground(nav: Navigation) -> bool:
-    """Return whether a landing from the air has reached the ground (NavDetectGround)."""
-    return nav.vehicle.estimate.landed and nav.vehicle.firmware_state.landing_from_air
+def await_touch_down(nav: Navigation) -> None:
+    """NavStartDetectGround: detect the next touch-down."""
+    nav.vehicle.firmware_state.touch_downs = nav.vehicle.flight.truth().contacts
 
 
-def touch_down_here(nav: Navigation) -> None:
-    """Move TD to the vehicle; from the ground no touch-down is detected later."""
-    nav.vehicle.firmware_state.landing_from_air = in_flight(nav.vehicle)
-    nav.set_here("TD")
+def touched_down(nav: Navigation) -> bool:
+    """Return whether it has touched the ground since (NavDetectGround): the accelerometer feels the jolt."""
+    before = nav.vehicle.firmware_state.touch_downs
+    return before is not None and nav.vehicle.flight.truth().contacts != before
 
 
 def stage_lasted(seconds: float) -> Condition:
@@ -147,12 +147,12 @@ PLAN = FlightPlan(
             ),
         ),
         Block("circle CAM", (Circle("CAM"),)),
-        Block("land here", (Once(touch_down_here),)),
+        Block("land here", (Once(lambda nav: nav.set_here("TD")),)),
         Block("land", (Go("TD"),)),
         Block(
             "flare",
-            (Stay("TD", climb="NAV_DESCEND_VSPEED"),),
-            ((on_ground, "Holding point"), (lambda nav: not in_flight(nav.vehicle), "landed")),
+            (Once(await_touch_down), Stay("TD", climb="NAV_DESCEND_VSPEED")),
+            ((touched_down, "Holding point"), (lambda nav: not in_flight(nav.vehicle), "landed")),
         ),
         Block("landed", (Idle(),)),
         Block("HOME", (Stay("HOME"),)),
@@ -210,7 +210,9 @@ def on_step(vehicle: Vehicle) -> None:
         navigation.step()
     if in_flight(vehicle):
         vehicle.ground.flight_time += TICK
-    elif not vehicle.armed and vehicle.estimate.landed:
+        return
+    state_of(vehicle).touch_downs = None
+    if not vehicle.armed and vehicle.estimate.landed:
         vehicle.ground.landed = True
 
 

@@ -38,6 +38,9 @@ FOLLOW_GAIN, FOLLOW_LEAD = 0.4, 0.25
 FOLLOW_ACCEL, FOLLOW_JERK, FASTEST = 10.0, 80.0, 15.0
 """Limits of the flight stack [m/s^2, m/s^3, m/s]; the guidance loops limit the motion."""
 
+RESTS_FOR = round(60.0 / SUBSTEP)
+"""Substeps after which a reference that moves alone has arrived."""
+
 TURN_GAIN, TURN_BRAKE = 3.5, 2.4
 """Approach to a heading [1/s, rad/s^2]: 90 degrees within 3 were recorded after 1.15 s, 180 after 2.15 s."""
 
@@ -80,12 +83,11 @@ class Guidance(Manoeuvre):
             loops.plane.frozen = None
         elif loops.plane.frozen is None:
             loops.plane.frozen = loops.plane.place, loops.plane.velocity
-        limits = Limits(tuning.speed, tuning.speed_up, tuning.speed_down)
         for _ in range(self._substeps()):
             loops.step(
                 plane,
                 -down,
-                limits,
+                self._limits(),
                 plane_is_velocity=plane_is_velocity,
                 up_is_velocity=down_is_velocity,
                 in_flight=vehicle.ground.lifted,
@@ -105,20 +107,26 @@ class Guidance(Manoeuvre):
             )
         )
 
+    def _limits(self) -> Limits:
+        tuning = self.vehicle.tuning
+        return Limits(tuning.speed, tuning.speed_up, tuning.speed_down)
+
     def _turn_to(self, yaw: float) -> float:
         """Return the turn rate towards a heading [rad/s]."""
         return approach(wrap(yaw - self.vehicle.estimate.attitude[2]), TURN_GAIN, TURN_BRAKE)
 
     def _moved_loops(self) -> GuidanceLoops:
-        vehicle, estimate = self.vehicle, self.vehicle.estimate
-        late = vehicle.kernel.now() - self._last_step_ns > self.RESTART_AFTER
-        lost = state_of(vehicle).frozen is not None
-        if self._loops is None or late:
+        estimate = self.vehicle.estimate
+        lost = state_of(self.vehicle).frozen is not None
+        if self._loops is None or self._is_late():
             self._loops = GuidanceLoops(estimate.position, estimate.velocity)
-            self._last_step_ns = vehicle.kernel.now()
+            self._last_step_ns = self.vehicle.kernel.now()
         elif not lost and self._loops.away_from(estimate.position):
             self._loops.move_to(estimate.position, estimate.velocity)
         return self._loops
+
+    def _is_late(self) -> bool:
+        return self.vehicle.kernel.now() - self._last_step_ns > self.RESTART_AFTER
 
     def _substeps(self) -> int:
         now = self.vehicle.kernel.now()
@@ -283,21 +291,28 @@ class GuidedSetpoint:
 
 
 class Guided(Guidance):
-    """GUIDED: hold the last set-point; at first the position where the mode was entered."""
+    """GUIDED: hold the last set-point; at first position and heading where the mode was chosen.
+
+    The original's guidance runs with motors off, too: starting them changes neither set-point nor reference.
+    """
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
-        self._setpoint = self._here()
+        estimate = vehicle.estimate
+        self._hold(GuidedSetpoint(*estimate.position, estimate.attitude[2]))
 
-    def _here(self) -> GuidedSetpoint:
-        estimate = self.vehicle.estimate
-        return GuidedSetpoint(*estimate.position, estimate.attitude[2])
-
-    def enter(self) -> None:
-        """Hold the present position and heading."""
-        self._hold(self._here())
+    def _rest(self) -> None:
+        """Move the vertical reference through a time without steps."""
+        before = self._loops
+        if before is None or not self._is_late():
+            return
+        steps = min(self._substeps(), RESTS_FOR)
+        wanted, by_climb = self._setpoint.down, self._setpoint.height_is_velocity
+        self._loops = None
+        self._moved_loops().height.rest(before.height, -wanted, self._limits(), steps, by_climb=by_climb)
 
     def _hold(self, setpoint: GuidedSetpoint) -> None:
+        self._rest()
         self._setpoint = setpoint
         plane = setpoint.plane_is_velocity
         self.target = None if plane else (setpoint.north, setpoint.east, self._target_down())
@@ -365,6 +380,7 @@ class Guided(Guidance):
 
     def step(self) -> None:
         """Command the set-point."""
+        self._rest()
         wanted = self._setpoint
         self.fly_loops(
             (wanted.north, wanted.east),

@@ -213,6 +213,14 @@ class PlaneLoop:
         return cos(self.leans[0].estimate) * cos(self.leans[1].estimate)
 
 
+class Limits(NamedTuple):
+    """Greatest speeds of the references in the plane, up and down [m/s]."""
+
+    level: float
+    up: float
+    down: float
+
+
 class HeightLoop:
     """Vertical response, metres up."""
 
@@ -261,6 +269,20 @@ class HeightLoop:
         self.height += self.climb * SUBSTEP
         return thrust
 
+    def rest(self, before: HeightLoop, goal: float, limits: Limits, steps: int, *, by_climb: bool) -> None:
+        """Take over the reference of *before*, and move it alone: it does not stop with the motors.
+
+        Args:
+            before: Response until now.
+            goal: Height [m], or climb rate [m/s].
+            limits: Greatest speeds of the reference.
+            steps: Number of substeps.
+            by_climb: Whether ``goal`` is a climb rate.
+        """
+        self._reference, self._reference_climb = before._reference, before._reference_climb
+        for _ in range(steps):
+            self._move_reference(goal, limits.up, limits.down, by_climb=by_climb)
+
     def climb_ahead(self, lead: float) -> float:
         """Return the climb rate in *lead* seconds [m/s], at most that of the reference or the present one."""
         up, down = self._limits
@@ -283,14 +305,6 @@ class HeightLoop:
         if by_climb:
             self._reference = self.height + _bounded(self._reference - self.height, MOST_BEHIND)
         return push if -down < moved < up else 0.0
-
-
-class Limits(NamedTuple):
-    """Greatest speeds of the references in the plane, up and down [m/s]."""
-
-    level: float
-    up: float
-    down: float
 
 
 class GuidanceLoops:

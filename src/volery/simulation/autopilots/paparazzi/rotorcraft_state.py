@@ -92,8 +92,8 @@ class RotorcraftState:
     """Time of the last change of mode."""
     battery_good_ns: Ns = NEVER
     """Time at which the battery was last above its critical level."""
-    landing_from_air: bool = False
-    """Whether the block ``land here`` was entered in flight."""
+    touch_downs: int | None = None
+    """Number of touch-downs before the one that block ``flare`` awaits, while it does."""
 
 
 def state_of(vehicle: Vehicle) -> RotorcraftState:

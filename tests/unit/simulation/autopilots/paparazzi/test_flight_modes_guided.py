@@ -54,6 +54,33 @@ def test_without_motors_a_set_point_does_nothing(craft: Any) -> None:
     assert craft.up < 0.3
 
 
+def test_motors_that_start_fly_the_set_point_that_was_stored_without_them(craft: Any) -> None:
+    """Recorded: GUIDED with motors off stores a set-point; kill_throttle 0 then lifts off at once."""
+    craft.set("mode", 19)
+    craft.guide(0x00, 0.0, 0.0, -3.0)
+    craft.run(5.0)
+    craft.set("kill_throttle", 0.0)
+    craft.run(20.0)
+    assert craft.up == pytest.approx(3.0, abs=0.4)
+
+
+def test_after_sinking_it_leaves_the_ground_slowly(craft: Any) -> None:
+    """Observed: the reference goes on sinking on the ground; 2 s after the set-point 1.7 m, not 4 m."""
+    craft.guided(-5.0)
+    craft.guide(0x40, 0.0, 0.0, 0.8)
+    craft.until(lambda: craft.flight.truth().contacts > 0, 15.0)
+    craft.run(2.0)
+    craft.set("kill_throttle", 1.0)
+    craft.run(3.0)
+    craft.set("kill_throttle", 0.0)
+    craft.run(0.4)
+    craft.guide(0x00, 0.0, 0.0, -6.0)
+    craft.run(2.0)
+    assert 1.0 < craft.up < 2.4
+    craft.run(20.0)
+    assert craft.up == pytest.approx(6.0, abs=0.6)
+
+
 def test_entering_it_stays_where_it_is(craft: Any) -> None:
     craft.in_the_air()
     place = craft.position

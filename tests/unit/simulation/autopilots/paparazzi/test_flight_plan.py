@@ -212,6 +212,35 @@ def test_land_here_on_the_ground_leaves_the_motors_on(craft: Any) -> None:
     assert craft.armed
 
 
+def test_a_touch_down_stops_the_motors_at_once(craft: Any) -> None:
+    """Observed in eight landings: no thrust is reported 0.07 to 0.26 s after the touch-down."""
+    craft.in_the_air()
+    craft.block("land here")
+    craft.until(lambda: craft.flight.truth().contacts > 0, 20.0)
+    craft.run(0.2)
+    assert not craft.armed
+    assert craft.block_name == "Holding point"
+
+
+def test_a_touch_down_of_an_earlier_flight_does_not_stop_the_motors(craft: Any) -> None:
+    craft.in_the_air()
+    craft.block("flare")
+    craft.block("Standby")
+    craft.set("mode", 19)
+    craft.guide(0x40, 0.0, 0.0, 0.8)
+    craft.until(lambda: craft.flight.truth().contacts > 0, 20.0)
+    craft.run(2.0)
+    craft.set("kill_throttle", 1.0)
+    craft.run(1.0)
+    craft.set("mode", 13)
+    craft.block("Holding point")
+    craft.in_the_air()
+    craft.block("flare")
+    craft.run(1.0)
+    assert craft.armed
+    assert craft.block_name == "flare"
+
+
 def test_a_moved_waypoint_is_flown_to_and_reported(craft: Any) -> None:
     craft.in_the_air()
     place = 20.0, -15.0, -9.0
