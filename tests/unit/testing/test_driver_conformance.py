@@ -20,8 +20,11 @@ from volery.testing.checks import CheckFailedError, demand, raising
 from volery.testing.driver_conformance import chosen
 from volery.testing.fault_trials import try_fault
 from volery.vehicles import Capability
-from volery.vehicles.driver import DriverFactory, drivers
+from volery.vehicles.driver import DriverFactory, ManualControl, drivers
 from volery.vehicles.drivers.ardupilot import open_driver
+
+HEIGHTS: list[float] = []
+"""Heights at which a strong vehicle was given manual control, m above home."""
 
 
 class Cheat:
@@ -38,6 +41,12 @@ class Cheat:
         lacking = {Capability.SPEED} if self._way == "no speed" else set()
         return frozenset(self._driver.capabilities - lacking)
 
+    def manual_control(self, control: ManualControl | None) -> None:
+        if self._way == "strong" and control is not None:
+            HEIGHTS.append(self._driver.telemetry.above_home)
+            control = control._replace(throttle=1.0)
+        self._driver.manual_control(control)
+
     def goto(self, *asked: Any) -> Sequence[Any]:
         steps = self._driver.goto(*asked)
         if self._way == "claims":
@@ -51,7 +60,7 @@ class Cheat:
 
 @pytest.fixture(autouse=True)
 def cheats() -> Iterator[None]:
-    ways = ("claims", "hangs", "raises", "no speed")
+    ways = ("claims", "hangs", "raises", "no speed", "strong")
     for way in ways:
 
         def opens(*opened: Any, way: str = way) -> Any:
@@ -86,6 +95,13 @@ def test_a_driver_that_raises_what_is_none_of_ours() -> None:
     assert result.outcome is Outcome.FAILED
     assert "ZeroDivisionError: of the driver's own" in result.detail
     assert try_fault("cheat-raises", "none", "goto").broken.startswith("a fault of volery: ZeroDivision")
+
+
+def test_a_strong_vehicle_is_not_flown_by_hand_out_of_the_clear_space() -> None:
+    """Observed: the check lifted a `bebop`, which hovers at a quarter of its thrust, to 92 m."""
+    HEIGHTS.clear()
+    assert found("sim:cheat-strong", "stabilize")["stabilize"].outcome is Outcome.PASSED
+    assert 22.0 < max(HEIGHTS) < 30.0
 
 
 def test_a_fault_trial_of_a_driver_that_hangs() -> None:

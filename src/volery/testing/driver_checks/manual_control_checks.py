@@ -14,6 +14,8 @@ CLIMBING = (*STICKS, Capability.CLIMB_BY_THROTTLE)
 STABILIZED = (Capability.MANUAL_CONTROL, Capability.STABILIZE)
 UP = (Capability.TAKEOFF,)
 BETWEEN_S = 0.1
+STRAYED_M = 4.0
+"""Distance from the height at which manual flight began, at which it ends: 30 m above home are clear."""
 
 
 def fly_by_hand(
@@ -108,7 +110,8 @@ def stabilize(stage: Stage) -> str:
     stage.drone.manual_control(0, 0, 0.5, 0)
     stage.drone.stabilize()
     mode = stage.drone.mode
-    fly_by_hand(stage, 3, 0.5)
+    # where the throttle is the thrust, half of it lifts a strong vehicle at 1 g
+    fly_by_hand(stage, 3, 0.5, until=lambda: abs(stage.drone.telemetry.above_home - 20.0) > STRAYED_M)
     demand(stage.drone.flying, "it fell")
     stage.drone.goto(stage.at(0, 0, 15))
     demand(stage.drone.flying, "it fell")
