@@ -1,11 +1,12 @@
 """The five-line mission phase by phase: simulated against flown by the real firmware in its own simulator.
 
 The reference is what was recorded of ArduCopter 4.5.6 (SITL), PX4 1.14 (SIH, mean of 90 flights) and
-Paparazzi after v6.2 (NPS, `ardrone2`, mean of four), with the same mission file and without wind. The ratio
+Paparazzi after v6.2 (NPS, `ardrone2`, mean of eight), with the same mission file and without wind. The ratio
 is simulated over recorded; PX4's is the mean of as many seeds as flights, with the noise of SIH's sensors. A
-figure marked with * is more than 5 per cent (times) or 10 per cent (others) off. PX4's figures are computed
-from the traces that `volery fly` wrote of the firmware, by the functions that compute the simulated ones. The
-simulated PX4 is recorded as a real vehicle is: armed since the heartbeat that says so, up to a second late.
+figure marked with * is more than 5 per cent (times) or 10 per cent (others) off. Those of PX4 and Paparazzi
+are computed from the traces that `volery fly` wrote of the firmware, by the functions that compute the
+simulated ones. The simulated PX4 is recorded as a real vehicle is: armed since the heartbeat that says so, up
+to a second late.
 SIH starts its random numbers with the same seed, so flights that begin at the same time after the boot have
 the same noise; each of the 90 had a seed of its own.
 
@@ -37,7 +38,7 @@ SENSORS = {"px4": "sih", "paparazzi": "rtk"}
 """The sensors nearest to those of the simulator that was recorded: SIH's noise is larger than that of the
 default ones, the receiver of NPS has none."""
 
-FLIGHTS = {"px4": 90, "paparazzi": 4}
+FLIGHTS = {"px4": 90, "paparazzi": 8}
 """Number of flights whose mean is compared, with seeds from 1 on: as many as were recorded; else one. Noise
 of SIH's sensors makes times of single flights differ by some seconds."""
 
@@ -212,13 +213,17 @@ def speed(one: VehicleState) -> float:
     return hypot(one.vx, one.vy)
 
 
-def legs(*recorded: float) -> Sequence[Figure]:
-    """Return the figures of three legs, each the duration of its goto()."""
+def legs(*recorded: tuple[float, float]) -> Sequence[Figure]:
+    """Return the figures of three legs, each the duration of its goto(), with its standard error."""
     return [
         Figure(
-            f"leg {number + 1}", "s", seconds, lambda flight, number=number: flight.duration("goto", number)
+            f"leg {number + 1}",
+            "s",
+            seconds,
+            lambda flight, number=number: flight.duration("goto", number),
+            error=error,
         )
-        for number, seconds in enumerate(recorded)
+        for number, (seconds, error) in enumerate(recorded)
     ]
 
 
@@ -231,7 +236,7 @@ RECORDED: Mapping[str, Sequence[Figure]] = {
             5.4,
             lambda flight: flight.rises_to(NEARLY_UP_M) - flight.rises_to(LIFTED_M),
         ),
-        *legs(14.51, 28.62, 17.79),
+        *legs((14.51, nan), (28.62, nan), (17.79, nan)),
         Figure("land from 20 m", "s", 31.19, lambda flight: flight.duration("land")),
         Figure("armed in all", "s", 101.1, Flight.armed),
         Figure("distance", "m", 401.0, Flight.distance),
@@ -268,14 +273,14 @@ RECORDED: Mapping[str, Sequence[Figure]] = {
         Figure("overshoot", "m", 0.92, Flight.overshoot, error=0.014),
     ),
     "paparazzi": (
-        *legs(25.25, 50.75, 25.57),
-        Figure("land from 20 m", "s", 27.63, lambda flight: flight.duration("land")),
-        Figure("armed in all", "s", 136.3, Flight.armed),
-        Figure("distance", "m", 430.0, Flight.distance),
-        Figure("greatest speed", "m/s", 7.54, lambda flight: flight.greatest(speed)),
-        Figure("greatest climb", "m/s", 3.70, lambda flight: flight.greatest(lambda one: one.vz)),
-        Figure("greatest sink", "m/s", 3.07, lambda flight: flight.greatest(lambda one: -one.vz)),
-        Figure("overshoot", "m", 2.20, Flight.overshoot),
+        *legs((25.26, 0.05), (50.81, 0.04), (25.59, 0.05)),
+        Figure("land from 20 m", "s", 27.51, lambda flight: flight.duration("land"), error=0.07),
+        Figure("armed in all", "s", 136.62, Flight.armed, error=0.02),
+        Figure("distance", "m", 430.2, Flight.distance, error=0.06),
+        Figure("greatest speed", "m/s", 7.17, lambda flight: flight.greatest(speed), error=0.09),
+        Figure("greatest climb", "m/s", 3.38, lambda flight: flight.greatest(lambda one: one.vz), error=0.04),
+        Figure("greatest sink", "m/s", 3.10, lambda flight: flight.greatest(lambda one: -one.vz), error=0.05),
+        Figure("overshoot", "m", 2.21, Flight.overshoot, error=0.005),
     ),
 }
 """PX4's simulator measures no current; Paparazzi's reports a current that its model does not depend on."""
