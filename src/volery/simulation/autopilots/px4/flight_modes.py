@@ -125,6 +125,11 @@ class TakeOff(Hold):
 class Descent(Land):
     """AUTO.LAND: sink more slowly below MPC_LAND_ALT1, and at MPC_LAND_SPEED below ALT2."""
 
+    def enter(self) -> None:
+        """Take the present position where no point was given, as Navigator's ``set_land_item`` does."""
+        if self.point is None:
+            self.point = self.vehicle.estimate.position
+
     def step(self) -> None:
         """Move the trajectory down over the point and follow it."""
         vehicle = self.vehicle

@@ -50,7 +50,7 @@ def attitude_quaternion(vehicle: Vehicle) -> Fields | None:
 
 
 def global_position(vehicle: Vehicle) -> Fields | None:
-    """Return GLOBAL_POSITION_INT once there is a position."""
+    """Return GLOBAL_POSITION_INT once there is a position; PX4 cuts decimals off and does not round."""
     estimate = vehicle.estimate
     if vehicle.uptime() < GLOBAL_AFTER or not estimate.position_ok:
         return None
@@ -58,13 +58,13 @@ def global_position(vehicle: Vehicle) -> Fields | None:
     north, east, down = estimate.velocity
     return {
         "time_boot_ms": boot_ms(vehicle),
-        "lat": round(latitude * 1e7),
-        "lon": round(longitude * 1e7),
-        "alt": round(amsl * 1000.0),
-        "relative_alt": round(vehicle.height * 1000.0),
-        "vx": to_int16(north * 100.0),
-        "vy": to_int16(east * 100.0),
-        "vz": to_int16(down * 100.0),
+        "lat": int(latitude * 1e7),
+        "lon": int(longitude * 1e7),
+        "alt": int(amsl * 1000.0),
+        "relative_alt": int(vehicle.height * 1000.0),
+        "vx": to_int16(int(north * 100.0)),
+        "vy": to_int16(int(east * 100.0)),
+        "vz": to_int16(int(down * 100.0)),
         "hdg": heading_cdeg(estimate.attitude[2]),
     }
 

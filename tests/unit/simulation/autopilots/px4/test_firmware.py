@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isnan, nan
+from statistics import fmean
 from typing import Any
 
 import pytest
@@ -176,3 +177,25 @@ def test_telemetry_that_the_other_end_does_not_use_is_not_sent() -> None:
     others = {"HIGHRES_IMU", "ATTITUDE_QUATERNION", "VFR_HUD", "ODOMETRY"}
     assert others <= {name for _, name, _ in everything}
     assert not others & {name for _, name, _ in received}
+
+
+def test_a_stated_position_is_cut_off_and_not_rounded() -> None:
+    """PX4 converts degrees to integers as C++ does: in the mean half a count nearer to zero."""
+    kernel = VirtualKernel()
+    frame = LocalFrame(46.0, -7.0, 500.0)
+    _, flights = make_world(kernel.now, [Multirotor()], seed=3, frame=frame)
+    autopilot = Autopilot(kernel, flights[0], FIRMWARE, warm=True)
+    ours, theirs = in_process_pair(kernel, MS, "station")
+    cuts: list[tuple[float, float]] = []
+
+    def compare(found: Frame) -> None:
+        if found.name == "GLOBAL_POSITION_INT":
+            latitude, longitude, _ = autopilot.vehicle.estimate.geodetic
+            cuts.append((latitude * 1e7 - found.fields["lat"], longitude * 1e7 - found.fields["lon"]))
+
+    ours.receive(compare)
+    autopilot.connect(theirs)
+    kernel.run(30 * S)
+    assert len(cuts) > 100
+    assert fmean(north for north, _ in cuts) == pytest.approx(0.5, abs=0.2)
+    assert fmean(east for _, east in cuts) == pytest.approx(-0.5, abs=0.2)

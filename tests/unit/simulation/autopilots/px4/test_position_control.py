@@ -216,6 +216,23 @@ def test_the_noise_of_a_flight_follows_from_its_seed() -> None:
     assert hovered(1) != hovered(2)
 
 
+def test_it_lands_where_it_was_when_land_was_commanded() -> None:
+    """Navigator's ``set_land_item`` takes the present position, not where the vehicle can stop."""
+    places = []
+
+    def land(drone: Drone) -> None:
+        drone.takeoff(10)
+        drone.set_velocity(north=3, lasting=4)
+        assert drone.velocity.north > 1.5
+        places.append(drone.position)
+        drone.land()
+        places.append(drone.position)
+
+    fly(land, "sim:px4?start=warm", Options(seed=1))
+    commanded, landed = places
+    assert abs(landed.latitude - commanded.latitude) * 111_200.0 < 0.6
+
+
 def test_the_nose_points_to_where_it_flies() -> None:
     """MPC_YAW_MODE 0: towards the point while it is farther than NAV_ACC_RAD."""
     headings = []
