@@ -11,7 +11,7 @@ BENCH = Path(__file__).parents[2] / "bench" / "phases.py"
 
 NOT_REACHED = {
     "ardupilot": set[str](),
-    "px4": {"goal 3 within 1 m to LAND"},
+    "px4": set[str](),
     "paparazzi": set[str](),
 }
 """What is known of the reasons: docs/four-autopilots.md."""
