@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rigs.requirements import lacking
-from volery.report.html_report import write_comparison, write_report
+from volery.report.html_report import recover, write_comparison
 from volery.requirements.accounts import Accounts
 from volery.requirements.record import write_record
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
@@ -50,7 +50,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
             writer(event)
         writer.close()
         write_record(accounts.record("completed"), folder)
-        write_report(folder)
+        recover(folder)
         made.append(folder)
     return made
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
+import os
 import sys
 from functools import cache
 from importlib import import_module
@@ -72,7 +75,13 @@ def _declared(file: str) -> list[Commands]:
 
 @seldom_collected()
 def main() -> None:
-    """Run the command line of this process, with the defaults of the nearest configuration file."""
+    """Run the command line of this process, with the defaults of the nearest configuration file.
+
+    numpy computes with one thread, unless OPENBLAS_NUM_THREADS is set: results do not depend on the number of
+    cores, and no thread waits for work, which takes as much processor time as numpy's import.
+    """
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    atexit.register(gc.freeze)  # at its end Python looks for garbage in all that exists; nothing needs it
     command = typer.main.get_group(application(next(iter(sys.argv[1:]), "")))
     defaults: dict[str, Any] = {}
     try:

@@ -1,8 +1,8 @@
 """HTML documents: the report of a run and the comparison of several, each one file that needs no network.
 
-A report is made from the trace of a run folder alone. If the folder has a ``run.json``, its figures are
-shown, since only ``run.json`` has the wall time; else the accounts are computed again from the trace, as for
-a run that was killed.
+A report is made from the events of a run: while it runs, or later from the trace of its folder alone. If the
+folder has a ``run.json``, its figures are shown, since only ``run.json`` has the wall time; else the accounts
+are computed again from the trace, as for a run that was killed.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ from volery.report.grids import (
 from volery.report.terminal import comparison_table
 from volery.requirements.accounts import DELIVERED, Accounts
 from volery.requirements.record import RUN_FILE, ParcelRecord, RunRecord, Status, read_record, write_record
-from volery.trace.attachments import WORLD_ATTACHMENT, scenery_from_json
-from volery.trace.events import Record, Verdict
-from volery.trace.mcap_writer import OUTCOME, TRACE_FILE
+from volery.trace.attachments import WORLD_ATTACHMENT, RunSetup, scenery_from_json
+from volery.trace.events import Event, Record, Verdict
+from volery.trace.mcap_writer import OUTCOME, TRACE_FILE, Attachment
 from volery.trace.reader import Reading
 from volery.trace.timeline import TimelineWriter
 
@@ -83,6 +83,33 @@ class ReportContent:
     lost: str = ""
 
 
+class HtmlReport:
+    """Reporter of a run that is in progress: keeps what its report draws, and writes the report at its end.
+
+    The report is that which ``recover`` makes of the run's trace, without reading the trace.
+    """
+
+    def __init__(self, setup: RunSetup, attachments: Iterable[Attachment]) -> None:
+        self._digest = _digest(setup, {one.name: one for one in attachments})
+
+    def __call__(self, event: Event) -> None:
+        """Take an event."""
+        self._digest(event)
+
+    def listener(self, kind: type[Any]) -> Record | None:
+        """Return what takes events of a kind; None if they do not matter to the report."""
+        return self._digest if kind in Digest.listens else None
+
+    def write(self, record: RunRecord, folder: Path) -> Path:
+        """Write ``report.html`` into a finished run folder and return its path."""
+        return write_document(ReportContent(record, self._digest.data(record.sim_s)), folder)
+
+
+def _digest(setup: RunSetup, attachments: Mapping[str, Attachment]) -> Digest:
+    world = attachments.get(WORLD_ATTACHMENT)
+    return Digest(setup, scenery_from_json(world.data) if world else None)
+
+
 def gather(folder: Path, *taps: Record) -> ReportContent:
     """Read the trace of a run, and its ``run.json`` if there is one.
 
@@ -97,9 +124,7 @@ def gather(folder: Path, *taps: Record) -> ReportContent:
         UsageError: There is no trace, or it ends before its header.
     """
     with Reading(folder / TRACE_FILE) as reading:
-        setup = reading.setup
-        attached = reading.attachments.get(WORLD_ATTACHMENT)
-        digest = Digest(setup, scenery_from_json(attached.data) if attached else None)
+        digest = _digest(reading.setup, reading.attachments)
         if (folder / RUN_FILE).exists():
             record = read_record(folder)
             for event in reading.events(Digest.listens):
@@ -130,11 +155,6 @@ def status_of(ending: Mapping[str, str]) -> Status:
     """Return the status of a run from its trace; ``unfinished`` if the run was killed."""
     known = (status for status in get_args(Status) if status == ending.get("status"))
     return next(known, "unfinished")
-
-
-def write_report(folder: Path) -> Path:
-    """Write ``report.html`` into *folder* and return its path. Raises ``UsageError`` if that fails."""
-    return write_document(gather(folder), folder)
 
 
 def write_document(material: ReportContent, folder: Path) -> Path:

@@ -9,11 +9,12 @@ writes ``trace.mcap`` and ``timeline.json`` while it runs, and ``run.json`` and 
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from time import perf_counter
+from typing import Protocol
 
 from volery.base.errors import UsageError
 from volery.base.files import create_file
@@ -23,7 +24,7 @@ from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RUN_FILE, RunRecord, Status, write_record
 from volery.run.event_log import EventLog, LogOptions
 from volery.trace.attachments import RunSetup
-from volery.trace.events import Verdict
+from volery.trace.events import Event, Verdict
 from volery.trace.mcap_writer import TRACE_FILE, Attachment, McapWriter
 from volery.trace.stream import Stream
 from volery.trace.timeline import TimelineWriter
@@ -49,10 +50,21 @@ def _versions() -> dict[str, str]:
 TIMELINE_FILE = "timeline.json"
 REPORT_FILE = "report.html"
 
-ReportWriter = Callable[[Path], Path]
-"""Writes a document into a finished run folder and returns its path."""
 
-reporters: Registry[ReportWriter] = Registry("volery.reporters", "report")
+class Reporter(Protocol):
+    """Makes a document of a run: a listener of its events (see ``Stream``) that writes at the end."""
+
+    def __call__(self, event: Event) -> None:
+        """Take an event."""
+
+    def write(self, record: RunRecord, folder: Path) -> Path:
+        """Write the document into a finished run folder and return its path."""
+
+
+ReporterClass = Callable[[RunSetup, Sequence[Attachment]], Reporter]
+"""Makes the reporter of one run from its set-up and the attachments of its trace."""
+
+reporters: Registry[ReporterClass] = Registry("volery.reporters", "report")
 
 
 def make_folder(out: Path) -> Path:
@@ -79,7 +91,7 @@ class Recording:
         self,
         setup: RunSetup,
         out: Path | None,
-        attachments: Iterable[Attachment] = (),
+        attachments: Sequence[Attachment] = (),
         *,
         traced: bool = True,
     ) -> None:
@@ -92,6 +104,7 @@ class Recording:
         self._trace: McapWriter | None = None
         self._timeline: TimelineWriter | None = None
         self._log: EventLog | None = None
+        self._reporters: list[Reporter] = []
         self.stream.tap(self.accounts)
         if self.folder is not None:
             _forget_earlier_run(self.folder)
@@ -100,6 +113,17 @@ class Recording:
             self._timeline = TimelineWriter(self.folder / TIMELINE_FILE)
             self.stream.tap(self._trace)
             self.stream.tap(self._timeline)
+            self._start_reporters(setup, attachments)
+
+    def _start_reporters(self, setup: RunSetup, attachments: Sequence[Attachment]) -> None:
+        for name in reporters.names():
+            try:
+                reporter = reporters.load(name)(setup, attachments)
+            except MissingExtraError as error:
+                self.notes.append(str(error))
+                continue
+            self._reporters.append(reporter)
+            self.stream.tap(reporter)
 
     def log_into(self, wanted: LogOptions) -> None:
         """Write the lines of a log from now on. Raises ``UsageError`` if the file cannot be written."""
@@ -127,11 +151,8 @@ class Recording:
     def _write_documents(self, record: RunRecord, folder: Path) -> None:
         try:
             write_record(record, folder)
-            for name in reporters.names() if self._trace is not None else ():
-                try:
-                    reporters.load(name)(folder)
-                except MissingExtraError as error:
-                    self.notes.append(str(error))
+            for reporter in self._reporters:
+                reporter.write(record, folder)
         except (UsageError, OSError) as error:
             self.problems.append(str(error))
 

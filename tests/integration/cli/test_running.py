@@ -181,6 +181,10 @@ def test_a_folder_that_cannot_be_written(starter):
     assert "cannot write" in done.stderr
 
 
+def children_of(pid: int) -> list[int]:
+    return [int(one) for one in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_a_demo_that_is_ended_leaves_no_process(tmp_path, number):
@@ -191,9 +195,10 @@ def test_a_demo_that_is_ended_leaves_no_process(tmp_path, number):
     workers = []
     try:
         until(lambda: all(one.exists() and one.stat().st_size > 100_000 for one in traces), process)
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        workers = [os.pidfd_open(int(one)) for one in children]
-        assert len(workers) >= 2
+        children = children_of(process.pid)
+        started = [*children, *(one for child in children for one in children_of(child))]
+        workers = [os.pidfd_open(one) for one in started]
+        assert len(workers) >= 4  # simulations, fork server, resource tracker
         process.send_signal(number)
         process.wait(timeout=WITHIN_S)
         for worker in workers:  # readable when it has ended

@@ -1,6 +1,7 @@
 """The command line: exit statuses, messages, JSON; nothing that flies."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -85,6 +86,39 @@ def test_a_command_imports_its_own_file_only(word, imported):
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     found = {name.removeprefix(package) for name in done.stdout.split() if name.startswith(package)}
     assert found == imported or (imported is None and {"fly", "ros", "simulate"} < found)
+
+
+@pytest.mark.parametrize(("stated", "found"), [(None, "1 1"), ("2", "2")])
+def test_numpy_has_one_thread_unless_more_are_stated(stated, found):
+    """Its threads wait for work as long as its import takes; results would depend on the number of cores."""
+    script = """
+import os, sys
+from volery.cli.main import main
+sys.argv = ["volery", "--version"]
+try:
+    main()
+except SystemExit:
+    import numpy
+    print(os.environ["OPENBLAS_NUM_THREADS"], len(os.listdir("/proc/self/task")))
+"""
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    environment |= {"OPENBLAS_NUM_THREADS": stated} if stated else {}
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, env=environment
+    )
+    assert done.stdout.splitlines()[-1].startswith(found)
+
+
+def test_no_garbage_is_sought_when_a_command_ends():
+    script = """
+import atexit, gc, sys
+from volery.cli.main import main
+atexit.register(lambda: print(gc.get_freeze_count() > 1000))
+sys.argv = ["volery", "--version"]
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "True"
 
 
 @pytest.mark.parametrize(

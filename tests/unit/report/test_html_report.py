@@ -15,20 +15,20 @@ from rich.console import Console, RenderableType
 from volery.base.errors import UsageError
 from volery.base.time import S
 from volery.report.html_report import (
+    HtmlReport,
     compare,
     environment,
     gather,
     recover,
     render,
     write_comparison,
-    write_report,
 )
 from volery.report.terminal import comparison_table, cost_table, short_comparison, summary_table
 from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RunRecord, read_record, write_record
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
 from volery.trace.attachments import RunSetup, to_json
-from volery.trace.events import Event, Failure, Message, Milestone, Text, VehicleState
+from volery.trace.events import Charge, Event, Failure, Message, Milestone, Text, VehicleState
 from volery.trace.mcap_writer import Attachment, McapWriter
 
 _MAP = Attachment("world.json", "application/json", to_json(sample_scenery()))
@@ -111,7 +111,7 @@ def shown(thing: RenderableType, width: int = 200) -> str:
 
 
 def test_one_file_that_asks_nothing_of_the_network(runs: tuple[Path, Path]) -> None:
-    html = write_report(runs[0]).read_text()
+    html = recover(runs[0]).report.read_text()
     tags = parsed(html)
     assert tags.references == ["data:,"]
     assert "http://" not in html
@@ -140,7 +140,7 @@ def test_says_what_was_asked_of_it(runs: tuple[Path, Path]) -> None:
 
 def test_a_run_of_fifteen_minutes_stays_small(tmp_path: Path) -> None:
     make_run(tmp_path / "long", seconds=900.0)
-    assert write_report(tmp_path / "long").stat().st_size < 5_000_000
+    assert recover(tmp_path / "long").report.stat().st_size < 5_000_000
 
 
 def test_words_of_others_cannot_break_out_of_the_page(tmp_path: Path) -> None:
@@ -227,9 +227,15 @@ def test_more_words_than_fit_are_counted(tmp_path: Path) -> None:
     assert "600 more stand in the trace alone" in html
 
 
-def test_a_folder_without_a_trace_is_a_usage_error(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"trace\.mcap"):
-        write_report(tmp_path)
+def test_a_report_made_while_the_run_is_in_progress_is_that_of_its_trace(tmp_path: Path) -> None:
+    record = make_run(tmp_path / "run")
+    live = HtmlReport(sample_setup(), [_MAP])
+    for event in sample_events(seconds=120.0):
+        if (listener := live.listener(type(event))) is not None:
+            listener(event)
+    written = live.write(record, tmp_path / "run").read_bytes()
+    assert recover(tmp_path / "run").report.read_bytes() == written
+    assert live.listener(Charge) is None
 
 
 def test_a_killed_run_is_recovered_from_its_trace(runs: tuple[Path, Path], tmp_path: Path) -> None:
@@ -271,7 +277,7 @@ def test_a_record_that_is_there_is_kept(runs: tuple[Path, Path]) -> None:
 
 
 def test_runs_side_by_side(runs: tuple[Path, Path], tmp_path: Path) -> None:
-    write_report(runs[0])
+    recover(runs[0])
     html = write_comparison(runs, tmp_path).read_text()
     tags = parsed(html)
     assert any(reference.endswith("one/report.html") for reference in tags.references)

@@ -150,7 +150,8 @@ def run_all(output: Output, jobs: Mapping[str, Job]) -> dict[str, JobOutcome]:
     """Run all *jobs* and return their outcomes by name. Raises the error of the first that cannot start."""
     from volery.cli.run_display import live_progress
 
-    context = multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["volery.run.simulate"])  # imported once for all processes
     reports = context.SimpleQueue()
     with (
         live_progress(output) as drawings,
