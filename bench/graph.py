@@ -16,7 +16,7 @@ from typing import Any
 
 from volery.base.time import MS, S
 from volery.bridge import serve_vehicle
-from volery.cost import load_catalogue
+from volery.cost import Tariff, load_catalogue
 from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
@@ -30,7 +30,7 @@ POSE = "geometry_msgs/msg/PoseStamped"
 
 
 def graph_on(kernel: VirtualKernel, priced: bool, recorded: bool) -> EmbeddedGraph:
-    tariff = load_catalogue().processor("rpi4-cortex-a72").ros_law("roscpp").at(1500)
+    tariff = Tariff(load_catalogue().processor("rpi4-cortex-a72").ros_law("roscpp"), 1500)
     tariffs = (lambda node: tariff) if priced else free
     return EmbeddedGraph(kernel, tariffs, records=lambda topic: recorded)
 

@@ -47,7 +47,8 @@ from volery.cost.pricing import (
     StatedPricing,
 )
 from volery.cost.python_operations import OPERATIONS, STEPS_PER_NS, OperationTable, operation_table
-from volery.cost.ros_law import NOT_COUNTED, CallFigures, Price, RosLaw, Tariff
+from volery.cost.ros_law import NOT_COUNTED, CallFigures, RosLaw
+from volery.cost.tariff import Price, Tariff
 
 __all__ = [
     "FREE",

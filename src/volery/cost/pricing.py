@@ -16,7 +16,7 @@ from volery.base.errors import EstimateError, choices
 from volery.base.time import Ns
 from volery.cost.catalogue import ProcessorEntry
 from volery.cost.figures import Provenance, WithProvenance, scale_energy, scale_time
-from volery.cost.ros_law import Tariff
+from volery.cost.tariff import Tariff
 
 STEPS_PER_CYCLE = 1000
 """Steps of a cycle of compiled code. Costs are whole steps, so that sums are exact on every machine."""
@@ -207,7 +207,7 @@ class ProcessorPrices:
     def ros_calls(self, client: str) -> Tariff:
         """Return the prices of calls into ROS with a client library (``roscpp``, ``rospy``, ``rclpy``)."""
         if client not in self._tariffs:
-            self._tariffs[client] = self.entry.ros_law(client).at(self._frequency_mhz)
+            self._tariffs[client] = Tariff(self.entry.ros_law(client), self._frequency_mhz)
         return self._tariffs[client]
 
     def watts(self, busy_cores: float) -> float:

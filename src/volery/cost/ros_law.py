@@ -29,12 +29,8 @@ passes in ``spin``. The paper does not price them; a law with figures for them d
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from pydantic import model_validator
 
-from volery.base.errors import EstimateError, choices
-from volery.base.time import Ns
 from volery.cost.figures import Line, WithProvenance, line_through
 
 NOT_COUNTED = (
@@ -65,24 +61,6 @@ connection; x microseconds pass in ``spin``.
 
 SERVICE_CALLS = ("call_service", "serve")
 """A request, for its caller and for its server: they cost nothing where a law has no figure."""
-
-_SPIN = {1.0: "spin_once_first", 0.0: "spin_once_next"}
-_MAX_CACHED = 4096
-"""Prices that a tariff keeps; sleeps of many different lengths must not fill the memory."""
-
-
-class Price(NamedTuple):
-    """Execution time of one call on the target, ns: of the caller, and of its process in the background.
-
-    ``flags`` say what is doubtful about it.
-    """
-
-    caller: Ns
-    background: Ns
-    flags: tuple[str, ...] = ()
-
-
-NO_PRICE = Price(0, 0)
 
 
 class CallFigures(WithProvenance):
@@ -147,88 +125,3 @@ class RosLaw(WithProvenance):
                 f"no figures of {self.charged_as} are in the catalogue"
             )
         return tuple(found)
-
-    def price(self, call: str, x: float, frequency_mhz: float) -> Price:
-        """Return the price of one call. See ``Tariff``."""
-        return self.at(frequency_mhz)(call, x)
-
-    def at(self, frequency_mhz: float) -> Tariff:
-        """Return the law at one frequency in MHz."""
-        return Tariff(self, frequency_mhz)
-
-
-class Tariff:
-    """The prices of a law at one frequency."""
-
-    def __init__(self, law: RosLaw, frequency_mhz: float) -> None:
-        self.law = law
-        self.frequency_mhz = frequency_mhz
-        self.warnings = law.warnings(frequency_mhz)
-        self._parts: dict[str, tuple[float, float]] = {}
-        self._callers: dict[str, tuple[float, float]] = {}
-        self._known: dict[tuple[str, float], Price] = {}
-        for call, figures in law.calls.items():
-            self._parts[call] = _at(frequency_mhz, *figures.lines())
-            if figures.caller is not None:
-                self._callers[call] = _at(frequency_mhz, figures.caller, figures.caller_per_x)
-
-    def __call__(self, call: str, x: float = 0.0) -> Price:
-        """Return the price of one call.
-
-        Args:
-            call: Name of the call or of a background event.
-            x: Number of subscribers of ``publish``, time slept in microseconds of ``sleep``.
-
-        Raises:
-            EstimateError: The call has no figure, or its line gives a negative time at this frequency.
-        """
-        known = self._known.get((call, x))
-        return known if known is not None else self._compute(call, x)
-
-    def _compute(self, call: str, x: float) -> Price:
-        name = _SPIN.get(x, call) if call == "spin_once" else call
-        while name not in self._parts and name in WARMER_CALLS:
-            name = WARMER_CALLS[name]
-        if name in (*BACKGROUND_EVENTS, *SERVICE_CALLS) and name not in self._parts:
-            return self._keep(call, x, NO_PRICE)
-        if name not in self._parts:
-            raise EstimateError(
-                f"no figure for the ROS call {name!r} of {self.law.client} on {self.law.processor}; "
-                f"there is {choices(self._parts)}"
-            )
-        constant, per_x = self._parts[name]
-        variable = per_x * x
-        if constant < 0.0 or variable < 0.0:
-            raise EstimateError(
-                f"the {self.law.client} figures of {self.law.processor} give a negative time for {name!r} at "
-                f"{self.frequency_mhz:g} MHz; they hold from {self.law.least_mhz:g} to "
-                f"{self.law.greatest_mhz:g} MHz"
-            )
-        return self._keep(call, x, self._split(name, constant, variable, x))
-
-    def _keep(self, call: str, x: float, price: Price) -> Price:
-        if len(self._known) < _MAX_CACHED:
-            self._known[call, x] = price
-        return price
-
-    def _split(self, name: str, constant: float, variable: float, x: float) -> Price:
-        """Divide the cost of a call between the caller and the background."""
-        flags = self._flags(name)
-        whole = round(constant + variable)
-        if name == "sleep" or name in BACKGROUND_EVENTS:  # a sleep's cost falls while it sleeps
-            return Price(0, whole, flags)
-        if name in self._callers:
-            fixed, per_x = self._callers[name]
-            caller = min(whole, max(0, round(fixed + per_x * x)))
-            return Price(caller, whole - caller, flags)
-        return Price(round(constant), round(variable), flags)
-
-    def _flags(self, name: str) -> tuple[str, ...]:
-        figures = self.law.calls[name]
-        if figures.doubtful_mhz and self.frequency_mhz > min(figures.points or {0.0: 0.0}):
-            return (*self.warnings, f"{name}: {figures.note}")
-        return self.warnings
-
-
-def _at(frequency_mhz: float, constant: Line, per_x: Line | None) -> tuple[float, float]:
-    return constant.at(frequency_mhz), per_x.at(frequency_mhz) if per_x else 0.0

@@ -3,7 +3,7 @@ import math
 import pytest
 
 from volery.base.errors import EstimateError
-from volery.cost import Price, RosLaw, load_catalogue
+from volery.cost import Price, RosLaw, Tariff, load_catalogue
 from volery.cost.catalogue import parse_catalogue
 
 INTEL, ARM = "intel-i5-3470", "rpi4-cortex-a72"
@@ -30,13 +30,13 @@ def law(kind: str) -> RosLaw:
 @pytest.mark.parametrize(("index", "platform"), list(enumerate(PLATFORMS)))
 def test_calls_without_an_x_are_the_tables(call: str, index: int, platform: tuple[str, int]) -> None:
     kind, frequency = platform
-    price = law(kind).price(call, 0, frequency)
+    price = Tariff(law(kind), frequency)(call, 0)
     assert (price.caller, price.background) == (POINTS[call][index], 0)
 
 
 def test_between_its_two_frequencies_a_call_is_on_their_line() -> None:
-    assert law(INTEL).price("init", 0, 2300).caller == round((433923 + 300054) / 2)
-    assert law(ARM).price("subscribe", 0, 1050).caller == round((1445835 + 1360615) / 2)
+    assert Tariff(law(INTEL), 2300)("init", 0).caller == round((433923 + 300054) / 2)
+    assert Tariff(law(ARM), 1050)("subscribe", 0).caller == round((1445835 + 1360615) / 2)
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_publish_splits_into_caller_and_background(
 ) -> None:
     kind, frequency = platform
     for subscribers in (0, 1, 5):
-        price = law(kind).price("publish", subscribers, frequency)
+        price = Tariff(law(kind), frequency)("publish", subscribers)
         assert price.caller == round(constant)
         assert price.background == round(each * subscribers)
 
@@ -71,19 +71,19 @@ def test_sleep_is_background_with_its_slope_per_gigahertz(
     platform: tuple[str, int], slope: float, constant: float
 ) -> None:
     kind, frequency = platform
-    price = law(kind).price("sleep", 100_000, frequency)
+    price = Tariff(law(kind), frequency)("sleep", 100_000)
     assert price.caller == 0
     assert math.isclose(price.background, slope * 100_000 + constant, abs_tol=1.0)
 
 
 def test_the_first_spin_of_a_node_costs_more_than_the_next() -> None:
-    assert law(INTEL).price("spin_once", 1, 3000).caller == POINTS["spin_once_first"][1]
-    assert law(INTEL).price("spin_once", 0, 3000).caller == POINTS["spin_once_next"][1]
+    assert Tariff(law(INTEL), 3000)("spin_once", 1).caller == POINTS["spin_once_first"][1]
+    assert Tariff(law(INTEL), 3000)("spin_once", 0).caller == POINTS["spin_once_next"][1]
 
 
 def test_an_unknown_call_is_an_error_and_never_zero() -> None:
     with pytest.raises(EstimateError, match=r"'fly' of roscpp on intel-i5-3470.*publish"):
-        law(INTEL).price("fly", 0, 3000)
+        Tariff(law(INTEL), 3000)("fly", 0)
 
 
 def test_out_of_range_it_extrapolates_and_warns() -> None:
@@ -91,30 +91,30 @@ def test_out_of_range_it_extrapolates_and_warns() -> None:
     [warning] = law(INTEL).warnings(3600)
     assert "intel-i5-3470 at 3600 MHz" in warning
     assert "1600 to 3000 MHz" in warning
-    assert law(INTEL).price("init", 0, 3600).flags == (warning,)
+    assert Tariff(law(INTEL), 3600)("init", 0).flags == (warning,)
 
 
 def test_a_negative_estimate_is_an_error() -> None:
     with pytest.raises(EstimateError, match=r"negative time for 'sleep' at 2500 MHz.*600 to 1500 MHz"):
-        law(ARM).price("sleep", 100_000, 2500)
+        Tariff(law(ARM), 2500)("sleep", 100_000)
 
 
 def test_a_python_node_charged_with_the_figures_of_roscpp_is_flagged() -> None:
     borrowed = load_catalogue().processor(ARM).ros_law("rospy")
     own = law(ARM)
-    assert borrowed.price("init", 0, 600)[:2] == own.price("init", 0, 600)[:2]
-    assert own.price("init", 0, 600).flags == ()
-    [flag] = borrowed.price("init", 0, 600).flags
+    assert Tariff(borrowed, 600)("init", 0)[:2] == Tariff(own, 600)("init", 0)[:2]
+    assert Tariff(own, 600)("init", 0).flags == ()
+    [flag] = Tariff(borrowed, 600)("init", 0).flags
     assert "rospy nodes on rpi4-cortex-a72 are charged with roscpp figures" in flag
 
 
 def test_a_doubtful_figure_is_flagged_where_it_counts() -> None:
-    assert "probably a slip" in law(ARM).price("advertise_service", 0, 1500).flags[0]
-    assert law(ARM).price("advertise_service", 0, 600).flags == ()
+    assert "probably a slip" in Tariff(law(ARM), 1500)("advertise_service", 0).flags[0]
+    assert Tariff(law(ARM), 600)("advertise_service", 0).flags == ()
 
 
 def test_prices_are_plain_integers() -> None:
-    price = law(ARM).price("publish", 2, 1234.5)
+    price = Tariff(law(ARM), 1234.5)("publish", 2)
     assert isinstance(price, Price)
     assert all(type(part) is int for part in price[:2])
 
@@ -153,16 +153,16 @@ def measured_law(client: str) -> RosLaw:
 
 
 def test_a_measured_part_of_the_caller_takes_precedence() -> None:
-    price = measured_law("rospy").price("publish", 3, 2600)
+    price = Tariff(measured_law("rospy"), 2600)("publish", 3)
     assert (price.caller, price.background) == (50000 + 3 * 20000, 40000 + 3 * 40000)
 
 
 def test_background_events_are_charged_where_there_are_figures() -> None:
     law = measured_law("rospy")
-    assert law.price("receive", 0, 2600) == Price(0, 150000)
-    assert law.price("wait", 1e6, 2600) == Price(0, 600000)
-    assert law.price("accept", 0, 2600) == Price(0, 0)
-    assert load_catalogue().processor(INTEL).ros_law("roscpp").price("receive", 0, 3000) == Price(0, 0)
+    assert Tariff(law, 2600)("receive", 0) == Price(0, 150000)
+    assert Tariff(law, 2600)("wait", 1e6) == Price(0, 600000)
+    assert Tariff(law, 2600)("accept", 0) == Price(0, 0)
+    assert Tariff(load_catalogue().processor(INTEL).ros_law("roscpp"), 3000)("receive", 0) == Price(0, 0)
 
 
 def test_a_law_of_one_frequency_is_flagged_at_another() -> None:
@@ -179,19 +179,19 @@ def test_a_client_without_a_law_gets_a_hint() -> None:
 
 def test_a_warm_publish_costs_the_same_without_a_separate_figure() -> None:
     paper, mine = law(INTEL), measured_law("rospy")
-    assert paper.price("publish_next", 3, 3000) == paper.price("publish", 3, 3000)
-    assert mine.price("publish_next", 3, 2600) == mine.price("publish", 3, 2600)
+    assert Tariff(paper, 3000)("publish_next", 3) == Tariff(paper, 3000)("publish", 3)
+    assert Tariff(mine, 2600)("publish_next", 3) == Tariff(mine, 2600)("publish", 3)
     text = MEASURED + "          publish_next: {provenance: measured, source: s, constant: {offset: 7000}}\n"
-    apart = parse_catalogue(text).processor("here").ros_law("rospy").price("publish_next", 3, 2600)
+    apart = Tariff(parse_catalogue(text).processor("here").ros_law("rospy"), 2600)("publish_next", 3)
     assert (apart.caller, apart.background) == (7000, 0)
-    often = parse_catalogue(text).processor("here").ros_law("rospy").at(2600)
+    often = Tariff(parse_catalogue(text).processor("here").ros_law("rospy"), 2600)
     assert often("publish_next_often", 3) == apart
     assert often("publish_often", 3) == often("publish", 3)
 
 
 def test_service_requests_cost_what_a_law_states_and_nothing_where_it_has_no_figure() -> None:
     plain = law(INTEL)
-    assert plain.price("serve", 0, 3000) == plain.price("call_service", 0, 3000) == Price(0, 0)
+    assert Tariff(plain, 3000)("serve", 0) == Tariff(plain, 3000)("call_service", 0) == Price(0, 0)
     figures = plain.calls["init"].model_copy(update={"points": {1600.0: 730_000.0, 3000.0: 730_000.0}})
     priced = plain.model_copy(update={"calls": {**plain.calls, "serve": figures}})
-    assert priced.price("serve", 0, 3000).caller == 730_000
+    assert Tariff(priced, 3000)("serve", 0).caller == 730_000

@@ -45,6 +45,10 @@ commands = Commands("First steps")
 
 DEMO_MODEL, STARTER_MODEL = "delivery", "starter"
 
+IMPORTED_ONCE = ["__main__", "volery.run.simulate", "volery.bridge", "volery.report.html_report"]
+"""Modules that the processes of simulations share: most of what a simulation imports. Others are imported by
+each."""
+
 POLL_PERIOD_S = 0.1
 """Wall seconds between two reads of the progress that the processes send."""
 
@@ -151,7 +155,7 @@ def run_all(output: Output, jobs: Mapping[str, Job]) -> dict[str, JobOutcome]:
     from volery.cli.run_display import live_progress
 
     context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(["volery.run.simulate"])  # imported once for all processes
+    context.set_forkserver_preload(IMPORTED_ONCE)
     reports = context.SimpleQueue()
     with (
         live_progress(output) as drawings,

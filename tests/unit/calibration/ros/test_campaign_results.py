@@ -7,7 +7,7 @@ from volery.base.errors import EstimateError, ModelError
 from volery.calibration.host_machine import Machine
 from volery.calibration.ros.call_costs import call_costs
 from volery.calibration.ros.campaign import Conditions, format_line, plot_svg, ros_law, write_entry
-from volery.cost import RosLaw, load_catalogue
+from volery.cost import RosLaw, Tariff, load_catalogue
 
 from .ros_rounds import AGAIN, PER_SUBSCRIBER, PER_US, PUBLISH, RECEIVE, RECEIVE_NEXT, SLEEP, WARMER, Probe
 
@@ -24,7 +24,7 @@ def test_an_entry_prices_as_was_measured(tmp_path: Path) -> None:
     write_entry(file, MACHINE, law())
     entry = load_catalogue(file).processor("my-computer")
     assert (entry.cores, entry.least_mhz, entry.greatest_mhz) == (2, 2600, 2600)
-    prices = entry.ros_law("roscpp").at(2600)
+    prices = Tariff(entry.ros_law("roscpp"), 2600)
     publish = prices("publish", 3)
     assert publish.caller + publish.background == pytest.approx(PUBLISH + 3 * PER_SUBSCRIBER, rel=1e-3)
     assert publish.caller == pytest.approx((PUBLISH + 3 * PER_SUBSCRIBER) / 2, rel=1e-3)
@@ -39,7 +39,7 @@ def test_an_entry_prices_as_was_measured(tmp_path: Path) -> None:
 def test_rounds_of_one_period_price_all_publications() -> None:
     for period_us in (20_000.0, 50_000.0):
         rounds = [Probe(period_us=period_us).round() for _ in range(3)]
-        prices = ros_law(call_costs(rounds), Conditions("rospy", MACHINE.description, 2600.0)).at(2600)
+        prices = Tariff(ros_law(call_costs(rounds), Conditions("rospy", MACHINE.description, 2600.0)), 2600)
         for call in ("publish", "publish_next"):
             assert prices(call, 3) == prices(f"{call}_often", 3)
 
@@ -66,14 +66,14 @@ def test_a_second_frequency_makes_lines_of_points(tmp_path: Path) -> None:
     assert (made.least_mhz, made.greatest_mhz) == (1300, 2600)
     entry = load_catalogue(file).processor("my-computer")
     assert (entry.least_mhz, entry.greatest_mhz) == (1300, 2600)
-    halfway = entry.ros_law("roscpp").price("receive", 0, 1950)
+    halfway = Tariff(entry.ros_law("roscpp"), 1950)("receive", 0)
     assert halfway.background == pytest.approx((2e5 + RECEIVE) / 2, rel=1e-3)
     assert "1300 to 2600 MHz" in entry.ros["roscpp"].validity
 
 
 def test_callbacks_of_rospy_are_priced_where_their_message_arrives(tmp_path: Path) -> None:
     write_entry(tmp_path / "all.yaml", MACHINE, law("rospy", spins=False))
-    prices = load_catalogue(tmp_path / "all.yaml").processor("my-computer").ros_law("rospy").at(2600)
+    prices = Tariff(load_catalogue(tmp_path / "all.yaml").processor("my-computer").ros_law("rospy"), 2600)
     assert prices("spin_once", 1.0)[:2] == prices("spin_once", 0.0)[:2] == (0, 0)
     assert prices("receive").background == pytest.approx(RECEIVE, rel=1e-3)
     assert prices("receive_next_often").background == pytest.approx(WARMER * RECEIVE_NEXT, rel=1e-3)

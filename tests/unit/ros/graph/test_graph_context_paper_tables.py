@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from volery.base.time import MS, S
-from volery.cost import RosLaw, load_catalogue
+from volery.cost import RosLaw, Tariff, load_catalogue
 from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
@@ -33,7 +33,7 @@ def ros_time(law: RosLaw, mhz: int) -> tuple[int, int]:
     events: list[Any] = []
     kernel = VirtualKernel(events.append)
     processor = Processor(kernel, "board", cores=4)
-    tariff = law.at(mhz)
+    tariff = Tariff(law, mhz)
     graph = EmbeddedGraph(
         kernel,
         lambda node: tariff,
