@@ -3,6 +3,9 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
+/* Times are read by PyLong_AsUnsignedLong, digit by digit; the function for long long reads byte by byte. */
+_Static_assert(sizeof(long) == 8, "a time in ns has 64 bits");
+
 /* An entry with its order: times are not negative, and those beyond 64 bits count as the last. */
 typedef struct {
     unsigned long long when, ticket;
@@ -24,7 +27,7 @@ static inline int before(const Event *a, const Event *b)
 
 static int number(PyObject *entry, Py_ssize_t place, unsigned long long *found)
 {
-    *found = PyLong_AsUnsignedLongLong(PyTuple_GET_ITEM(entry, place));
+    *found = PyLong_AsUnsignedLong(PyTuple_GET_ITEM(entry, place));
     if (*found == (unsigned long long)-1 && PyErr_Occurred()) {
         if (!PyErr_ExceptionMatches(PyExc_OverflowError))
             return -1;

@@ -109,7 +109,7 @@ static char *put_numbers(char *at, Writer *writer, PyObject *event)
         int width = 8;
         switch (writer->codes[i]) {
         case 'q':
-            bits = (uint64_t)PyLong_AsLongLong(field);
+            bits = (uint64_t)PyLong_AsLong(field);
             break;
         case 'd': {
             double value = PyFloat_AsDouble(field);
@@ -117,7 +117,7 @@ static char *put_numbers(char *at, Writer *writer, PyObject *event)
             break;
         }
         case 'i': {
-            long long value = PyLong_AsLongLong(field);
+            long long value = PyLong_AsLong(field);
             if (value != (int32_t)value) {
                 PyErr_Format(PyExc_OverflowError, "%R does not fit an int32", field);
                 return NULL;
@@ -211,8 +211,8 @@ static PyObject *write_event(Writer *writer, PyObject *event)
     Chunk *chunk = writer->chunk;
     if (!PyTuple_Check(event) || PyTuple_GET_SIZE(event) < writer->size)
         return PyErr_Format(PyExc_TypeError, "no event of this kind: %R", event);
-    long long log = PyLong_AsLongLong(PyTuple_GET_ITEM(event, writer->log));
-    long long publish = PyLong_AsLongLong(PyTuple_GET_ITEM(event, writer->publish));
+    long long log = PyLong_AsLong(PyTuple_GET_ITEM(event, writer->log));
+    long long publish = PyLong_AsLong(PyTuple_GET_ITEM(event, writer->publish));
     if (PyErr_Occurred())
         return NULL;
     if (log < 0)

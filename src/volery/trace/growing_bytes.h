@@ -6,6 +6,9 @@
 #define PY_SSIZE_T_CLEAN
 #include <Python.h>
 
+/* Times are read by PyLong_AsLong, digit by digit; PyLong_AsLongLong reads them byte by byte. */
+_Static_assert(sizeof(long) == 8, "a time in ns has 64 bits");
+
 typedef struct {
     char *bytes;
     Py_ssize_t used, room;

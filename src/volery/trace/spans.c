@@ -291,8 +291,8 @@ static PyObject *spans_slice(Spans *spans, PyObject *event)
 {
     if (!PyTuple_Check(event) || PyTuple_GET_SIZE(event) != SLICE_FIELDS)
         return PyErr_Format(PyExc_TypeError, "no slice: %R", event);
-    long long start = PyLong_AsLongLong(PyTuple_GET_ITEM(event, START));
-    long long stop = PyLong_AsLongLong(PyTuple_GET_ITEM(event, END));
+    long long start = PyLong_AsLong(PyTuple_GET_ITEM(event, START));
+    long long stop = PyLong_AsLong(PyTuple_GET_ITEM(event, END));
     int number = PyErr_Occurred() ? -1 : core_number(spans, event);
     if (number < 0)
         return NULL;

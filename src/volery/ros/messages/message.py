@@ -23,16 +23,32 @@ _MISFITS = (TypeError, ValueError, AttributeError, OverflowError)
 
 
 def generated_copy(cls: Any, fields: list[Any]) -> Copy:
-    """Return a generated function that copies messages of type `cls`.
+    """Return the method ``copy`` of a message class.
 
-    Generated code takes half the time of a loop over the fields. The function accepts every object that has
-    the fields; it raises what reading or converting a field raises.
+    Generated code takes half the time of a loop over the fields.
     """
     writing = _Writing()
-    made = writing.expression(cls, fields, "message")
-    source = "\n".join(["def copy(message):", *writing.lines, f"    return {made}"])
-    exec(compile(source, f"<copy of {cls.__msgtype__}>", "exec"), writing.names)
-    written: Copy = writing.names["copy"]
+    made = writing.expression(cls, fields, "self")
+    return _compiled(f"copy of {cls.__msgtype__}", [*writing.lines, f"return {made}"], writing.names)
+
+
+def generated_conversion(cls: Any, fields: list[Any]) -> Copy:
+    """Return the method ``converted`` of a message class."""
+    names: dict[str, Any] = {"array": np.ndarray}
+    tests = _conversions(fields, "self", names)
+    if tests is None:
+        return generated_copy(cls, fields)
+    return _compiled(f"conversion of {cls.__msgtype__}", [*tests, "return self"], names)
+
+
+def _compiled(title: str, lines: list[str], names: dict[str, Any]) -> Copy:
+    """Return the method with these statements; a value that does not fit raises an error with its field."""
+    body = "".join(f"\n        {line}" for line in lines)
+    source = (
+        f"def method(self):\n    try:{body}\n    except misfits:\n        return self._copied_by_fields()"
+    )
+    exec(compile(source, f"<{title}>", "exec"), names | {"misfits": _MISFITS}, names)
+    written: Copy = names["method"]
     return written
 
 
@@ -56,26 +72,10 @@ class _Writing:
                 value = f"{copier}({value})"
             elif one.nested is not None:
                 variable = f"part_{len(self.lines)}"
-                self.lines.append(f"    {variable} = {value}")
+                self.lines.append(f"{variable} = {value}")
                 value = self.expression(one.nested, one.nested.fields_of, variable)
             values.append(value)
         return f"{kind}({', '.join(values)})"
-
-
-def generated_conversion(cls: Any, fields: list[Any]) -> Copy:
-    """Return a generated function that converts the lists of a message to arrays in place, and returns it.
-
-    An array of the field's type stays. A type with lists of strings or messages is copied, since these may
-    belong to other messages as well.
-    """
-    names: dict[str, Any] = {"array": np.ndarray}
-    tests = _conversions(fields, "message", names)
-    if tests is None:
-        return cast("Copy", cls._copy)
-    source = "\n".join(["def convert(message):", *tests, "    return message"])
-    exec(compile(source, f"<conversion of {cls.__msgtype__}>", "exec"), names)
-    written: Copy = names["convert"]
-    return written
 
 
 def _conversions(fields: list[Any], of: str, names: dict[str, Any]) -> list[str] | None:
@@ -95,7 +95,7 @@ def _conversions(fields: list[Any], of: str, names: dict[str, Any]) -> list[str]
             names[f"type_{number}"], names[f"copier_{number}"] = _dtype(one.base), _copier(one)
             shape = f"{value}.shape != ({one.length},)" if one.length else f"{value}.ndim != 1"
             wrong = f"type({value}) is not array or {value}.dtype is not type_{number} or {shape}"
-            lines += [f"    if {wrong}:", f"        {value} = copier_{number}({value})"]
+            lines += [f"if {wrong}:", f"    {value} = copier_{number}({value})"]
     return lines
 
 
@@ -111,8 +111,6 @@ class Message:
     __match_args__: ClassVar[tuple[str, ...]] = ()
     _copiers: ClassVar[tuple[tuple[int, Copier], ...]] = ()
     _values: ClassVar[Callable[[Any], tuple[Any, ...]]]
-    _copy: ClassVar[Any]  # a function: Copy
-    _convert: ClassVar[Any]  # likewise
     fields_of: ClassVar[list[Field]] = []
     """Fields of the type. Private to this package."""
     __hash__: ClassVar[Any] = None  # messages are mutable values
@@ -123,20 +121,16 @@ class Message:
 
     def copy(self) -> Any:
         """Return a copy with lists converted to arrays; ``UsageError`` if a value does not fit."""
-        try:
-            return self._copy(self)
-        except _MISFITS:
-            return self._copied_by_fields()  # raises an error that names the field
+        raise NotImplementedError  # each type has its own
 
     def converted(self) -> Any:
-        """Return this message with its lists converted to arrays, or a copy if its lists are no numbers.
+        """Return this message with its lists converted to arrays in place.
 
-        Only for a message of the caller alone. Raises ``UsageError`` if a value does not fit.
+        An array of the field's type stays. A type with lists of strings or messages is copied, since these
+        may belong to other messages as well. Only for a message of the caller alone. Raises ``UsageError`` if
+        a value does not fit.
         """
-        try:
-            return self._convert(self)
-        except _MISFITS:
-            return self._copied_by_fields()
+        raise NotImplementedError  # each type has its own
 
     def _copied_by_fields(self) -> Any:
         cls = type(self)
@@ -226,9 +220,20 @@ def make_class(
     made: Any = make_dataclass(
         label, members, bases=(base,), namespace=namespace, init=bool(fields), eq=False, slots=True
     )
-    made._copy = staticmethod(generated_copy(made, fields))
-    made._convert = staticmethod(generated_conversion(made, fields))
+    for method, write in (("copy", generated_copy), ("converted", generated_conversion)):
+        setattr(made, method, _written_at_first_use(made, method, partial(write, made, fields)))
     return cast("type[Message]", made)
+
+
+def _written_at_first_use(cls: Any, name: str, write: Callable[[], Copy]) -> Copy:
+    """Return a method that replaces itself by what *write* returns: most types are never copied."""
+
+    def method(self: Any) -> Any:
+        written = write()
+        setattr(cls, name, written)
+        return written(self)
+
+    return method
 
 
 def _values_of(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
