@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterable, Sequence
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from time import perf_counter
@@ -104,16 +104,16 @@ class Recording:
         self._trace: McapWriter | None = None
         self._timeline: TimelineWriter | None = None
         self._log: EventLog | None = None
-        self._reporters: list[Reporter] = []
+        self._reporters: dict[str, Reporter] = {}
         self.stream.tap(self.accounts)
         if self.folder is not None:
             _forget_earlier_run(self.folder)
         if self.folder is not None and traced:
+            self._start_reporters(setup, attachments)
             self._trace = McapWriter(self.folder / TRACE_FILE, setup, attachments, _definition)
             self._timeline = TimelineWriter(self.folder / TIMELINE_FILE)
             self.stream.tap(self._trace)
             self.stream.tap(self._timeline)
-            self._start_reporters(setup, attachments)
 
     def _start_reporters(self, setup: RunSetup, attachments: Sequence[Attachment]) -> None:
         for name in reporters.names():
@@ -122,8 +122,13 @@ class Recording:
             except MissingExtraError as error:
                 self.notes.append(str(error))
                 continue
-            self._reporters.append(reporter)
-            self.stream.tap(reporter)
+            self._reporters[name] = reporter
+            self.stream.tap_guarded(reporter, partial(self._drop_reporter, name))
+
+    def _drop_reporter(self, name: str, error: Exception) -> None:
+        del self._reporters[name]
+        what = f"the report {name!r} was not made: {type(error).__name__}: {error}"
+        self.problems.append(f"{what}; the other files are complete")
 
     def log_into(self, wanted: LogOptions) -> None:
         """Write the lines of a log from now on. Raises ``UsageError`` if the file cannot be written."""
@@ -151,7 +156,7 @@ class Recording:
     def _write_documents(self, record: RunRecord, folder: Path) -> None:
         try:
             write_record(record, folder)
-            for reporter in self._reporters:
+            for reporter in self._reporters.values():
                 reporter.write(record, folder)
         except (UsageError, OSError) as error:
             self.problems.append(str(error))

@@ -46,3 +46,19 @@ def test_a_tap_that_comes_late_hears_from_then_on() -> None:
     stream.tap(received.append)
     stream(WORDS)
     assert received == [WORDS]
+
+
+def test_a_guarded_tap_that_fails_is_removed_and_the_others_receive_everything() -> None:
+    received: list[Event] = []
+    failures: list[Exception] = []
+
+    def fail(event: Event) -> None:
+        raise ValueError("wrong")
+
+    stream = Stream()
+    stream.tap_guarded(fail, failures.append)
+    stream.tap(received.append)
+    stream(WORDS)
+    stream(FAILURE)
+    assert received == [WORDS, FAILURE]
+    assert [str(error) for error in failures] == ["wrong"]
