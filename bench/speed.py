@@ -1,9 +1,10 @@
-"""Processor time of what users wait for, as ratios to another checkout of volery in the same run.
+"""Processor time of what users wait for, as ratios to a reference in the same run.
 
-Each row is executed by turns with this checkout and with the other, each in its own virtual environment; the
-figures are minima of CPU seconds (user and system, children included) over the rounds. The kernel's rows are
-in ``bench/kernel.py``, the bodies' in ``bench/physics.py``, the messages' in ``bench/graph.py``. For the
-figures of a wheel, install it in the .venv of a folder that has ``examples`` and ``bench/kernels`` as well.
+Rows of ``AGAINST`` compare this checkout with another one, each in its own virtual environment; rows of
+``WITHIN`` compare two things that this checkout does. Both are executed by turns, and the figures are minima
+of CPU seconds (user and system, all descendants included) over the rounds. The kernel's rows are in
+``bench/kernel.py``, the bodies' in ``bench/physics.py``, the messages' in ``bench/graph.py``. For the figures
+of a wheel, install it in the .venv of a folder that has ``examples`` and ``bench/kernels`` as well.
 
     python bench/speed.py --against ../volery-before [--here FOLDER] [--rounds 3] [--only delivery]
 """
@@ -11,11 +12,14 @@ figures of a wheel, install it in the .venv of a folder that has ``examples`` an
 from __future__ import annotations
 
 import argparse
+import ctypes
 import os
+import resource
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -53,9 +57,11 @@ options = volery.Options(fidelity="code", seed=7, out=out)
 start = time.process_time()
 run = simulate("examples/delivery", options, overrides=["run.duration=60 s"])
 total = time.process_time() - start
-loop = total if out else sum(spent)
-print(loop, (out / "trace.mcap").stat().st_size if out else 0)
+print(sum(spent) if sys.argv[2] else total, (out / "trace.mcap").stat().st_size if out else 0)
 """
+
+PR_SET_CHILD_SUBREAPER = 36
+"""From ``linux/prctl.h``: processes whose parent has ended become children of this one."""
 
 
 class Measured(NamedTuple):
@@ -63,6 +69,9 @@ class Measured(NamedTuple):
 
     seconds: float
     size: float = 0.0
+
+
+Measure = Callable[[Path], Measured]
 
 
 def python(checkout: Path) -> Path:
@@ -79,19 +88,23 @@ def script(checkout: Path, source: str, *arguments: str) -> Measured:
 
 
 def command(checkout: Path, *arguments: str, cache: str | None = None) -> Measured:
-    """Run the command line and return the CPU seconds of it and its children."""
+    """Run the command line and return the CPU seconds of it and its descendants."""
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     if cache is not None:
         environment |= {"NUMBA_CACHE_DIR": cache, "XDG_CACHE_HOME": cache}
     program = [str(checkout / ".venv/bin/volery"), *arguments]
-    process = subprocess.Popen(
-        program, cwd=checkout, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        program, cwd=checkout, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, check=False
     )
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode > 1:
-        sys.exit(f"{' '.join(program)}: {process.stderr.read().decode() if process.stderr else ''}")
-    return Measured(usage.ru_utime + usage.ru_stime)
+    if done.returncode > 1:
+        sys.exit(f"{' '.join(program)}: {done.stderr.decode()}")
+    try:
+        while True:  # until the last process that it has left behind has ended
+            os.wait()
+    except ChildProcessError:
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return Measured(after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime)
 
 
 def fly(checkout: Path, cache: str | None = None) -> Measured:
@@ -122,31 +135,59 @@ def warm_cost(checkout: Path) -> Measured:
         return cost(checkout, cache)
 
 
-def delivery(checkout: Path, traced: bool) -> Measured:
+def demo(checkout: Path) -> Measured:
     with tempfile.TemporaryDirectory() as folder:
-        return script(checkout, DELIVERY, folder if traced else "")
+        return command(checkout, "demo", "--quiet", "--out", f"{folder}/runs")
 
 
-def mission(url: str, drones: int) -> Callable[[Path], Measured]:
+def delivery(traced: bool, loop: bool) -> Measure:
+    """Return what measures 60 s of orders: the simulation loop alone, or the whole run."""
+
+    def measure(checkout: Path) -> Measured:
+        with tempfile.TemporaryDirectory() as folder:
+            return script(checkout, DELIVERY, folder if traced else "", "loop" if loop else "")
+
+    return measure
+
+
+def mission(url: str, drones: int = 1) -> Measure:
     return lambda checkout: script(checkout, FLIGHT, url, str(drones))
 
 
-ROWS: dict[str, tuple[Callable[[Path], Measured], str]] = {
-    "delivery, code, without files (loop)": (lambda checkout: delivery(checkout, traced=False), "3 x"),
-    "delivery, code, full trace": (lambda checkout: delivery(checkout, traced=True), "2.2 x"),
-    "one drone, warm (ardupilot)": (mission("sim:ardupilot", 1), "2 x"),
+AGAINST: dict[str, tuple[Measure, str]] = {
+    "delivery, code, without files (loop)": (delivery(traced=False, loop=True), "3 x"),
+    "delivery, code, full trace": (delivery(traced=True, loop=False), "2.2 x"),
+    "one drone, warm (ardupilot)": (mission("sim:ardupilot"), "2 x"),
     "twenty drones": (mission("sim:ardupilot", 20), "2.5 x"),
-    "one drone, warm (px4)": (mission("sim:px4", 1), "1.5 of ardupilot's time"),
-    "one drone, warm (dji)": (mission("sim:dji", 1), "1.5 of ardupilot's time"),
     "volery fly, warm": (fly, "3 x"),
-    "volery fly, empty cache": (first_fly, "warm + 1 s"),
     "volery cost, warm": (warm_cost, "2 x"),
-    "volery cost, empty cache": (first_cost, "warm + 1 s"),
+    "volery demo, second time": (demo, "3 x"),
 }
+WITHIN: dict[str, tuple[Measure, Measure, str]] = {
+    "delivery with trace, loop": (
+        delivery(traced=False, loop=True), delivery(traced=True, loop=True), "1.15 of it without files",
+    ),
+    "one drone, warm (px4)": (mission("sim:ardupilot"), mission("sim:px4"), "1.5 of ardupilot's"),
+    "one drone, warm (dji)": (mission("sim:ardupilot"), mission("sim:dji"), "1.5 of ardupilot's"),
+    "volery fly, empty cache": (fly, first_fly, "1 s more than warm"),
+    "volery cost, empty cache": (warm_cost, first_cost, "1 s more than warm"),
+}  # fmt: skip
 
 
 def smallest(rounds: list[Measured]) -> Measured:
     return min(rounds, key=lambda one: one.seconds)
+
+
+def compare(
+    name: str, wanted: str, rounds: int, of: Callable[[], Measured], to: Callable[[], Measured]
+) -> None:
+    """Print a row: minima over the rounds of the reference *to* and of what is measured, by turns."""
+    measured = [(to(), of()) for _ in range(rounds)]
+    reference, here = smallest([one for one, _ in measured]), smallest([one for _, one in measured])
+    line = f"{name:40}{reference.seconds:10.2f}{here.seconds:10.2f}{reference.seconds / here.seconds:7.2f}x"
+    if here.size and reference.size:
+        wanted += f"; trace {reference.size / 1e6:.1f} -> {here.size / 1e6:.1f} MB"
+    print(f"{line}{here.seconds / reference.seconds:8.2f}  {wanted}", flush=True)
 
 
 def main() -> None:
@@ -160,18 +201,14 @@ def main() -> None:
     for folder in (other, measured):
         if not python(folder).exists():
             sys.exit(f"speed: {folder} has no .venv/bin/python; install volery there in a .venv of its own")
-    print(f"{'CPU seconds':40}{'reference':>10}{'here':>10}{'ratio':>8}  to reach", flush=True)
-    for name, (measure, wanted) in ROWS.items():
-        if given.only not in name:
-            continue
-        rounds = [(measure(other), measure(measured)) for _ in range(given.rounds)]
-        reference = smallest([one for one, _ in rounds])
-        here = smallest([one for _, one in rounds])
-        ratio = reference.seconds / here.seconds
-        line = f"{name:40}{reference.seconds:10.2f}{here.seconds:10.2f}{ratio:7.2f}x  {wanted}"
-        if here.size:
-            line += f"; trace {reference.size / 1e6:.1f} -> {here.size / 1e6:.1f} MB"
-        print(line, flush=True)
+    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    print(f"{'CPU seconds':40}{'reference':>10}{'here':>10}{'ratio':>8}{'share':>8}  to reach", flush=True)
+    for name, (measure, wanted) in AGAINST.items():
+        if given.only in name:
+            compare(name, wanted, given.rounds, partial(measure, measured), partial(measure, other))
+    for name, (reference, measure, wanted) in WITHIN.items():
+        if given.only in name:
+            compare(name, wanted, given.rounds, partial(measure, measured), partial(reference, measured))
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ def _varying(name: str) -> Callable[[Any], tuple[Any, ...]] | None:
     paths = _varying_paths(name)
     if paths is None:
         return None
-    read = attrgetter(*paths)
+    read: Callable[[Any], Any] = attrgetter(*paths)
     return read if len(paths) > 1 else lambda message: (read(message),)
 
 
