@@ -174,23 +174,44 @@ def uncompilable(source: str, callables: frozenset[str] = frozenset()) -> Iterat
     for line in (line for node in tree.body if isinstance(node, ast.ClassDef) for line in _overridable(node)):
         yield line, "what a subclass in plain Python sets instead is not read; do not compile it"
     for node in ast.walk(tree):
+        reason = ""
         if isinstance(node, ast.FunctionDef):
-            marks = {ast.unparse(one) for one in node.decorator_list}
-            returned = ast.unparse(node.returns) if node.returns else ""
-            if marks & {"cached_property", "functools.cached_property"}:
-                yield node.lineno, "a cached_property is computed at every access; compute it in __init__"
-            elif "property" in marks and (returned.startswith("Callable[") or returned in callables):
-                yield node.lineno, "a call of what the property returns does nothing; make it a method"
+            reason = _miscompiled_function(node, tree, callables)
         elif isinstance(node, ast.Call):
-            called = ast.unparse(node.func)
-            if called in ("eval", "exec") and len(node.args) < 2:
-                yield node.lineno, f"{called} without names has no frame to take them from; give it some"
-            elif called == "sys._getframe" and node.args:
-                yield node.lineno, "compiled functions have no frame, so their number differs; walk them"
-            elif called.endswith("dataclass") and any(
-                one.arg == "slots" and ast.unparse(one.value) == "True" for one in node.keywords
-            ):
-                yield node.lineno, "slots=True makes a second, uncompiled class; leave it out"
+            reason = _miscompiled_call(node)
+        if reason:
+            yield node.lineno, reason
+
+
+def _miscompiled_function(node: ast.FunctionDef, tree: ast.Module, callables: frozenset[str]) -> str:
+    marks = {ast.unparse(one) for one in node.decorator_list}
+    returned = ast.unparse(node.returns) if node.returns else ""
+    if marks & {"cached_property", "functools.cached_property"}:
+        return "a cached_property is computed at every access; compute it in __init__"
+    if "property" in marks and (returned.startswith("Callable[") or returned in callables):
+        return "a call of what the property returns does nothing; make it a method"
+    if _calls_itself(node, tree):
+        return "compiled recursion has no limit and ends the process; use a loop"
+    return ""
+
+
+def _miscompiled_call(node: ast.Call) -> str:
+    called = ast.unparse(node.func)
+    if called in ("eval", "exec") and len(node.args) < 2:
+        return f"{called} without names has no frame to take them from; give it some"
+    if called == "sys._getframe" and node.args:
+        return "compiled functions have no frame, so their number differs; walk them"
+    slots = (one for one in node.keywords if one.arg == "slots" and ast.unparse(one.value) == "True")
+    if called.endswith("dataclass") and any(slots):
+        return "slots=True makes a second, uncompiled class; leave it out"
+    return ""
+
+
+def _calls_itself(function: ast.FunctionDef, module: ast.Module) -> bool:
+    """Return whether a function calls itself, by its name if it is of the module, else as a method."""
+    itself = function.name if function in module.body else f"self.{function.name}"
+    calls = (node for node in ast.walk(function) if isinstance(node, ast.Call))
+    return any(ast.unparse(node.func) == itself for node in calls)
 
 
 def _overridable(node: ast.ClassDef) -> Iterator[int]:

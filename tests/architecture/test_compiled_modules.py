@@ -17,6 +17,8 @@ import pytest
             "make it a method",
         ),
         ("@dataclass(frozen=True, slots=True)\nclass A:\n    x: int\n", "slots=True"),
+        ("x = 1\ny = 2\ndef f(x: int) -> int:\n    return f(x - 1)\n", "no limit"),
+        ("class A:\n    x = 1\n    def f(self) -> int:\n        return self.f()\n", "no limit"),
         ("x = eval('y')\n", "eval without names"),
         ("x = sys._getframe(2)\n", "no frame"),
     ],
@@ -40,6 +42,7 @@ def test_harmless_relatives_pass(script: ModuleType) -> None:
     harmless = (
         "class A:\n    @property\n    def x(self) -> int:\n        return eval('1', {})\n"
         "@dataclass(frozen=True)\nclass B:\n    x: int\n"
+        "class C:\n    def outer(self) -> Record:\n        return outer()\n"
         "def outer() -> Record:\n    return sys._getframe().f_back\n"
     )
     assert list(script.uncompilable(harmless, frozenset({"Record"}))) == []

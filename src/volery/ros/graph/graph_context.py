@@ -7,7 +7,7 @@ that implement them import this one and not each other.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -126,15 +126,16 @@ class Parameters:
 
     def names(self) -> list[str]:
         """Return the absolute names of all parameters, sorted."""
-        return sorted(_leaves("", self._tree))
-
-
-def _leaves(prefix: str, branch: dict[str, Any]) -> Iterator[str]:
-    for step, value in branch.items():
-        if isinstance(value, dict):
-            yield from _leaves(f"{prefix}/{step}", value)
-        else:
-            yield f"{prefix}/{step}"
+        found: list[str] = []
+        branches = [("", self._tree)]
+        while branches:
+            prefix, branch = branches.pop()
+            for step, value in branch.items():
+                if isinstance(value, dict):
+                    branches.append((f"{prefix}/{step}", value))
+                else:
+                    found.append(f"{prefix}/{step}")
+        return sorted(found)
 
 
 @dataclass(eq=False)
