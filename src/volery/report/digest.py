@@ -10,10 +10,11 @@ curve keeps the smallest and the largest value of each stretch, so no peak is lo
 from __future__ import annotations
 
 from array import array
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import hypot, isnan
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,11 +132,7 @@ class _Track:
 
 
 class Digest:
-    """Stream tap that collects the events in ``listens`` for its ``data``."""
-
-    listens: ClassVar[frozenset[type[Any]]] = frozenset(
-        (VehicleState, Slice, Activation, Milestone, Message, Failure, Operation, LinkState, Text)
-    )
+    """Stream tap that collects for its ``data`` what a report draws."""
 
     def __init__(self, setup: RunSetup, scenery: Scenery | None) -> None:
         self._setup = setup
@@ -151,23 +148,29 @@ class Digest:
         self._subscriptions: dict[str, set[str]] = {}
         self._lost: dict[str, list[int]] = {}
         self._last: Ns = 0
+        self.takers: dict[type[Any], Callable[[Any], None]] = {
+            VehicleState: self._state,
+            Slice: self._slice,
+            Activation: self._activation,
+            Milestone: self._milestone,
+            Message: self._message,
+            **dict.fromkeys((Failure, Operation, LinkState, Text), self._remark),
+        }
+        """What adds an event of each kind that matters."""
+
+    def listener(self, kind: type[Any]) -> Callable[[Any], None] | None:
+        """Return what adds events of a kind; None if they do not matter."""
+        return self.takers.get(kind)
 
     def __call__(self, event: Event) -> None:
         """Add one event."""
-        match event:
-            case VehicleState():
-                self._tracks.setdefault(event.vehicle, _Track("")).add(event)
-                self._last = max(self._last, event.at)
-            case Slice():
-                self._slice(event)
-            case Activation():
-                self._activation(event)
-            case Milestone():
-                self._milestone(event)
-            case Message():
-                self._message(event)
-            case _:
-                self._remark(event)
+        add = self.takers.get(event.__class__)
+        if add is not None:
+            add(event)
+
+    def _state(self, event: VehicleState) -> None:
+        self._tracks.setdefault(event.vehicle, _Track("")).add(event)
+        self._last = max(self._last, event.at)
 
     def _slice(self, event: Slice) -> None:
         self._last = max(self._last, event.end)

@@ -98,7 +98,7 @@ class HtmlReport:
 
     def listener(self, kind: type[Any]) -> Record | None:
         """Return what takes events of a kind; None if they do not matter to the report."""
-        return self._digest if kind in Digest.listens else None
+        return self._digest.listener(kind)
 
     def write(self, record: RunRecord, folder: Path) -> Path:
         """Write ``report.html`` into a finished run folder and return its path."""
@@ -127,7 +127,7 @@ def gather(folder: Path, *taps: Record) -> ReportContent:
         digest = _digest(reading.setup, reading.attachments)
         if (folder / RUN_FILE).exists():
             record = read_record(folder)
-            for event in reading.events(Digest.listens):
+            for event in reading.events(digest.takers):
                 digest(event)
         else:
             record = _account(reading, (digest, *taps))
