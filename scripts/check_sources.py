@@ -174,13 +174,14 @@ def uncompilable(source: str, callables: frozenset[str] = frozenset()) -> Iterat
     for line in (line for node in tree.body if isinstance(node, ast.ClassDef) for line in _overridable(node)):
         yield line, "what a subclass in plain Python sets instead is not read; do not compile it"
     for node in ast.walk(tree):
-        reason = ""
         if isinstance(node, ast.FunctionDef):
-            reason = _miscompiled_function(node, tree, callables)
+            found = node.lineno, _miscompiled_function(node, tree, callables)
         elif isinstance(node, ast.Call):
-            reason = _miscompiled_call(node)
-        if reason:
-            yield node.lineno, reason
+            found = node.lineno, _miscompiled_call(node)
+        else:
+            continue
+        if found[1]:
+            yield found
 
 
 def _miscompiled_function(node: ast.FunctionDef, tree: ast.Module, callables: frozenset[str]) -> str:
