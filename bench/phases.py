@@ -17,20 +17,19 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from math import dist, hypot, isnan, nan, sqrt
 from pathlib import Path
 from statistics import fmean, stdev
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import volery
 from volery import AboveHome, Position
 from volery.base.frames import LocalFrame
 from volery.base.time import MS
 from volery.run.assembly.vehicles import ObservedVehicles
-from volery.trace.events import Operation, VehicleState
-from volery.trace.reader import Reading
+from volery.trace.events import Event, Operation, VehicleState
+from volery.trace.stream import Stream
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "examples"))
 from mission import HOME, mission
@@ -111,24 +110,23 @@ class Flight:
         sensors = SENSORS.get(autopilot, "consumer")
         armed_after = ARMED_AFTER_S.get(autopilot, 0.0)
         url = f"sim:{autopilot}?start={'cold' if armed_after else 'warm'}&sensors={sensors}"
-        with tempfile.TemporaryDirectory() as folder:
-            observed, origin = autopilot in OBSERVED, [HOME]
+        observed, origin = autopilot in OBSERVED, [HOME]
+        events: list[Event] = []
 
-            def recorded(drone: volery.Drone) -> None:
-                if observed:
-                    drone.wait_ready()
-                    volery.sleep(armed_after - drone.kernel.now() / 1e9)
-                    drone.kernel.call_at(drone.kernel.now() + MEAN_AGE, lambda: observe(drone))
-                flown(drone)
+        def recorded(drone: volery.Drone) -> None:
+            cast("Stream", drone.kernel.record).tap(events.append)
+            if observed:
+                drone.wait_ready()
+                volery.sleep(armed_after - drone.kernel.now() / 1e9)
+                drone.kernel.call_at(drone.kernel.now() + MEAN_AGE, lambda: observe(drone))
+            flown(drone)
 
-            def observe(drone: volery.Drone) -> None:
-                origin.append(drone.position)
-                ObservedVehicles(drone.kernel, [drone]).sample()
+        def observe(drone: volery.Drone) -> None:
+            origin.append(drone.position)
+            ObservedVehicles(drone.kernel, [drone]).sample()
 
-            run = volery.fly(recorded, url, volery.Options(seed=seed, out=Path(folder)))
-            assert run.completed, run.record.outcome.reason
-            with Reading(Path(folder) / "trace.mcap") as reading:
-                events = list(reading.events())
+        run = volery.fly(recorded, url, volery.Options(seed=seed))
+        assert run.completed, run.record.outcome.reason
         (self.record,) = run.record.vehicles.values()
         self.operations = [one for one in events if isinstance(one, Operation)]
         states = as_estimated(
