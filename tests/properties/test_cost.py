@@ -9,7 +9,7 @@ KINDS = st.sampled_from(["intel-i5-3470", "rpi4-cortex-a72"])
 @st.composite
 def tariffs(draw: st.DrawFn) -> Tariff:
     law = load_catalogue().processor(draw(KINDS)).ros_law("roscpp")
-    return law.at(draw(st.floats(law.least_mhz, law.greatest_mhz)))
+    return Tariff(law, draw(st.floats(law.least_mhz, law.greatest_mhz)))
 
 
 @given(tariffs(), st.integers(0, 200), st.integers(0, 200))

@@ -45,9 +45,17 @@ commands = Commands("First steps")
 
 DEMO_MODEL, STARTER_MODEL = "delivery", "starter"
 
-IMPORTED_ONCE = ["__main__", "volery.run.simulate", "volery.bridge", "volery.report.html_report"]
-"""Modules that the processes of simulations share: most of what a simulation imports. Others are imported by
-each."""
+IMPORTED_ONCE = [
+    "__main__",
+    "networkx",  # of a component of the demo
+    "volery.bridge",
+    "volery.report.html_report",
+    "volery.run.simulate",
+    "volery.simulation.autopilots.ardupilot.copter",
+    "volery.simulation.autopilots.ardupilot.rover",
+    "volery.vehicles.drivers.ardupilot",
+]
+"""Modules that the processes of simulations share: nearly all that they import."""
 
 POLL_PERIOD_S = 0.1
 """Wall seconds between two reads of the progress that the processes send."""
