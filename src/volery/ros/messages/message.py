@@ -221,7 +221,8 @@ def make_class(
         label, members, bases=(base,), namespace=namespace, init=bool(fields), eq=False, slots=True
     )
     for method, write in (("copy", generated_copy), ("converted", generated_conversion)):
-        setattr(made, method, _written_at_first_use(made, method, partial(write, made, fields)))
+        if method not in made.__match_args__:  # a field of that name comes first
+            setattr(made, method, _written_at_first_use(made, method, partial(write, made, fields)))
     return cast("type[Message]", made)
 
 

@@ -155,6 +155,13 @@ def test_own_types_can_be_defined() -> None:
     assert messages.from_cdr(asked.__msgtype__, messages.to_cdr(asked)).parcel.good == "blood"
 
 
+def test_fields_may_have_the_names_of_methods() -> None:
+    messages.define("parcel_msgs/msg/Print", "bool copy\nint32 converted\n")
+    printed = messages.new("parcel_msgs/msg/Print", copy=True, converted=2)
+    assert messages.from_cdr("parcel_msgs/msg/Print", messages.to_cdr(printed)) == printed
+    assert (printed.copy, printed.converted) == (True, 2)
+
+
 def test_constants_may_have_small_letters_as_in_ros_1() -> None:
     messages.define("mixed_msgs/msg/Mode", "uint8 kManual = 3\nuint8 A__B=4\nstring Name=a = b\nuint8 mode\n")
     kind: Any = messages.message_class("mixed_msgs/msg/Mode")
