@@ -360,6 +360,9 @@ class Vehicle:
     parameters: Annotated[
         Mapping[str, float], MapOf(NUMBER, free=True), "Parameters of the autopilot, by its own names."
     ] = field(default_factory=dict)
+    version: Annotated[
+        str, TEXT, 'Version of that firmware, such as `"1.14"`; the newest that is simulated if not given.'
+    ] = ""
     processor: str | None = None
     where: Location | None = field(default=None, compare=False)
 

@@ -117,6 +117,9 @@ def serve(
     kind: Annotated[str, typer.Option(help="multirotor or rover.")] = "multirotor",
     sensors: Annotated[str, typer.Option(help="consumer or rtk.")] = "consumer",
     system: Annotated[int | None, typer.Option(help="System id of the vehicle; 1 by default.")] = None,
+    version: Annotated[
+        str | None, typer.Option(help="Version of the firmware, such as 1.14; the newest by default.")
+    ] = None,
     graph: Annotated[
         str,
         typer.Option(
@@ -137,7 +140,7 @@ def serve(
 
     if not 0.0 < speed < float("inf"):
         raise UsageError(f"--speed {speed:g}: give simulated seconds per second, above 0")
-    options = {"kind": kind, "sensors": sensors, "home": home, "system": system}
+    options = {"kind": kind, "sensors": sensors, "home": home, "system": system, "version": version}
     query = "&".join(f"{name}={value}" for name, value in options.items() if value is not None)
     vehicle = parse_simulated(parse(f"sim:{autopilot}?{query}"), autopilot)
     server: VehicleServer | VehicleNodeServer

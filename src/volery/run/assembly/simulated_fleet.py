@@ -70,7 +70,8 @@ class SimulatedFleet:
         ids = _ids([vehicle.name for vehicle in vehicles], systems or {})
         for vehicle, flight in zip(vehicles, flights, strict=True):
             self.flights[vehicle.name] = flight
-            family = self._families[vehicle.name] = firmwares.load(vehicle.autopilot)
+            family = firmwares.load(vehicle.autopilot).of_version(vehicle.version)
+            self._families[vehicle.name] = family
             self.autopilots[vehicle.name] = Autopilot(
                 kernel,
                 flight,

@@ -32,6 +32,7 @@ OPTIONS = (
     "start",
     "system",
     "transmitter",
+    "version",
     "wind",
     "wire",
     *RATE_OPTIONS,
@@ -82,10 +83,10 @@ def parse_simulated(
     """Parse a ``sim:`` address.
 
     Options: ``home=LAT,LON,AMSL``, ``heading=DEG``, ``kind=multirotor|rover``, ``sensors=consumer|rtk``,
-    ``start=warm|cold``, ``system=ID``, ``wind=SPEED,FROM_DEG,GUSTS``, ``parameters=NAME:VALUE,...`` of the
-    autopilot, ``names`` of its ROS node, ``transmitter=CHANNEL:PULSE@SECONDS,...``, ``rate``, ``attitude``
-    and ``rc`` in Hz, ``wire=values|bytes`` and, with bytes, the faults of
-    ``volery.links.wire_faults``. Raises ``UsageError``.
+    ``start=warm|cold``, ``system=ID``, ``version`` of the firmware, ``wind=SPEED,FROM_DEG,GUSTS``,
+    ``parameters=NAME:VALUE,...`` of the autopilot, ``names`` of its ROS node,
+    ``transmitter=CHANNEL:PULSE@SECONDS,...``, ``rate``, ``attitude`` and ``rc`` in Hz, ``wire=values|bytes``
+    and, with bytes, the faults of ``volery.links.wire_faults``. Raises ``UsageError``.
     """
     address.only(*OPTIONS)
     stated = address.numbers("home", 3)
@@ -101,6 +102,7 @@ def parse_simulated(
         sensors=_one_of(address, "sensors", SENSOR_SETS, "consumer"),
         started=_one_of(address, "start", STARTS, "cold"),
         parameters=_parameters(address),
+        version=address.options.get("version", ""),
     )
     wind = Wind(*(address.numbers("wind", 3) or ()))
     frame = LocalFrame(latitude, longitude, amsl)

@@ -16,7 +16,7 @@ autopilot.connect(theirs)
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import nan
 from typing import NamedTuple
@@ -119,9 +119,25 @@ class FirmwareFamily:
 
     name: str
     kinds: Mapping[str, Firmware]
+    """Those of the newest version."""
     codec: Codec | None = MAVLINK
     default_links: tuple[DefaultLink, ...] = (GROUND_STATION,)
     """Links that ``volery serve`` opens unless addresses are given."""
+    versions: Mapping[str, Mapping[str, Firmware]] = field(default_factory=dict)
+    """``kinds`` of each version, the newest last; empty where there is one only."""
+
+    def of_version(self, version: str) -> FirmwareFamily:
+        """Return the family with the firmwares of one version; of the newest if *version* is empty.
+
+        Raises:
+            UsageError: There is no such version.
+        """
+        if not version:
+            return self
+        if version not in self.versions:
+            there = f"there is {choices(self.versions)}" if self.versions else "there is one only"
+            raise UsageError(f"a simulated {self.name} has no version {version!r}; {there}")
+        return replace(self, kinds=self.versions[version])
 
 
 firmwares: Registry[FirmwareFamily] = Registry("volery.autopilots", "simulated autopilot")

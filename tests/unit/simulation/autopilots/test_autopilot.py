@@ -14,7 +14,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
 from volery.simulation.autopilots.ardupilot import FIRMWARE
-from volery.simulation.autopilots.autopilot import Autopilot, firmwares
+from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily, firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor, Rover
 
@@ -51,6 +51,17 @@ def yard() -> Yard:
 
 def test_a_firmware_is_found_by_its_name() -> None:
     assert firmwares.load("ardupilot") is FIRMWARE
+
+
+def test_a_version_selects_the_firmwares_and_an_unknown_one_is_refused() -> None:
+    older = {"multirotor": FIRMWARE.kinds["rover"]}
+    family = FirmwareFamily("x", FIRMWARE.kinds, versions={"1.0": older, "2.0": FIRMWARE.kinds})
+    assert family.of_version("").kinds is FIRMWARE.kinds
+    assert family.of_version("1.0").kinds is older
+    with pytest.raises(UsageError, match=r"x has no version '3'; there is 1\.0 or 2\.0"):
+        family.of_version("3")
+    with pytest.raises(UsageError, match="there is one only"):
+        FirmwareFamily("y", {}).of_version("3")
 
 
 def test_the_kind_of_body_selects_the_firmware() -> None:
