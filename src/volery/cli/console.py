@@ -59,7 +59,11 @@ class _PrintableOnly(RenderHook):
 
 
 def _console(*, stderr: bool = False) -> Console:
-    made = Console(stderr=stderr)
+    """Return a console that prints text as it stands: what is styled is a ``Text`` with a style.
+
+    Names and messages of others may hold what Rich takes for markup (``[bold]``) or an emoji (``:100:``).
+    """
+    made = Console(stderr=stderr, markup=False, emoji=False)
     made.push_render_hook(_PrintableOnly())
     return made
 
@@ -106,16 +110,16 @@ class Output:
     def note(self, text: str) -> None:
         """Print a remark on standard error, unless ``--quiet`` is given."""
         if not self.quiet:
-            self.notes.print(text, markup=False, highlight=False, soft_wrap=True)
+            self.notes.print(text, highlight=False, soft_wrap=True)
 
     def complain(self, text: str) -> None:
         """Print an error on standard error in any case; only the beginning of a very long one."""
         if len(text) > LONGEST_ERROR:
             text = f"{text[:LONGEST_ERROR]} ... ({len(text) - LONGEST_ERROR} more characters)"
-        self.notes.print(text, markup=False, highlight=False, soft_wrap=True, style="red")
+        self.notes.print(text, highlight=False, soft_wrap=True, style="red")
 
     def give(self, data: Any) -> None:
         """Print the result as JSON if ``--json`` is given. A string is printed as it is."""
         if self.json:
             text = data if isinstance(data, str) else json.dumps(data, indent=2, ensure_ascii=False)
-            self.results.print(text, markup=False, highlight=False, soft_wrap=True)
+            self.results.print(text, highlight=False, soft_wrap=True)

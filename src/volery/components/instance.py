@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from traceback import walk_tb
+from traceback import walk_stack, walk_tb
+from types import FrameType
 
 from volery.base.errors import ComponentError, VoleryError
 from volery.base.time import Ns
@@ -213,18 +214,27 @@ class ForeignError(Exception):
 
 
 def describe(error: BaseException) -> str:
-    """Return what was raised, and where in the component's code.
+    """Return what was raised, and the line of the component's code that did it or made the call.
 
-    For example ``ValueError: no such parcel (delivery_central.py:41)``.
+    For example ``ValueError: no such parcel (delivery_central.py:41)``. A call that the callee does not take
+    is raised by the framework on behalf of its caller: then it is the caller's line.
     """
     if isinstance(error, ForeignError):
         return str(error)
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    frames = [
-        (trace.f_globals, trace.f_code.co_filename, line) for trace, line in walk_tb(error.__traceback__)
-    ]
-    own = [frame for frame in frames if COMPONENT_MARK in frame[0]] or frames
+    raised = [(frame, line) for frame, line in walk_tb(error.__traceback__)]
+    outer = walk_stack(raised[0][0].f_back) if raised else ()
+    own = [one for one in raised if _is_component_code(one[0])]
+    own = own or [one for one in outer if _is_component_code(one[0])][:1]
+    own = own or [one for one in raised if not one[0].f_globals.get("__name__", "").startswith(_FRAMEWORK)]
     if not own:
         return text
-    _, file, line = own[-1]
-    return f"{text} ({file.rpartition('/')[2]}:{line})"
+    frame, line = own[-1]
+    return f"{text} ({frame.f_code.co_filename.rpartition('/')[2]}:{line})"
+
+
+_FRAMEWORK = "volery."
+
+
+def _is_component_code(frame: FrameType) -> bool:
+    return COMPONENT_MARK in frame.f_globals

@@ -69,6 +69,11 @@ class SourceFile:
         return 1
 
 
+def not_python(path: Path, error: SyntaxError) -> ModelError:
+    """Return the error of the user's file, with the line that Python's compiler names."""
+    return ModelError(f"not Python: {error.msg}", where=Location(str(path), error.lineno or 1))
+
+
 TOO_DEEP = "an expression is nested too deeply to be compiled; split it into several"
 
 
@@ -91,7 +96,7 @@ def parse(path: Path, where: Location | None = None) -> SourceFile:
     try:
         return SourceFile(path, ast.parse(text, filename=str(path)))
     except SyntaxError as error:
-        raise ModelError(f"not Python: {error.msg}", where=Location(str(path), error.lineno or 1)) from error
+        raise not_python(path, error) from error
     except ValueError as error:
         raise ModelError(f"not Python: {error}", where=Location(str(path), 1)) from error
     except RecursionError as error:
@@ -154,6 +159,8 @@ class Loader:
             try:
                 tree = self.steps.instrument(source.tree) if self.steps else source.tree
                 code = compile(tree, str(source.path), "exec", dont_inherit=True)
+            except SyntaxError as error:  # such as a return outside a function: its tree can be made
+                raise not_python(source.path, error) from error
             except RecursionError as error:
                 raise ModelError(TOO_DEEP, where=Location(str(source.path), 1)) from error
             self._codes[source.path] = code

@@ -44,7 +44,8 @@ class CollectedModelError(ModelError):
     def __init__(self, errors: Iterable[ModelError]) -> None:
         self.errors = tuple(errors)
         listed = "\n".join(str(error) for error in self.errors)
-        super().__init__(f"{len(self.errors)} things are wrong with this model:\n{listed}")
+        count = "1 thing is" if len(self.errors) == 1 else f"{len(self.errors)} things are"
+        super().__init__(f"{count} wrong with this model:\n{listed}")
 
     def __reduce__(self) -> tuple[type[CollectedModelError], tuple[tuple[ModelError, ...]]]:
         """Return how to pickle it, to send it from process to process."""

@@ -30,6 +30,20 @@ def test_no_control_character_of_a_name_reaches_the_terminal(
     assert "\\x1b]0;PWN" in written.out
 
 
+def test_no_text_of_others_is_markup_or_an_emoji(capfd: pytest.CaptureFixture[str]) -> None:
+    text = "model.yaml:100: no 'garag' [bold]here[/bold] :warning: [/]"
+    output = Output()
+    table = make_table("name", title=text)
+    table.add_row(text)
+    output.show(text, table)
+    output.note(text)
+    output.complain(text)
+    Output(json=True).give(text)
+    written = capfd.readouterr()
+    assert written.out.count(text) == 4
+    assert written.err.count(text) == 2
+
+
 def test_lines_and_tabs_stay() -> None:
     assert printable("a\n\tb ö \u2028") == "a\n\tb ö \u2028"
 

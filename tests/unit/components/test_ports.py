@@ -9,7 +9,7 @@ import pytest
 
 from volery.base.errors import ComponentError, EstimateError, UsageError
 from volery.base.time import MS, Ns, S
-from volery.components.instance import Allocation, Instance
+from volery.components.instance import COMPONENT_MARK, Allocation, Instance
 from volery.components.ports import HEADER_BYTES, Port, PortList, size_of
 from volery.components.programs import start
 from volery.cost.pricing import FREE, Cost, StatedPricing
@@ -281,6 +281,21 @@ def test_an_error_of_a_callee_names_it_and_leaves_it_usable():
     assert bench.failures == []
     assert bench.busy("ground") == [(0, 2, "faulty"), (2, 4, "faulty")]  # what it computed before is paid
     assert {call.outcome for call in bench.of(Call)} == {"ComponentError"}
+
+
+def test_a_call_that_the_callee_does_not_take_is_the_line_of_the_caller(monkeypatch):
+    monkeypatch.setitem(globals(), COMPONENT_MARK, True)  # these lines are component code
+    bench = Bench()
+    faulty = bench.instance("faulty", Faulty(bench.kernel), Allocation(bench.ground), free(boom=0), ("boom",))
+    port = Port(bench.kernel, "caller", faulty, None, None)
+
+    def call():
+        port.boom("too", "much")
+
+    steps, line = [call], call.__code__.co_firstlineno + 1
+    bench.instance("caller", Doing(bench.kernel, steps), Allocation(bench.onboard, priority=0), free())
+    bench.run()
+    assert f"(test_ports.py:{line})" in str(bench.failures[0][1])
 
 
 def test_an_uncaught_error_ends_the_caller_and_is_reported():

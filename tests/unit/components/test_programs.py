@@ -211,6 +211,7 @@ def test_a_class_that_fits_is_accepted(desk, text, given, operations):
             "no class 'Central' (did you mean 'Centrale'?); there is Centrale",
         ),
         ("x = 1\n\ndef f(:\n", 3, "not Python: invalid syntax"),
+        ("class Central: pass\nreturn 3\n", 2, "not Python: 'return' outside function"),
         ("Central = 3\nfrom os import path as Central\n", 1, "'Central' is not a class"),
     ],
 )

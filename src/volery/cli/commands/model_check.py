@@ -57,9 +57,7 @@ def check(output: Output, model: Model, overrides: Overrides = None, format_: Fo
         _show(output, checked)
     else:
         data = _data(checked) if format_ == "json" else sarif(checked, model_file(model))
-        output.results.print(
-            json.dumps(data, indent=2, ensure_ascii=False), markup=False, highlight=False, soft_wrap=True
-        )
+        output.results.print(json.dumps(data, indent=2, ensure_ascii=False), highlight=False, soft_wrap=True)
     return BAD_INPUT if checked.errors else OK
 
 

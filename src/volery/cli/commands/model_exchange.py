@@ -73,7 +73,7 @@ def export(
 
 def _notes(output: Output, notes: tuple[Note, ...]) -> None:
     if notes:
-        output.note(f"{len(notes)} things did not map:")
+        output.note(f"{len(notes)} thing{'s' * (len(notes) > 1)} did not map:")
     for one in notes:
         output.note(f"  {one}")
 

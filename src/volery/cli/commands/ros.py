@@ -351,7 +351,10 @@ def _graph_tables(seen: GraphSnapshot) -> list[Table]:
     for line in seen.topics:
         rate = "" if line.rate is None else f"{line.rate:.3g}"
         topics.add_row(
-            f"{line.name}\n[dim]{line.type}", rate, "\n".join(line.publishers), "\n".join(line.subscribers)
+            Text.assemble(f"{line.name}\n", (line.type, "dim")),
+            rate,
+            "\n".join(line.publishers),
+            "\n".join(line.subscribers),
         )
     return [nodes, topics]
 

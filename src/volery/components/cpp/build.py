@@ -367,8 +367,8 @@ def _translation_units(component: CppComponent, sources: Sources) -> list[Path]:
     text = glue(
         component.class_name, file, component.requires, component.provided, component.interfaces or {}
     )
-    glue_file = _write_generated({"glue.cpp": text}) / "glue.cpp"
-    return [glue_file, *(one for one in sources.compiled if one != file)]
+    name = file.with_suffix(".cpp").name  # what is said of this unit is said of the user's file
+    return [_write_generated({name: text}) / name, *(one for one in sources.compiled if one != file)]
 
 
 def _write_generated(texts: Mapping[str, str]) -> Path:

@@ -143,9 +143,16 @@ _from_files: dict[str, str] = {}
 
 
 def _imported(file: Path) -> list[str]:
-    """Return the packages whose interfaces the file imports, in order."""
+    """Return the packages whose interfaces the file imports, in order; none if it is not Python.
+
+    What is wrong with such a file is reported when it is loaded.
+    """
     found: dict[str, None] = {}
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"), filename=str(file))):
+    try:
+        tree = ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
+    except (OSError, ValueError, SyntaxError, RecursionError):
+        return []
+    for node in ast.walk(tree):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         if isinstance(node, ast.ImportFrom) and node.module and not node.level:
             names = [node.module]

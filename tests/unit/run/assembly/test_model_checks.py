@@ -87,6 +87,17 @@ def test_a_component_that_cannot_run_is_bad_input(starter, file, old, new, expec
     assert expected in said
 
 
+@pytest.mark.parametrize("language", ["rospy", "rclpy"])
+def test_a_fault_in_the_python_of_a_ros_file_has_its_line(starter, language):
+    starter(
+        "model.yaml", f"language: python\n    path: {PATROL}", f"language: {language}\n    path: {PATROL}"
+    )
+    status, said = starter(PATROL, "def run(self):", "def run(self)")
+    assert status == 2, said
+    assert "patrol.py:16: not Python: expected ':'" in said
+    assert "internal error" not in said
+
+
 def test_everything_is_found_at_once(starter):
     starter(PATROL, "class Patrol:", "class Patrl:")
     status, said = starter(PLANNER, "class RoutePlanner:", "class Planner:")
