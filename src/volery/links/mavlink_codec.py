@@ -3,6 +3,10 @@
 Real links carry boot texts, noise and other protocols. The parser skips and counts everything that is no
 frame, so that ``problem`` can describe what arrives instead.
 
+A MAVLink 2 payload that is longer than the definition known here has extension fields of a newer sender: they
+are left out, as the protocol asks. MAVLink 1 has no extension fields.
+Source: https://mavlink.io/en/guide/serialization.html
+
 pymavlink computes and checks the signatures. A signed link sends signed frames only, and receives nothing
 else but RADIO_STATUS, which the radio at this end sends and cannot sign. A frame is refused if its signature
 is wrong or if its time is not later than that of the frame before it (a replay). Signing authenticates; it
@@ -88,9 +92,9 @@ class _Header:
             self.trailer += SIGNATURE_LENGTH if incompatible & SIGNED else 0
         self.kind: MessageType | None = message_type_of(number)
         self.length: int = self.payload - start + size + self.trailer
-        if incompatible & ~SIGNED or (self.kind is not None and size > self.kind.size):
+        if incompatible & ~SIGNED:
             self.length = 0
-        elif self.version_1 and self.kind is None:
+        elif self.version_1 and (self.kind is None or size > self.kind.size):
             self.length = 0  # noise often looks like MAVLink 1, so only known messages are accepted
 
     def valid(self, buffer: Octets) -> bool:
@@ -166,7 +170,7 @@ class MavlinkParser:
         size, incompatible, system, component, low, high = _RELEVANT_HEADER.unpack_from(octets, start)
         kind = message_type_of(low | high << 16)
         end = start + _BEFORE + size
-        if incompatible or kind is None or size > kind.size or end + _AFTER > len(octets):
+        if incompatible or kind is None or end + _AFTER > len(octets):
             return 0
         body = octets[start + 1 : end]
         if kind.checksum(body) != octets[end] | octets[end + 1] << 8:

@@ -5,7 +5,18 @@ from pymavlink.dialects.v10 import ardupilotmega as dialect_v1
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.links.frame import Frame
-from volery.links.mavlink_codec import CHECKSUM, HEADER, MavlinkParser, encode, frame_length, quantised
+from volery.links.mavlink_codec import (
+    CHECKSUM,
+    HEADER,
+    SIGNED,
+    MavlinkParser,
+    SignedMavlink,
+    _Packet,
+    encode,
+    frame_length,
+    quantised,
+)
+from volery.links.mavlink_messages import MessageType, message_type
 
 BEAT = encode(Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "base_mode": 81, "mavlink_version": 3}, 1, 1), 0)
 BOOT = b"\n\nInit ArduCopter V4.5.6 (7ce11b41)\n\nFree RAM: 131072\nBooting 0/0\n"
@@ -134,3 +145,36 @@ def test_a_quantised_frame_is_what_arrives():
     assert third["roll"] != 1 / 3
     assert third["roll"] == pytest.approx(1 / 3)
     assert third["yaw"] == 0.0
+
+
+def with_extension_fields(kind: MessageType, extra: bytes, flags: int = 0) -> bytes:
+    """Return a frame of *kind* as a sender with a newer definition sends it; without its signature."""
+    payload = bytes(1 + number % 100 for number in range(kind.size)) + extra
+    low, high = kind.id & 0xFFFF, kind.id >> 16
+    header = HEADER.pack(0xFD, len(payload), flags, 0, 9, 1, 1, low, high)
+    return header + payload + CHECKSUM.pack(kind.checksum(header[1:] + payload))
+
+
+@pytest.mark.parametrize("signed", [False, True])
+def test_every_message_is_read_where_a_newer_sender_adds_fields(signed: bool) -> None:
+    theirs, ours = SignedMavlink(b"k" * 32), SignedMavlink(b"k" * 32)
+    parser = ours.parser() if signed else MavlinkParser()
+    for kind in (message_type(one.msgname) for one in dialect.mavlink_map.values()):
+        known = kind.unpack(bytes(1 + number % 100 for number in range(kind.size)))
+        for extra in (b"\1", b"\0\0\7\0", bytes(range(1, 256 - kind.size))):
+            if not extra or kind.size + len(extra) > 255:
+                continue
+            frame = with_extension_fields(kind, extra, SIGNED if signed else 0)
+            frame = _Packet(frame).signed(theirs._mavlink) if signed else frame
+            assert frame_length(frame, 0) == len(frame)
+            (found,) = parser.feed(frame)
+            assert (found.name, found.fields) == (kind.name, known), kind.name
+    assert parser.statistics.garbage == 0
+
+
+def test_mavlink_1_has_no_extension_fields() -> None:
+    payload = bytes(range(1, 11))  # a heartbeat has nine bytes
+    covered = bytes((10, 0, 1, 1, 0)) + payload
+    frame = b"\xfe" + covered + CHECKSUM.pack(message_type("HEARTBEAT").checksum(covered))
+    assert frame_length(frame, 0) == 0
+    assert len(MavlinkParser().feed(frame + BEAT)) == 1
