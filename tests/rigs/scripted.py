@@ -62,6 +62,7 @@ class Scripted:
     system: int = 1
     firmware: int = 0
     version: int = 0
+    home_up: float = 0.0  # by which the altitude of home was corrected, m
     clock_rate: float = 0.0  # how fast its time since boot runs; 0: it is not sent
 
     home: ClassVar[tuple[int, int, int]]  # degE7, degE7, mm AMSL
@@ -116,7 +117,7 @@ class Scripted:
                 lat=self.home[0] + round(craft.north / self.metres[0]),
                 lon=self.home[1] + round(craft.east / self.metres[1]),
                 alt=self.home[2] + round(craft.up * 1000),
-                relative_alt=round(craft.up * 1000),
+                relative_alt=round((craft.up - self.home_up) * 1000),
                 vx=round(north * 100),
                 vy=round(east * 100),
                 vz=round(-up * 100),
@@ -129,6 +130,7 @@ class Scripted:
     def _home_position(self) -> None:
         if self.craft.placed:
             latitude, longitude, altitude = self.home
+            altitude += round(self.home_up * 1000)
             self.say("HOME_POSITION", latitude=latitude, longitude=longitude, altitude=altitude)
 
     def _attitude(self) -> None:

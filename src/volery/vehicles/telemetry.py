@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from math import inf, isfinite, nan
+from math import hypot, inf, isfinite, nan
 from typing import NamedTuple
 
-from volery.base.frames import Vector
+from volery.base.frames import LocalFrame, Vector
 from volery.base.position import Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
+from volery.vehicles.firmware_versions import FirmwareVersion
 from volery.vehicles.vehicle_clock import Moment, VehicleClock
 
 
@@ -69,6 +70,10 @@ STALE_AFTER: Ns = 2 * S
 REFRESHED_AFTER: Ns = 2 * S
 """Time after a silence in which messages that the link has held back may still arrive."""
 POSITION_STALE_AFTER: Ns = 3 * S
+SAME_HOME_M, SAME_HOME_UP_M = 1.0, 5.0
+"""Horizontal and vertical distance up to which home counts as the same place: PX4 corrects its altitude by
+the noise of satellite altitudes, +-1.5 m in recordings.
+"""
 PERIODS_MISSED = 3
 """A position that is reported rarely counts as old after this many of its periods."""
 LONGEST_POSITION_AGE: Ns = 30 * S
@@ -111,6 +116,7 @@ class Telemetry:
         changed: notified after each message.
         kind: "drone", "rover", or the autopilot's own term for another kind.
         system: system id, where the protocol has one.
+        version: version of the firmware; None where it is not stated, or not yet.
         failsafe: the autopilot is in a failsafe.
         failsafe_lasts: this failsafe need not end on the ground: an order of safety may end it.
         flying: off the ground, as judged by the autopilot.
@@ -130,7 +136,7 @@ class Telemetry:
         rc_ns: time of their last report; -1 before the first.
         obstacles: what range sensors measure, by message and sector; only where a clearance is stated.
         obstacles_ns: time of their last measurement, also of one that sees nothing; -1 before the first.
-        home_ns: time since which the present home position is reported; -1 without one.
+        home_ns: time since which home is reported where it is now, within ``SAME_HOME_M``; -1 without one.
         detects_silence: whether a silence is one of the link, not of a node that does not run its loop.
         stream_lost: how a stream of this program was interrupted, so that a failsafe of the autopilot acts.
     """
@@ -153,6 +159,7 @@ class Telemetry:
         self.kind = ""
         self.autopilot = ""
         self.system = 0
+        self.version: FirmwareVersion | None = None
         self.mode = ""
         self.status = ""
         self.armed = False
@@ -167,6 +174,7 @@ class Telemetry:
         self.amsl_remedy = ""
         self._clock = VehicleClock()
         self._home: Position | None = None
+        self._home_at_first: Position | None = None  # as it was at ``home_ns``
         self.home_ns: Ns = -1
         self.velocity = Velocity(nan, nan, nan)
         self.attitude = Attitude(nan, nan, nan)
@@ -269,8 +277,11 @@ class Telemetry:
 
     @home.setter
     def home(self, home: Position | None) -> None:
-        if home != self._home:
-            self._home, self.home_ns = home, self._kernel.now()
+        if home == self._home:
+            return
+        self._home = home
+        if home is None or not _same_home(home, self._home_at_first):
+            self._home_at_first, self.home_ns = home, self._kernel.now()
 
     @property
     def fix(self) -> str:
@@ -307,6 +318,16 @@ class Telemetry:
     def silence(self, now: Ns) -> float:
         """Return seconds since the last message; infinite before the first."""
         return inf if self.last_message_ns < 0 else (now - self.last_message_ns) / S
+
+
+def _same_home(home: Position, before: Position | None) -> bool:
+    """Return whether *home* is no other place than *before*, but for corrections by the autopilot."""
+    if before is None or abs(home.altitude.metres - before.altitude.metres) > SAME_HOME_UP_M:
+        return False
+    east, north, _ = LocalFrame(before.latitude, before.longitude, 0.0).to_enu(
+        home.latitude, home.longitude, 0.0
+    )
+    return hypot(east, north) <= SAME_HOME_M
 
 
 def failsafe_cause(telemetry: Telemetry, now: Ns) -> str:

@@ -37,7 +37,12 @@ KEPT = {
     "MISSION_CURRENT": ("seq", "mission_state"),
     "MISSION_ITEM_REACHED": ("seq",),
 }
-NAMES = ("auto-gcs", "manual-gcs", "offboard-api")
+NAMES = {
+    "auto-gcs": "px4-1.14-auto-gcs",
+    "manual-gcs": "px4-1.14-manual-gcs",
+    "offboard-api": "px4-1.14-offboard-api",
+    "guided-1.17": "px4-1.17-guided",
+}
 UNTIL_MS = {"offboard-api": 150_000}
 
 
@@ -63,8 +68,8 @@ def extract(path: Path, until: int) -> Iterator[list[Any]]:
 
 
 def main(folder: Path) -> None:
-    for name in NAMES:
-        rows = extract(folder / f"px4-1.14-{name}.tlog", UNTIL_MS.get(name, 10**9))
+    for name, recording in NAMES.items():
+        rows = extract(folder / f"{recording}.tlog", UNTIL_MS.get(name, 10**9))
         lines = ",\n".join(json.dumps(row, separators=(",", ":")) for row in rows)
         (Path(__file__).parent / f"{name}.json").write_text(f"[\n{lines}\n]\n")
 

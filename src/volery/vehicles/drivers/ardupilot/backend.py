@@ -22,7 +22,9 @@ from volery.vehicles.drivers.ardupilot.modes import (
     NUMBERS,
     RESTING,
 )
+from volery.vehicles.drivers.ardupilot.versions import COVERAGE
 from volery.vehicles.drivers.mavlink.backend import (
+    ATTITUDE_AND_RATES,
     INT_FRAMES,
     POSITION_ONLY,
     SHORTEST_TURN,
@@ -48,6 +50,8 @@ ARDUPILOT_FIRMWARE = Firmware(
     called="an ArduPilot",
     oldest=(4, 0),  # the first version with requests of single messages
     estimator="EKF_STATUS_REPORT",
+    coverage=COVERAGE,
+    turning=ATTITUDE_AND_RATES,
     home_first=True,
 )
 
@@ -191,7 +195,7 @@ class ArduPilotMavlink(MavlinkClient):
 class ArduPilotMavros(MavrosBackend):
     """ArduPilot over MAVROS. See ``ArduPilotBackend``."""
 
-    firmware = FirmwareBehind("ArduPilot", RESTING, home_first=True)
+    firmware = FirmwareBehind("ArduPilot", RESTING, home_first=True, turning=ATTITUDE_AND_RATES)
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         super().__init__(kernel, node, name, namespace, geoid)

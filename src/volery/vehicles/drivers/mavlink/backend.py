@@ -24,7 +24,7 @@ VELOCITY_AND_YAW_RATE = 0x05C7
 ACCELERATION_AND_YAW_RATE = 0x043F
 """Type masks of SET_POSITION_TARGET_*: a bit that is set means ignore that field."""
 
-ATTITUDE_AND_HEADING, ATTITUDE_AND_YAW_RATE = 0b111, 0b011
+ATTITUDE_AND_HEADING, ATTITUDE_AND_YAW_RATE, ATTITUDE_AND_RATES = 0b111, 0b011, 0b000
 """Type masks of SET_ATTITUDE_TARGET, likewise."""
 
 FORCE = 21196.0
@@ -108,16 +108,21 @@ def acceleration_fields(acceleration: Acceleration, yaw_rate: float) -> dict[str
     }
 
 
-def attitude_fields(target: AttitudeTarget, seen: Telemetry) -> dict[str, Any]:
+def attitude_fields(target: AttitudeTarget, seen: Telemetry, turning: int) -> dict[str, Any]:
     """Return an attitude as the fields of SET_ATTITUDE_TARGET.
 
     Beside a yaw rate the quaternion has the present heading, because some firmware reads both.
+
+    Args:
+        target: the attitude.
+        seen: telemetry of the vehicle.
+        turning: type mask with which the firmware takes an attitude beside a yaw rate.
     """
     turns = isnan(target.heading)
     heading = seen.attitude.heading if turns else target.heading
     heading = heading if isfinite(heading) else 0.0
     return {
-        "type_mask": ATTITUDE_AND_YAW_RATE if turns else ATTITUDE_AND_HEADING,
+        "type_mask": turning if turns else ATTITUDE_AND_HEADING,
         "q": euler_to_quaternion(radians(target.roll), radians(target.pitch), radians(heading)),
         "body_yaw_rate": radians(target.yaw_rate) if turns else 0.0,
         "thrust": target.thrust,

@@ -18,7 +18,7 @@ from volery.kernel.api import Action, Kernel
 from volery.links.frame import Frame
 from volery.links.link import Link, SelectiveLink
 from volery.links.mavlink_messages import constant, entry_name, from_bytewise, message_type
-from volery.trace.events import LinkState
+from volery.trace.events import LinkState, Text
 from volery.vehicles.address import rate_option, records_texts, system_option
 from volery.vehicles.driver import AttitudeTarget, link_error
 from volery.vehicles.drivers.mavlink import obstacle_decoder
@@ -31,6 +31,7 @@ from volery.vehicles.drivers.mavlink.backend import (
 )
 from volery.vehicles.drivers.mavlink.decoder import TelemetryDecoder
 from volery.vehicles.drivers.mavlink.services import MavlinkServices, item_fields
+from volery.vehicles.firmware_versions import Coverage, MinorVersion, stated_version
 from volery.vehicles.services import Item
 from volery.vehicles.telemetry import Answer, Telemetry
 
@@ -52,6 +53,8 @@ TRIES = 5
 UPLOAD_STALLED: Ns = 5 * S
 MISSION_TYPE = 0
 
+_WARNING = 4
+"""Severity in syslog (RFC 5424)."""
 _IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
 _ACCEPTED = constant("MAV_RESULT_ACCEPTED")
 _NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
@@ -81,16 +84,20 @@ class Firmware(NamedTuple):
         name: name in messages.
         called: name with its article.
         oldest: oldest supported version, major and minor.
+        coverage: versions that the rules of the driver were read from.
         estimator: message with the state of its estimator.
         home_first: item 0 of its missions is home.
+        turning: type mask of SET_ATTITUDE_TARGET beside a yaw rate.
         bytewise: whole parameter values lie in the bytes of the float (see ``from_bytewise``), as in PX4.
     """
 
     number: int
     name: str
     called: str
-    oldest: tuple[int, int]
+    oldest: MinorVersion
+    coverage: Coverage
     estimator: str
+    turning: int
     bytewise: bool = False
     home_first: bool = False
 
@@ -369,16 +376,23 @@ class MavlinkClient:
         return True
 
     def _handle_version(self, number: int) -> bool:
-        """Check the version: one byte each for major, minor, patch and kind of release; 0 if not stated."""
+        """Note the version that the vehicle states, and say if it is too old or not covered by the rules."""
         self._requests.note_answered(VERSION)
-        major, minor, patch = number >> 24, number >> 16 & 0xFF, number >> 8 & 0xFF
+        version = stated_version(number)
+        if version is None or version == self.telemetry.version:
+            return False
+        self.telemetry.version = version
         oldest = self.firmware.oldest
-        if number and (major, minor) < oldest:
+        if version.series < oldest:
             self._unsupported = (
-                f"{self.firmware.name} {major}.{minor}.{patch} flies here; this driver needs "
+                f"{self.firmware.name} {version} flies here; this driver needs "
                 f"{oldest[0]}.{oldest[1]} or newer: update the firmware"
             )
-        return bool(self._unsupported)
+            return True
+        uncovered = self.firmware.coverage.uncovered(version)
+        if uncovered:
+            self._kernel.record(Text(self._kernel.now(), self.telemetry.name, _WARNING, uncovered))
+        return True
 
     def _note_answer(self, key: str, accepted: bool, result: str) -> None:
         self.telemetry.answers[key] = Answer(self._kernel.now(), accepted, result)
@@ -459,7 +473,7 @@ class MavlinkClient:
 
     def send_attitude(self, target: AttitudeTarget) -> None:
         """Send SET_ATTITUDE_TARGET."""
-        self._send_to("SET_ATTITUDE_TARGET", **attitude_fields(target, self.telemetry))
+        self._send_to("SET_ATTITUDE_TARGET", **attitude_fields(target, self.telemetry, self.firmware.turning))
 
     def request_arming_checks(self) -> None:
         """Send RUN_PREARM_CHECKS; the reasons arrive as texts."""

@@ -39,8 +39,8 @@ KINDS: Mapping[int, str] = {
 
 PREARM_CHECK = constant("MAV_SYS_STATUS_PREARM_CHECK")
 HORIZONTAL_POSITION = constant("ESTIMATOR_POS_HORIZ_ABS")
-NO_POSITION = constant("ESTIMATOR_CONST_POS_MODE")
-"""The same bits are used in ArduPilot's EKF_STATUS_REPORT and in PX4's ESTIMATOR_STATUS."""
+"""The same bit is used in ArduPilot's EKF_STATUS_REPORT and in PX4's ESTIMATOR_STATUS."""
+NO_POSITION = constant("EKF_CONST_POS_MODE")
 COMPLETE = constant("MISSION_STATE_COMPLETE")
 _UNKNOWN_16 = 65535
 RC_CHANNELS = 18
@@ -178,9 +178,13 @@ class TelemetryDecoder(ABC):
         )
         self._update_ready()
 
+    def _no_position(self) -> int:
+        """Return the flags of the estimator's state with which there is no horizontal position."""
+        return NO_POSITION
+
     def _estimator(self, fields: Fields) -> None:
         flags: int = fields["flags"]
-        self._estimates_position = bool(flags & HORIZONTAL_POSITION) and not flags & NO_POSITION
+        self._estimates_position = bool(flags & HORIZONTAL_POSITION) and not flags & self._no_position()
         self._telemetry.note_estimate(self._estimates_position)
         self._update_ready()
 

@@ -9,12 +9,12 @@ from typing import Any, Generic, TypeVar
 
 from volery.base.errors import CapabilityError, Refused
 from volery.base.geoid import Geoid
-from volery.base.time import Ns, S
+from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.links.link import Link
 from volery.ros.graph import Node
 from volery.vehicles.address import MAVLINK_OPTIONS, check_options
-from volery.vehicles.driver import Capability, MissionItem, Repeat, Step
+from volery.vehicles.driver import Capability, Land, MissionItem, Repeat, ReturnHome, Step
 from volery.vehicles.drivers.mavlink.backend import Ack, Backend
 from volery.vehicles.drivers.mavlink.mavros_backend import namespace_and_geoid
 from volery.vehicles.drivers.steps import (
@@ -32,6 +32,8 @@ from volery.vehicles.drivers.steps import (
 from volery.vehicles.services import Item
 from volery.vehicles.telemetry import Telemetry
 
+COMPLETE_FOR: Ns = 2500 * MS
+"""Time in which the messages about the end of a mission and the next heartbeat arrive."""
 ARMING_CHECKS_PERIOD: Ns = 5 * S
 LASTS_AFTER: Ns = 6 * S
 """Time after which an arming check counts as one that stays: it has been reported twice."""
@@ -109,6 +111,7 @@ class MavlinkDriver:
 
     obeys = ""
     """Mode in which the firmware obeys a computer."""
+    landing_modes: frozenset[str] = frozenset()
 
     def __init__(self, kernel: Kernel, name: str, backend: Backend) -> None:
         self.name = name
@@ -123,6 +126,7 @@ class MavlinkDriver:
         self._backend = backend
         self._takeover = Takeover(kernel, backend.telemetry, self.obeys)
         self._last_item: int | None = None  # the item at which the mission on board ends in the air
+        self._mission_lands = False  # the mission on board was stored by this program, and ends on the ground
 
     @property
     def capabilities(self) -> frozenset[Capability]:
@@ -216,14 +220,35 @@ class MavlinkDriver:
             again=2 * S,
         )
         self._last_item = self._end_in_air(mission)
+        self._mission_lands = isinstance(mission[-1], Land | ReturnHome)
         return (step,)
 
-    def _finish_mission(self, mode: str, leads_to: tuple[str, ...], within: Ns) -> Step:
-        """Return a step that ends when disarmed, at the last item, or when the mission is reported over."""
+    def _finish_mission(self, mode: str, leads_to: tuple[str, ...], within: Ns, ends_in: str = "") -> Step:
+        """Return a step that ends when disarmed, at the last item, or when the mission is reported over.
+
+        An autopilot may report it as complete when the return home begins that is its last item.
+
+        Args:
+            mode: mode in which missions are flown.
+            leads_to: modes in which they end on the ground.
+            within: time-out, ns.
+            ends_in: mode that the autopilot enters when one has ended in the air; empty where it stays.
+        """
+        seen = self.telemetry
+        complete, ended = _Lasting(self._kernel), _Lasting(self._kernel)
 
         def over(seen: Telemetry) -> bool:
             last = self._last_item
-            return not seen.armed or seen.mission_ended or (last is not None and seen.mission_reached >= last)
+            if not seen.armed or (last is not None and seen.mission_reached >= last):
+                return True
+            in_air = seen.mission_ended and seen.flying and not self._mission_lands
+            stays = complete.holds(in_air and seen.mode not in self.landing_modes)
+            return stays or (in_air and seen.mode == ends_in)
+
+        def taken() -> str:
+            """Return that another has changed the mode, unless the mission is reported to have ended."""
+            left = ended.holds(bool(ends_in) and seen.mode == ends_in and not seen.mission_ended)
+            return f"changed from {mode} to {seen.mode}" if left else ""
 
         return Step(
             ask="finish the mission",
@@ -231,7 +256,8 @@ class MavlinkDriver:
             done=over,
             within=within,
             mode=mode,
-            leads_to=leads_to,
+            leads_to=(*leads_to, ends_in) if ends_in else leads_to,
+            lost=taken,
         )
 
     def _forget_progress(self) -> None:
@@ -272,6 +298,20 @@ class MavlinkDriver:
             again=S,
             mode=mode,
         )
+
+
+class _Lasting:
+    """Finds out whether something has been the case for ``COMPLETE_FOR``."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        self._kernel = kernel
+        self._since: Ns | None = None
+
+    def holds(self, now_true: bool) -> bool:
+        """Note whether it is the case now; return whether it has lasted."""
+        now = self._kernel.now()
+        self._since = (now if self._since is None else self._since) if now_true else None
+        return self._since is not None and now - self._since >= COMPLETE_FOR
 
 
 def _accepted(seen: Telemetry, key: str) -> bool:

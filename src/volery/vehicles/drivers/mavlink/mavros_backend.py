@@ -71,6 +71,8 @@ class FirmwareBehind(NamedTuple):
     resting: str
     home_first: bool
     """Whether item 0 of a mission is home."""
+    turning: int
+    """Type mask of SET_ATTITUDE_TARGET beside a yaw rate."""
 
 
 class MavrosDecoder:
@@ -396,7 +398,7 @@ class MavrosBackend:
         if self._attitude is None:
             name = self._name("setpoint_raw/attitude")
             self._attitude = self._node.advertise(name, "mavros_msgs/msg/AttitudeTarget")
-        fields = attitude_fields(target, self.telemetry)
+        fields = attitude_fields(target, self.telemetry, self.firmware.turning)
         w, x, y, z = attitude_ned_to_enu(fields["q"])
         rate = to_ros_yaw_rate(degrees(fields["body_yaw_rate"]))
         message = new(

@@ -21,6 +21,7 @@ from volery.ros.graph import Node
 from volery.ros.messages import new, request
 from volery.vehicles.driver import Acceleration, AttitudeTarget, ManualControl
 from volery.vehicles.drivers.mavlink.backend import (
+    ATTITUDE_AND_YAW_RATE,
     INT_FRAMES,
     VELOCITY_AND_YAW_RATE,
     Ack,
@@ -31,6 +32,7 @@ from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
 from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend
 from volery.vehicles.drivers.px4.decoder import PX4Decoder
 from volery.vehicles.drivers.px4.modes import HOLD, LINK_LOSS_PARAMETERS, MODES
+from volery.vehicles.drivers.px4.versions import COVERAGE
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Velocity
 
@@ -39,7 +41,9 @@ PX4_FIRMWARE = Firmware(
     name="PX4",
     called="a PX4",
     oldest=(1, 12),
+    coverage=COVERAGE,
     estimator="ESTIMATOR_STATUS",
+    turning=ATTITUDE_AND_YAW_RATE,  # with all three rates it takes the rates as a set-point of their own
     bytewise=True,
 )
 
@@ -195,7 +199,7 @@ class PX4Mavlink(MavlinkClient):
 class PX4Mavros(MavrosBackend):
     """PX4 over MAVROS. See ``PX4Backend``."""
 
-    firmware = FirmwareBehind("PX4", HOLD, home_first=False)
+    firmware = FirmwareBehind("PX4", HOLD, home_first=False, turning=ATTITUDE_AND_YAW_RATE)
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         super().__init__(kernel, node, name, namespace, geoid)

@@ -11,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from volery.base.position import AMSL, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.vehicles.drivers.mavlink.decoder import Fields, TelemetryDecoder
 from volery.vehicles.drivers.px4.modes import HOLD, MANUAL_MODES, MODES, mode_name
-from volery.vehicles.telemetry import Telemetry
+from volery.vehicles.drivers.px4.versions import HOME_ALTITUDE_CORRECTED, NO_HORIZONTAL_POSITION
+from volery.vehicles.telemetry import SAME_HOME_UP_M, Telemetry
 
 ALL_MODES = 0xFFFFFFFF
 ERROR, WARNING = 3, 4
@@ -24,6 +26,8 @@ NOT_FOR_PEOPLE = 8
 SEQUENCES = 65_536
 KEPT_EVENTS = 20
 """Number of past events that are requested; those that PX4 keeps no longer are reported as errors."""
+HOME_SMOOTHED_OVER: Ns = 10 * S
+"""Time constant of home's altitude, which PX4 1.17 corrects up to four times a second by +-1.5 m of noise."""
 EXPLAINS_WITHIN: Ns = S
 """Time after a refusal within which a report of the arming checks is its reason."""
 
@@ -232,11 +236,45 @@ class PX4Decoder(TelemetryDecoder):
         self._explains_until: Ns = -1
         self._handlers["CURRENT_EVENT_SEQUENCE"] = lambda fields: self._request_missed(fields["sequence"])
         self._estimator_reports = False
+        self._home_altitude: float | None = None  # smoothed, m AMSL, while PX4 corrects it
+        self._home_altitude_ns: Ns = 0
         self._handlers["ESTIMATOR_STATUS"] = self._estimator_status
         self._handlers["EVENT"] = self._event
 
     def _mode_name(self, number: int) -> str:
         return mode_name(number)
+
+    def _no_position(self) -> int:
+        return NO_HORIZONTAL_POSITION.by(self._telemetry.version)
+
+    def _global_position(self, fields: Fields) -> None:
+        """Decode the position, with its height above a smoothed home while PX4 corrects that."""
+        super()._global_position(fields)
+        seen, now = self._telemetry, self._kernel.now()
+        if not seen.flying or not HOME_ALTITUDE_CORRECTED.by(seen.version):
+            self._home_altitude = None
+            return
+        reported = (fields["alt"] - fields["relative_alt"]) / 1000.0
+        before = self._home_altitude
+        if before is None or abs(reported - before) > SAME_HOME_UP_M:
+            self._home_altitude = reported
+        else:
+            passed = now - self._home_altitude_ns
+            self._home_altitude = before + (reported - before) * passed / (passed + HOME_SMOOTHED_OVER)
+        self._home_altitude_ns = now
+        seen.above_home = fields["alt"] / 1000.0 - self._home_altitude
+        self._smooth_home()
+
+    def _home_position(self, fields: Fields) -> None:
+        super()._home_position(fields)
+        self._smooth_home()
+
+    def _smooth_home(self) -> None:
+        """Let home have the altitude that the height is above, unless home was moved."""
+        home, altitude = self._telemetry.home, self._home_altitude
+        if home is None or altitude is None or abs(home.altitude.metres - altitude) > SAME_HOME_UP_M:
+            return
+        self._telemetry.home = Position(home.latitude, home.longitude, AMSL(altitude))
 
     def _update_ready(self) -> None:
         """Update ``ready``; without an estimator report, a reported position counts."""

@@ -189,8 +189,12 @@ class PX4(MavlinkDriver):
 
         began = self._kernel.now()
 
+        sent: Position | None = None
+
         def send() -> None:
-            monitor.set(self._reposition(goal(), heading))
+            nonlocal sent
+            sent = self._reposition(goal(), heading)
+            monitor.set(sent)
             self._backend.request_target()
 
         def refused() -> str:
@@ -200,8 +204,10 @@ class PX4(MavlinkDriver):
         arrived = cache(partial(arrived_at, rover=rover))
 
         def done(seen: Telemetry) -> bool:
-            there = arrived(goal()) if turned is None else turned
-            return seen.mode == HOLD and there(seen)
+            # where it was sent: a height above home is sent AMSL, and home may be corrected on the way
+            if sent is None or seen.mode != HOLD:
+                return False
+            return turned(seen) if turned is not None else arrived(sent)(seen)
 
         return Step(
             ask=ask,
@@ -309,7 +315,8 @@ class PX4(MavlinkDriver):
         """Enter AUTO.RTL. A drone lands and disarms itself; a rover stops near home.
 
         PX4 takes the destination of a return from its home position every 2 s: a return that begins right
-        after home was moved ends at the old one. So a home that has just been moved is waited for.
+        after home was moved ends at the old one. So a home that has just been moved is waited for. PX4 1.17
+        corrects home's altitude up to four times a second after a take-off; that is no other home.
         """
         if self.telemetry.kind == DRONE_KIND:
             return (*self._home_taken_up(), *self._until_disarmed(modes.RTL, "return home and land", within))
@@ -317,12 +324,16 @@ class PX4(MavlinkDriver):
         return (*self._home_taken_up(), *self._end_manual_control(), self._change_mode(modes.RTL), reach)
 
     def _home_taken_up(self) -> Sequence[Step]:
+        began = self._kernel.now()
+
         def old_enough(seen: Telemetry) -> bool:
-            return self._kernel.now() - seen.home_ns >= HOME_TAKEN_UP_AFTER
+            now = self._kernel.now()
+            # a home that moves on must not keep it from returning
+            return now - seen.home_ns >= HOME_TAKEN_UP_AFTER or now - began >= HOME_TAKEN_UP_AFTER + S
 
         if not self.telemetry.armed or old_enough(self.telemetry):
             return ()
-        wait = Step(ask="take up its new home", send=send_nothing, done=old_enough, within=5 * S)
+        wait = Step(ask="take up its new home", send=send_nothing, done=old_enough, within=10 * S)
         return (wait,)
 
     def land(self, within: Ns) -> Sequence[Step]:
@@ -430,7 +441,7 @@ class PX4(MavlinkDriver):
             immediate_step("begin anew", self._forget_progress),
             self._change_mode(modes.MISSION),
             *(replace(step, mode=modes.MISSION) for step in self.arm()),
-            self._finish_mission(modes.MISSION, (modes.RTL,), within),
+            self._finish_mission(modes.MISSION, (modes.RTL,), within, HOLD),
         )
 
     # -- common steps

@@ -703,6 +703,24 @@ def test_true_errors_are_recorded_where_the_truth_is_known(bench: Make) -> None:
     assert goto.true_vertical == pytest.approx(1.5)
 
 
+def test_an_attitude_states_all_body_rates_or_none(bench: Make) -> None:
+    """ArduCopter from 4.6 on stops if only one is stated; 4.5 takes all three as well."""
+    at = bench()
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.set_attitude(pitch=-5, yaw_rate=20, lasting=1)
+        sleep(at.kernel, 2 * S)
+        drone.set_attitude(pitch=-5, heading=90, lasting=1)
+
+    at.fly(mission)
+    sent = {
+        (fields["type_mask"], fields.get("body_roll_rate", 0.0), round(fields["body_yaw_rate"], 3))
+        for fields in at.autopilot.sent("SET_ATTITUDE_TARGET")
+    }
+    assert sent == {(0b000, 0.0, 0.349), (0b111, 0.0, 0.0)}
+
+
 def test_options_of_the_driver(bench: Make) -> None:
     at = bench(options={"rate": "5", "attitude": "2"})
     at.kernel.run(2 * S)

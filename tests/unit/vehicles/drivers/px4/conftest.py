@@ -51,6 +51,7 @@ class FakePx4(Scripted):
     system: int = 3
     firmware: int = 12
     version: int = 17694975
+    mission_state: int = 0
     intended: str = HOLD
 
     home = HOME
@@ -105,7 +106,7 @@ class FakePx4(Scripted):
         self.say("LOCAL_POSITION_NED", x=self.craft.north, y=self.craft.east, vx=north, vy=east, vz=-up)
 
     def _mission_current(self) -> None:
-        self.say("MISSION_CURRENT", seq=0, mission_state=0)
+        self.say("MISSION_CURRENT", seq=0, mission_state=self.mission_state)
 
     # -- living
 
@@ -142,6 +143,8 @@ class FakePx4(Scripted):
     def take(self, name: str, fields: dict[str, Any]) -> None:
         if name == "SET_POSITION_TARGET_LOCAL_NED" and fields["coordinate_frame"] == 1:
             self.setpoint, self.streamed_at = fields, self.kernel.now()
+        elif name == "SET_ATTITUDE_TARGET":
+            self.setpoint, self.streamed_at = {"vx": 0.0, "vy": 0.0, "vz": 0.0}, self.kernel.now()
         elif name == "MANUAL_CONTROL":
             self._take_sticks(fields)
         elif name == "SET_MODE":

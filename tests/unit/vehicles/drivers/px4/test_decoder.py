@@ -5,9 +5,12 @@ from __future__ import annotations
 import pytest
 
 from rigs.recorded import Recorded, extract
+from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
 from volery.links.mavlink_codec import MavlinkParser, encode
 from volery.vehicles.drivers.px4.decoder import KNOWN_EVENTS, PX4Decoder, event_id, event_text
+from volery.vehicles.firmware_versions import FirmwareVersion
+from volery.vehicles.telemetry import Telemetry
 
 ARM, REJECTED = 400, 1
 FOLDER = "px4_telemetry"
@@ -60,6 +63,48 @@ def test_it_is_ready_only_once_it_has_a_position() -> None:
     *_, (_, seen) = replayed("auto-gcs")
     assert seen.home is not None
     assert seen.home.latitude == pytest.approx(45.467, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("version", "flags", "located"),
+    [
+        ((1, 14, 0), 1023, False),
+        ((1, 15, 4), 1023, False),
+        ((1, 16, 0), 1023, True),  # at rest, with a position
+        ((1, 17, 0), 1023, True),
+        (None, 1023, True),
+        ((1, 17, 0), 1023 - 16, False),
+        ((1, 14, 0), 831, True),
+    ],
+)
+def test_the_estimator_of_each_version(version: tuple[int, ...] | None, flags: int, located: bool) -> None:
+    kernel = VirtualKernel()
+    seen = Telemetry(kernel, "craft")
+    seen.version = None if version is None else FirmwareVersion(*version)
+    hearing = PX4Decoder(kernel, seen)
+    hearing.handle_message("ESTIMATOR_STATUS", {"flags": flags})
+    assert hearing._estimates_position is located
+
+
+def test_px4_1_17_is_ready_at_rest_and_its_home_stays_where_it_is() -> None:
+    seen_ready, home_since, heights, jumps = None, set(), [], []
+    amsl = before = None
+    for at, seen in replayed("guided-1.17"):
+        seen_ready = at if seen.ready and seen_ready is None else seen_ready
+        if seen.flying and at > 25:
+            home_since.add(seen.home_ns)
+            if 40 < at < 64 and seen.position.altitude.metres != amsl:  # it hovers at one height AMSL
+                amsl = seen.position.altitude.metres
+                heights.append(seen.above_home)
+                jumps.append(abs(seen.above_home - (before or seen.above_home)))
+                before = seen.above_home
+            off = seen.position.altitude.metres - seen.home.altitude.metres - seen.above_home
+            assert abs(off) < 0.01
+    assert seen_ready is not None
+    assert seen_ready < 4
+    assert len(home_since) == 1  # a hundred corrections of its altitude are no other home
+    assert max(heights) - min(heights) < 2.0
+    assert max(jumps) < 0.8
 
 
 def test_offboard_and_its_loss_with_each_action() -> None:

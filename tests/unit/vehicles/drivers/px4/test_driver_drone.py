@@ -21,7 +21,7 @@ from volery.base.errors import (
 from volery.base.position import AMSL, AboveGround, AboveHome, Position
 from volery.base.time import MS, S
 from volery.kernel.waiting import sleep
-from volery.trace.events import Operation
+from volery.trace.events import Operation, Text
 from volery.vehicles import Capability, ChangeSpeed, Land, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.drivers.px4.modes import HOLD, LAND, MODES, OFFBOARD, RTL
 
@@ -493,6 +493,151 @@ def test_a_mission_ends_when_its_last_place_is_reached(bench: Make) -> None:
     assert at.fly(mission) == "AUTO.MISSION"
     assert modes_asked(at.autopilot) == ["AUTO.MISSION"]
     assert at.autopilot.sent("MISSION_SET_CURRENT")
+
+
+# -- as newer versions do it
+
+PX4_1_17 = 0x011100FF
+
+
+def unsteady_home(at: Any) -> None:
+    """As PX4 1.17 in the first two minutes of a flight: home's altitude is corrected by noise."""
+    noise = (0.0, 1.4, -0.9, 1.1, -1.3, 0.4, -1.2, 1.3)
+    handle = at.kernel.every(
+        300 * MS,
+        lambda: setattr(at.autopilot, "home_up", noise[at.kernel.now() // (300 * MS) % len(noise)]),
+    )
+    at.after(300, handle.cancel)
+
+
+def test_it_flies_by_heights_above_a_home_whose_altitude_is_corrected_all_the_time(bench: Make) -> None:
+    at = bench()
+    at.autopilot.version = PX4_1_17
+    began: list[int] = []
+
+    def mission(drone: Any) -> float:
+        at.after(45, lambda: unsteady_home(at))
+        drone.takeoff(10)
+        sleep(at.kernel, 40 * S)
+        drone.goto(NEAR)
+        height = float(drone.altitude.metres)
+        began.append(at.kernel.now())
+        drone.return_home()
+        return height
+
+    assert at.fly(mission) == pytest.approx(12.0, abs=0.5)
+    assert not at.craft.armed
+    (returned,) = [
+        when
+        for when, frame in zip(at.autopilot.times, at.autopilot.received, strict=True)
+        if frame.name == "COMMAND_LONG"
+        and frame.fields["command"] == SET_MODE
+        and frame.fields["param3"] == 5
+    ]
+    assert returned - began[0] < S
+
+
+def test_a_home_that_was_just_moved_is_waited_for_and_one_that_moves_on_is_not(bench: Make) -> None:
+    at = bench()
+    at.autopilot.version = PX4_1_17
+    began: list[int] = []
+
+    def wander() -> None:
+        latitude, longitude, altitude = at.autopilot.home
+        at.autopilot.home = (latitude + 500, longitude, altitude)
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        handle = at.kernel.every(S, wander)
+        sleep(at.kernel, 3 * S)
+        began.append(at.kernel.now())
+        try:
+            drone.return_home()
+        finally:
+            handle.cancel()
+
+    at.fly(mission)
+    returned = next(
+        when
+        for when, frame in zip(at.autopilot.times, at.autopilot.received, strict=True)
+        if frame.name == "COMMAND_LONG"
+        and frame.fields["command"] == SET_MODE
+        and frame.fields["param3"] == 5
+    )
+    assert 2 * S < returned - began[0] < 5 * S
+
+
+def test_a_mission_that_is_complete_when_its_return_begins_is_not_over(bench: Make) -> None:
+    at = bench()
+    at.autopilot.version = PX4_1_17
+
+    def complete() -> None:
+        at.autopilot.mission_state = 5
+        at.craft.landed_state = 2
+
+    def mission(drone: Any) -> None:
+        drone.wait_ready()
+        drone.upload_mission([TakeOff(10), Waypoint(NEAR), ReturnHome()])
+        at.after(3, lambda: setattr(at.craft, "landed_state", 2))
+        at.after(20, complete)
+        at.after(21, lambda: at.autopilot.enter(RTL))
+        drone.start_mission(within=120)
+        assert not drone.armed
+
+    at.fly(mission)
+
+
+@pytest.mark.parametrize("later", [0.0, 1.2])
+def test_a_mission_of_another_station_that_ends_in_the_air(bench: Make, later: float) -> None:
+    """The heartbeat with the mode that follows may come before the report that it is complete."""
+    at = bench()
+    at.autopilot.version = PX4_1_17
+
+    def mission(drone: Any) -> str:
+        drone.wait_ready()
+        at.after(3, lambda: setattr(at.craft, "landed_state", 2))
+        at.after(20, lambda: at.autopilot.enter(HOLD))
+        at.after(20 + later, lambda: setattr(at.autopilot, "mission_state", 5))
+        drone.start_mission(within=120)
+        return str(drone.mode)
+
+    assert at.fly(mission) == HOLD
+
+
+def test_a_pilot_who_holds_a_mission_has_taken_over(bench: Make) -> None:
+    at = bench()
+    at.autopilot.version = PX4_1_17
+
+    def mission(drone: Any) -> None:
+        drone.wait_ready()
+        at.after(3, lambda: setattr(at.craft, "landed_state", 2))
+        at.after(20, lambda: at.autopilot.enter(HOLD))
+        drone.start_mission(within=120)
+
+    with pytest.raises(Overridden, match=r"changed from AUTO\.MISSION to AUTO\.LOITER"):
+        at.fly(mission)
+    assert at.kernel.now() < 40 * S
+
+
+def test_a_version_that_no_rule_covers_is_said_and_flown_by_the_newest(bench: Make) -> None:
+    at = bench()
+    at.autopilot.version = 0x021E00FF
+    at.craft.flags = 1023
+    at.fly(up)
+    (said,) = [text.text for text in at.recorded(Text) if "not covered" in text.text]
+    assert said.startswith("PX4 2.30.0 is not covered by this driver, which knows 1.13 to 1.18")
+
+
+def test_a_turn_of_attitude_states_the_yaw_rate_alone(bench: Make) -> None:
+    at = bench()
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.set_attitude(pitch=-5, lasting=1)
+
+    at.fly(mission)
+    # with all three rates PX4 would take them as a set-point of their own
+    assert {fields["type_mask"] for fields in at.autopilot.sent("SET_ATTITUDE_TARGET")} == {0b011}
 
 
 # -- who is there
