@@ -114,13 +114,17 @@ def command_line() -> str:
     lines = ["# The command line\n"]
 
     def describe(command: Any, path: str) -> None:
-        lines.append(f"\n## {path}\n\n{command.help or ''}\n")
-        options = [one for one in command.params if one.param_type_name == "option" and one.name != "help"]
-        if options:
-            lines.append("| option | meaning |\n|---|---|")
-            for one in options:
-                names = ", ".join([*one.opts, *one.secondary_opts])
+        usage = " ".join(command.collect_usage_pieces(command.context_class(command)))
+        lines.append(f"\n## {path}\n\n`{path} {usage}`\n\n{command.help or ''}\n")
+        for kind in ("argument", "option"):
+            rows = [one for one in command.params if one.param_type_name == kind and one.name != "help"]
+            if rows:
+                lines.append(f"| {kind} | meaning |\n|---|---|")
+            for one in rows:
+                names = one.name if kind == "argument" else ", ".join([*one.opts, *one.secondary_opts])
                 lines.append(f"| `{names}` | {one.help or ''} |")
+            if rows:
+                lines.append("")
         for name, below in getattr(command, "commands", {}).items():
             describe(below, f"{path} {name}")
 

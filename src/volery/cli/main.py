@@ -82,7 +82,7 @@ def main() -> None:
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     atexit.register(gc.freeze)  # at its end Python looks for garbage in all that exists; nothing needs it
-    command = typer.main.get_group(application(next(iter(sys.argv[1:]), "")))
+    command = typer.main.get_command(application(next(iter(sys.argv[1:]), "")))
     defaults: dict[str, Any] = {}
     try:
         defaults = read_defaults(application, Path.cwd())

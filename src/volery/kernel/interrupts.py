@@ -1,7 +1,8 @@
 """Interrupts of virtual time from outside: Ctrl-C, and the watchdog for tasks that freeze it.
 
 While a kernel runs in the main thread it owns SIGINT. Ctrl-C is posted to the hub, which raises it between
-two events; if component code is running, it is also raised there at once, so that an endless loop ends. A
+two events; if component code is running, it is also raised there at once, so that an endless loop ends. At
+the prompt of an interactive session, where nothing of volery executes, it is raised at once as well. A
 second Ctrl-C before the first was delivered is raised immediately. A handler that the user's program has
 installed is called instead. The watchdog uses the same signal, since it also ends blocking system calls.
 """
@@ -59,6 +60,11 @@ def is_component_code(frame: FrameType | None) -> bool:
     return not _is_framework(next(_callers(frame), frame)) if frame is not None else False
 
 
+def is_outside(frame: FrameType | None) -> bool:
+    """Return whether nothing of the framework executes: a script between two calls, a prompt."""
+    return not any(_is_framework(each) for each in _callers(frame))
+
+
 def component_line(frame: FrameType | None) -> str:
     """Return ``file:line`` of the innermost line of component code, else of the framework."""
     found = next((each for each in _callers(frame) if not _is_framework(each)), frame)
@@ -79,6 +85,7 @@ class Interrupts:
     def __init__(self, kernel: Kernel) -> None:
         self._kernel = kernel
         self._before: Any = None
+        self._entered = False
         self._lock = threading.Lock()  # a stall is reported while the handler is installed, or not at all
         self._stall: StallReport | None = None
         self._pending = False
@@ -86,15 +93,19 @@ class Interrupts:
     def __enter__(self) -> Self:
         if threading.current_thread() is threading.main_thread():
             self._before = signal.signal(signal.SIGINT, self._handle)
+            self._entered = True
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        if self._before is not None:
+        if self._entered:
             with self._lock:
-                signal.signal(signal.SIGINT, self._before)
-                self._before = None
+                self._entered = False
+                if (
+                    signal.getsignal(signal.SIGINT) == self._handle
+                ):  # else a later session passes it on to here
+                    signal.signal(signal.SIGINT, self._before)
         if isinstance(error, KeyboardInterrupt):
             self._pending = False  # raised in component code before it was delivered
         self._deliver()
@@ -103,7 +114,7 @@ class Interrupts:
         """Raise a ``ComponentError`` in `task` if it still executes at time `now`; from any thread."""
         main = threading.main_thread().ident
         with self._lock:
-            if self._before is not None and main is not None:
+            if self._entered and main is not None:
                 self._stall = StallReport(task, now, what)
                 signal.pthread_kill(main, signal.SIGINT)  # also ends blocking calls, such as time.sleep
 
@@ -111,7 +122,7 @@ class Interrupts:
         stall, self._stall = self._stall, None
         if stall is not None:
             self._raise_stall(stall, frame)
-        elif self._before is signal.default_int_handler:
+        elif self._entered and self._before is signal.default_int_handler:
             self._interrupt(frame)
         elif callable(self._before):
             self._before(number, frame)
@@ -131,6 +142,8 @@ class Interrupts:
         if self._pending:
             raise KeyboardInterrupt
         task = self._kernel.current()
+        if task is not None and task.adopted and is_outside(frame):
+            raise KeyboardInterrupt
         in_component = task is not None and is_component_code(frame)
         if not (in_component and task is not None and task.adopted):
             self._pending = True

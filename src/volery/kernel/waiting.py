@@ -28,6 +28,7 @@ MAX_PERIODS_LATE = 2
 """A loop that is later than this does not catch up but counts anew, as rospy's ``Rate`` does."""
 
 _NO_TASK = "only a task can wait: call this from a component, or from the thread that has called connect()"
+_CLOSED = "the connection is closed, or the run has ended; connect() again"
 _FRAMEWORK = __name__.partition(".")[0] + "."
 
 
@@ -35,7 +36,7 @@ def current_task(kernel: Kernel) -> Task:
     """Return the running task; raise ``UsageError`` in a framework callback, which must not wait."""
     task = kernel.current()
     if task is None:
-        raise UsageError(_NO_TASK)
+        raise UsageError(_CLOSED if kernel.root.cancelled else _NO_TASK)
     return task
 
 

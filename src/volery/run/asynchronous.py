@@ -16,9 +16,9 @@ from queue import Empty, SimpleQueue
 from typing import Any
 
 from volery.base.errors import UsageError
-from volery.base.time import MS, Ns
+from volery.base.time import MS, Ns, from_seconds
 from volery.kernel.task import Scope, Task
-from volery.kernel.waiting import Signal, current_task
+from volery.kernel.waiting import Signal, current_task, sleep
 from volery.run.connect import connect
 from volery.vehicles import Drone, Vehicle
 
@@ -41,8 +41,8 @@ class AsyncVehicle:
     """A vehicle whose methods are awaited: ``await drone.takeoff(10)``.
 
     It has all methods of ``Drone`` or ``Rover``. State is awaited with ``get``, as in
-    ``await drone.get("position")``; nouns such as ``parameters`` are called through ``run``, as in
-    ``await drone.run(lambda one: one.parameters.all())``.
+    ``await drone.get("position")``, or followed: ``async for position in drone.stream("position")``. Nouns
+    such as ``parameters`` are called through ``run``: ``await drone.run(lambda one: one.parameters.all())``.
 
     Args:
         calls: queue of the thread that executes the calls.
@@ -75,6 +75,23 @@ class AsyncVehicle:
         if not isinstance(getattr(self._kind, name, None), property):
             raise UsageError(f"get({name!r}): {self._kind.__name__} has no such property")
         return await self.run(lambda vehicle: getattr(vehicle, name))
+
+    async def stream(self, name: str, period: float = 0.5) -> AsyncIterator[Any]:
+        """Yield the value of a property every *period* seconds of the vehicle's time, the first at once.
+
+        Args:
+            name: property of the vehicle, such as ``position``.
+            period: time between two values, s; a slower loop gets the latest value.
+
+        Raises:
+            UsageError: there is no such property, or the period is not above 0.
+        """
+        if not period > 0.0:
+            raise UsageError(f"stream({name!r}): a period of {period} s; it must be above 0")
+        yield await self.get(name)
+        while True:
+            await self.run(lambda vehicle: sleep(vehicle.kernel, from_seconds(period)))
+            yield await self.get(name)
 
     async def run(self, function: Callable[[Any], Any]) -> Any:
         """Execute ``function(vehicle)`` and return what it returns."""

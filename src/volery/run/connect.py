@@ -1,11 +1,16 @@
-"""``connect`` and ``connect_fleet``: vehicles for a script or an interactive session."""
+"""``connect`` and ``connect_fleet``: vehicles for a script or an interactive session.
+
+What they return is a session: it ends with its ``with`` block, by ``close()``, or when Python exits.
+"""
 
 from __future__ import annotations
 
+import atexit
+import threading
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import ExitStack, contextmanager
 from logging import getLogger
-from typing import Any, TypeVar, overload
+from typing import TypeVar
 
 from volery.base.errors import UsageError, VoleryError
 from volery.kernel.wall import WallKernel
@@ -21,46 +26,27 @@ LOCATED_WITHIN_S = 90.0
 """Longest wait for a position: a receiver that has just been switched on takes about a minute."""
 
 
-@overload
 def connect(
     url: str,
+    kind: type[V] = Drone,  # type: ignore[assignment] # mypy: a default of a type variable
     *,
     seed: int = 1,
     limits: Limits | None = None,
     fence: Fence | None = None,
     within: float = LOCATED_WITHIN_S,
-) -> AbstractContextManager[Drone]: ...
+) -> V:
+    """Connect to the vehicle at *url* and return it as soon as it knows where it is.
 
+    ```python
+    drone = volery.connect("sim:px4")  # a notebook or a REPL
+    with volery.connect("sim:px4") as drone:  # a script
+        drone.takeoff(10)
+    ```
 
-@overload
-def connect(
-    url: str,
-    kind: type[V],
-    *,
-    seed: int = 1,
-    limits: Limits | None = None,
-    fence: Fence | None = None,
-    within: float = LOCATED_WITHIN_S,
-) -> AbstractContextManager[V]: ...
-
-
-@contextmanager
-def connect(
-    url: str,
-    kind: type[Vehicle] = Drone,
-    *,
-    seed: int = 1,
-    limits: Limits | None = None,
-    fence: Fence | None = None,
-    within: float = LOCATED_WITHIN_S,
-) -> Iterator[Any]:
-    """Connect to the vehicle at *url* and yield it as soon as it knows where it is.
-
-    While a real one does not, the logger ``volery`` says every few seconds what is missing.
-
-    Works in a plain script and in an interactive session. A simulated vehicle (``sim:ardupilot``) lives in
-    virtual time, which passes only while a call blocks. A real vehicle lives in real time. At the end of the
-    context an armed vehicle lands, unless an operator has taken it over.
+    While a real one does not know where it is, the logger ``volery`` says every few seconds what is missing.
+    A simulated vehicle (``sim:ardupilot``) lives in virtual time, which passes only while a call blocks. A
+    real vehicle lives in real time. The connection ends with the ``with`` block, by ``close()``, or when
+    Python exits: then an armed vehicle lands, unless an operator has taken it over.
 
     Args:
         url: Address, such as ``sim:px4`` or ``ardupilot+serial:///dev/ttyUSB0``.
@@ -78,17 +64,19 @@ def connect(
         CapabilityError: The autopilot that answers is of another kind.
     """
     name = parse(url).driver
-    with _opened({name: url}, {name: kind}, VehicleSettings(seed=seed, limits=limits, fence=fence)) as opened:
+    with ExitStack() as opening:
+        settings = VehicleSettings(seed=seed, limits=limits, fence=fence)
+        opened = opening.enter_context(_opened({name: url}, {name: kind}, settings))
         vehicle = opened.vehicles[0]
         assert isinstance(vehicle, kind)
         vehicle.wait_connected()
         vehicle.wait_located(within, _teller(opened))
-        with _ending(vehicle.come_to_rest):
-            yield vehicle
+        opening.enter_context(_ending(vehicle.come_to_rest))
+        vehicle.at_end = _until_exit(opening, opened)
+    return vehicle
 
 
-@contextmanager
-def attach(url: str, kind: type[Vehicle] = Drone, *, seed: int = 1) -> Iterator[Vehicle]:
+def attach(url: str, kind: type[Vehicle] = Drone, *, seed: int = 1) -> Vehicle:
     """Connect to the vehicle at *url* without commanding it: an armed vehicle flies on at the end.
 
     For tools that read or set parameters, plans and logs. It does not wait for a position.
@@ -102,14 +90,15 @@ def attach(url: str, kind: type[Vehicle] = Drone, *, seed: int = 1) -> Iterator[
         VoleryError: As for ``connect``.
     """
     name = parse(url).driver
-    with _opened({name: url}, {name: kind}, VehicleSettings(seed=seed)) as opened:
+    with ExitStack() as opening:
+        opened = opening.enter_context(_opened({name: url}, {name: kind}, VehicleSettings(seed=seed)))
         vehicle = opened.vehicles[0]
         assert isinstance(vehicle, kind)
         vehicle.wait_connected()
-        yield vehicle
+        vehicle.at_end = _until_exit(opening, opened)
+    return vehicle
 
 
-@contextmanager
 def connect_fleet(
     urls: Mapping[str, str],
     kind: type[Vehicle] | Mapping[str, type[Vehicle]] = Drone,
@@ -118,8 +107,8 @@ def connect_fleet(
     limits: Limits | None = None,
     fence: Fence | None = None,
     within: float = LOCATED_WITHIN_S,
-) -> Iterator[Fleet]:
-    """Connect to several vehicles, as ``connect`` does to one, and yield them as a fleet.
+) -> Fleet:
+    """Connect to several vehicles, as ``connect`` does to one, and return them as a fleet.
 
     ```python
     with connect_fleet({"a": "sim:px4", "b": "sim:ardupilot"}) as fleet:
@@ -145,17 +134,43 @@ def connect_fleet(
     if not urls:
         raise UsageError("a fleet needs at least one vehicle; give its name and its address")
     kinds = {name: kind if isinstance(kind, type) else kind.get(name, Drone) for name in urls}
-    with _opened(urls, kinds, VehicleSettings(seed=seed, limits=limits, fence=fence)) as opened:
+    with ExitStack() as opening:
+        settings = VehicleSettings(seed=seed, limits=limits, fence=fence)
+        opened = opening.enter_context(_opened(urls, kinds, settings))
         fleet = Fleet({vehicle.name: vehicle for vehicle in opened.vehicles})
         fleet.each(lambda vehicle: vehicle.wait_connected(), "connect")
         fleet.each(lambda vehicle: vehicle.wait_located(within, _teller(opened)), "know where they are")
-        with _ending(lambda: fleet.each(lambda vehicle: vehicle.come_to_rest(), "come to rest")):
-            yield fleet
+        opening.enter_context(
+            _ending(lambda: fleet.each(lambda vehicle: vehicle.come_to_rest(), "come to rest"))
+        )
+        fleet.at_end = _until_exit(opening, opened)
+    return fleet
 
 
 def _teller(opened: OpenedVehicles) -> Callable[[str], object] | None:
     """Return what reports a wait; None in virtual time, where it takes no time."""
     return getLogger("volery").warning if isinstance(opened.kernel, WallKernel) else None
+
+
+def _until_exit(opening: ExitStack, opened: OpenedVehicles) -> ExitStack:
+    """Return what *opening* has opened, to be ended by a session; by the exit of Python at the latest.
+
+    Virtual time passes in its own thread only, so a simulated vehicle of another thread is left to end with
+    the process.
+    """
+    kept = opening.pop_all()
+    thread = None if isinstance(opened.kernel, WallKernel) else threading.get_ident()
+
+    def end() -> None:
+        if thread in (None, threading.get_ident()):
+            try:
+                kept.close()
+            except VoleryError as error:
+                getLogger("volery").error("at the end of the program: %s", error)
+
+    atexit.register(end)
+    kept.callback(atexit.unregister, end)
+    return kept
 
 
 @contextmanager
@@ -189,6 +204,6 @@ def _opened(
             yield opened
     finally:
         for vehicle in opened.vehicles:
-            vehicle.close()
+            vehicle.disconnect()
         opened.leave()
         kernel.close()

@@ -125,7 +125,7 @@ class _Flight:
         self._ending = Ending(kernel)
         self._ending.vehicles = self._opened.vehicles
         setup, attachments = self._setup(urls, options.seed)
-        self._recording = Recording(setup, options.out, attachments, traced=options.traced)
+        self._recording = Recording(setup, options.folder, attachments, traced=options.traced)
         kernel.record = self._recording.stream
         if options.log is not None:
             self._recording.log_into(options.log)

@@ -188,6 +188,11 @@ class Options:
             raise UsageError(f"no record {self.record!r}; there is {choices((FULL, SUMMARY))}, or no folder")
 
     @property
+    def folder(self) -> Path | None:
+        """The run folder."""
+        return None if self.out is None else Path(self.out)
+
+    @property
     def traced(self) -> bool:
         """Whether the run writes a trace."""
         return self.out is not None and self.record == FULL

@@ -114,7 +114,7 @@ def _supervised(system: System, options: Options) -> Run:
         lambda show: _simulated(system, replace(options, show=show, tell=None)),
         options.show,
         supervision,
-        partial(recover_run, system, options.out, options.seed, options.fidelity),
+        partial(recover_run, system, options.folder, options.seed, options.fidelity),
     )
 
 
@@ -163,7 +163,7 @@ class _Simulation:
             through_bytes=with_faulty_links(environment),
         )
         self._built = self._build(platform)
-        self._recording = Recording(setup, options.out, attachments_of(system), traced=options.traced)
+        self._recording = Recording(setup, options.folder, attachments_of(system), traced=options.traced)
         kernel.record = self._recording.stream
         self._observers = Observers(system.requirements, setup)
         self._recording.stream.tap(self._observers)

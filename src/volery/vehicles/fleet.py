@@ -10,12 +10,13 @@ from volery.kernel.api import Kernel
 from volery.kernel.task import Scope, Task
 from volery.kernel.waiting import Signal, current_task
 from volery.vehicles.drone import Drone
+from volery.vehicles.session import Session
 from volery.vehicles.vehicle import READY_WITHIN_S, Vehicle
 
 R = TypeVar("R")
 
 
-class Fleet(Mapping[str, Vehicle]):
+class Fleet(Mapping[str, Vehicle], Session):
     """Vehicles by name, on one clock, of any kinds and autopilots.
 
     A group operation starts on all vehicles at once and returns when the last one is done. A failure does not
@@ -34,6 +35,7 @@ class Fleet(Mapping[str, Vehicle]):
         if len(kernels) > 1:
             raise UsageError("a fleet whose vehicles are not on one clock; connect them with connect_fleet")
         (self._kernel,) = kernels.values()
+        Session.__init__(self, lambda: None)  # the vehicles of a part belong to the whole fleet
 
     def __getitem__(self, name: str) -> Vehicle:
         if name not in self._vehicles:

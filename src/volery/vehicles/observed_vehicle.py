@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import isnan
 
 from volery.base.errors import CapabilityError, LinkLost, LinkSilent, NotArrived, VehicleError
 from volery.base.position import AboveHome, Position
@@ -60,6 +61,14 @@ class ObservedVehicle:
         self._executor = StepExecutor(kernel, driver, link_timeout)
         self._supported: frozenset[Capability] = frozenset()  # as known once the vehicle was connected
         self._link_loss_query: Handle | None = None
+
+    def __repr__(self) -> str:
+        seen = self._driver.telemetry
+        if seen.last_message_ns < 0:
+            return f"<{type(self).__name__} {self.name}: no message yet>"
+        height = f", {seen.above_home:.1f} m above home" if seen.position is not None else ""
+        left = "" if isnan(seen.battery.remaining) else f", battery {seen.battery.remaining:.0%}"
+        return f"<{type(self).__name__} {self.name}: {describe_state(seen)}{height}{left}>"
 
     # -- state, as last reported by the autopilot
 

@@ -73,6 +73,7 @@ from volery.vehicles.flight_monitor import FlightMonitor
 from volery.vehicles.limits import Fence, Limits
 from volery.vehicles.observed_vehicle import LINK_RETURN_S
 from volery.vehicles.serviced_vehicle import ServicedVehicle
+from volery.vehicles.session import Session
 
 READY_WITHIN_S = 120.0
 MISSION_WITHIN_S = 3600.0
@@ -89,7 +90,7 @@ Truth = Callable[[], Position]
 """The true position (AMSL) of a simulated vehicle: for recorded errors, never for the operations."""
 
 
-class Vehicle(ServicedVehicle, ABC):
+class Vehicle(ServicedVehicle, Session, ABC):
     """A vehicle behind a driver. Use ``Drone`` or ``Rover``.
 
     Limits and fence are checked before anything is sent and at each position report while the vehicle
@@ -119,6 +120,7 @@ class Vehicle(ServicedVehicle, ABC):
         link_timeout: Ns = LINK_TIMEOUT,
     ) -> None:
         super().__init__(kernel, name, driver, link_timeout, limits or Limits(), fence)
+        Session.__init__(self, self.disconnect)
         self.escalation = Escalation()
         self._flight_monitor = FlightMonitor(kernel, driver.telemetry)
         self._truth = truth
@@ -224,7 +226,7 @@ class Vehicle(ServicedVehicle, ABC):
     def come_to_rest(self) -> str:
         """Land or stop the vehicle unless another station has control; return what was done."""
 
-    def close(self) -> None:
+    def disconnect(self) -> None:
         """Stop all communication. The vehicle goes on with its present operation."""
         with self.kernel.guard:
             for handle in (self._link_loss_query, self._monitor):

@@ -327,3 +327,16 @@ def test_doctor_fails_if_something_needed_is_missing(monkeypatch, capsys):
     said = capsys.readouterr().out
     assert "pip install gyro" in said
     assert "missing: gyro" in said
+
+
+def test_a_shell_completes_commands_and_options():
+    script = "import sys; from volery.cli.main import main; sys.argv = ['volery']; main()"
+    words = {"_VOLERY_COMPLETE": "complete_bash", "COMP_WORDS": "volery simul", "COMP_CWORD": "1"}
+    offered = subprocess.run(
+        [sys.executable, "-c", script],
+        env={**os.environ, **words},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert offered.stdout.split() == ["simulate"]

@@ -11,6 +11,7 @@ import pytest
 
 from volery.base.time import MS, S
 from volery.kernel.api import Kernel
+from volery.kernel.interrupts import Interrupts
 from volery.kernel.task import Task
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Event, Queue, sleep
@@ -143,6 +144,15 @@ def test_a_script_that_computes_is_interrupted_at_once_and_once(kernel: Kernel) 
     with kernel.adopt("script"):
         with pytest.raises(KeyboardInterrupt):
             ctrl_c_and_spin()
+        sleep(kernel, MS)
+
+
+def test_a_prompt_between_two_calls_is_interrupted_at_once(kernel: Kernel) -> None:
+    handler = Interrupts(kernel)
+    with kernel.adopt("script"), handler:
+        handler._before = signal.default_int_handler
+        with pytest.raises(KeyboardInterrupt):
+            handler._handle(signal.SIGINT, None)  # as a prompt that waits in a library written in C
         sleep(kernel, MS)
 
 

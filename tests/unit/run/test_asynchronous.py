@@ -29,6 +29,25 @@ def test_a_flight_with_two_calls_side_by_side() -> None:
     assert armed is False
 
 
+def test_state_is_followed_while_a_call_is_under_way() -> None:
+    async def program() -> list[float]:
+        async with connect_async("sim:ardupilot?start=warm") as drone:
+            rising = asyncio.ensure_future(drone.takeoff(5))
+            heights: list[float] = []
+            async for height in drone.stream("altitude", period=0.5):
+                heights.append(height.metres)
+                if rising.done():
+                    break
+            with pytest.raises(UsageError, match="must be above 0"):
+                await anext(drone.stream("altitude", period=0.0))
+            return heights
+
+    heights = asyncio.run(program())
+    assert heights[0] < 0.5
+    assert heights[-1] > 4.0
+    assert len({round(height, 1) for height in heights}) > 2
+
+
 def test_errors_reach_the_caller() -> None:
     async def program() -> None:
         async with connect_async("sim:ardupilot") as drone:

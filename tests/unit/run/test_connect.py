@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -18,13 +21,53 @@ def test_it_knows_where_it_is(autopilot: str) -> None:
 
 def test_what_is_missing_is_named_with_the_remedy() -> None:
     with pytest.raises(NotArrived, match=r"not reported its position \(its GPS .*wait of 0 s"):
-        connect("sim:px4", within=2.0).__enter__()
+        connect("sim:px4", within=2.0)
 
 
 def test_it_can_be_connected_to_without_a_position() -> None:
     with connect("sim:px4", within=0.0) as drone:
         assert drone.kernel.now() < 3e9
         assert drone.telemetry.position is None
+
+
+def test_it_needs_no_block_and_lands_when_it_is_closed() -> None:
+    drone = connect("sim:ardupilot?start=warm")
+    drone.takeoff(5)
+    assert repr(drone).startswith("<Drone ardupilot: at 46.0825")
+    assert "armed, 5." in repr(drone) or "armed, 4." in repr(drone)
+    drone.close()
+    assert not drone.telemetry.armed
+    drone.close()
+    with pytest.raises(UsageError, match="the connection is closed"):
+        drone.takeoff(5)
+
+
+def test_what_is_open_is_closed_when_python_exits() -> None:
+    program = """
+import atexit, volery
+atexit.register(lambda: print("armed at the end:", drone.telemetry.armed, fleet["a"].telemetry.armed))
+drone = volery.connect("sim:ardupilot?start=warm")
+drone.takeoff(5)
+fleet = volery.connect_fleet({"a": "sim:ardupilot?start=warm"})
+fleet.takeoff(5)
+raise SystemExit(f"armed: {drone.armed} {fleet['a'].armed}")
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("armed at the end: False False\n", "armed: True True\n")
+
+
+def test_two_connections_end_in_any_order() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    first, second = connect("sim:px4?start=warm"), connect("sim:px4?start=warm")
+    first.close()
+    second.takeoff(3)
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+    second.close()
+    assert not second.telemetry.armed
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+    signal.signal(signal.SIGINT, before)
 
 
 def test_a_fleet_knows_where_it_is() -> None:

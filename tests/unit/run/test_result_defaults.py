@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from pathlib import Path
 
 import pytest
 
@@ -14,3 +15,8 @@ from volery.run.result import Options
 def test_the_command_line_has_the_default_of_python(name: str) -> None:
     stated = inspect.signature(command.simulate).parameters[name].default
     assert stated == getattr(Options(), name)
+
+
+@pytest.mark.parametrize("folder", ["r1", Path("r1")])
+def test_a_run_folder_is_a_path_or_its_text(folder: Path | str) -> None:
+    assert Options(out=folder).folder == Path("r1")
