@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from math import inf, nan
 from typing import Any
 
 import pytest
 
 from rigs.station import TARGET, Station
 from volery.base.frames import LocalFrame
+from volery.base.time import MS, US
+from volery.links.frame import Frame
+from volery.links.mavlink_messages import message_type
 from volery.simulation.autopilots import ardupilot, px4
+from volery.simulation.autopilots.mavlink.channel import MOST_WAITING_ON_LINK
+from volery.trace.events import LinkState, ignore
 
 COMMANDS = (
     *(16, 17, 18, 19, 20, 21, 22, 34, 84, 85, 92, 94, 112, 115, 176, 177, 178, 179, 181, 182, 183, 184, 185),
@@ -57,9 +63,9 @@ class Bench(Station):
 
     home = LocalFrame(47.3977, 8.5456, 488.0)
 
-    def __init__(self, firmware: Any) -> None:
-        self.firmware = firmware
-        super().__init__()
+    def __init__(self, firmware: Any, kind: str = "copter", record: Any = ignore) -> None:
+        self.firmware, self.record = firmware, record
+        super().__init__(kind)
         self.beat()
         self.run(1.0)
 
@@ -103,3 +109,80 @@ def test_every_message_that_wants_an_answer_has_one(rig: Bench) -> None:
         if answer not in rig.answer(message, asked, 0.3):
             silent.append((message, fields))
     assert silent == []
+
+
+ROUND_US, ROUND_MS = 2**32 * US, 2**32 * MS
+
+
+@pytest.mark.parametrize(
+    ("firmware", "kind"),
+    [
+        (family, kind)
+        for family in (ardupilot.FIRMWARE, px4.FIRMWARE)
+        for kind in ("copter", "rover")
+        if {"copter": "multirotor"}.get(kind, kind) in family.kinds
+    ],
+)
+def test_clocks_of_32_bits_begin_anew(firmware: Any, kind: str) -> None:
+    """All streams go on beyond 71 min 35 s and beyond 49.7 days."""
+    events: list[Any] = []
+    rig = Bench(firmware, kind, events.append)
+    for name in rig.autopilot.endpoint.firmware.telemetry.messages:  # type: ignore[attr-defined]
+        rig.send("COMMAND_LONG", **TARGET, command=511, param1=message_type(name).id, param2=200_000.0)
+    rig.run(1.0)
+    usual = {one.name for one in rig.received}
+    for period, field in ((ROUND_US, "time_usec"), (ROUND_MS, "time_boot_ms")):
+        rig.vehicle.boot_at = rig.kernel.now() - period + 300 * MS
+        rig.run(0.01)
+        rig.received.clear()
+        rig.run(1.2)
+        message = "SERVO_OUTPUT_RAW" if field == "time_usec" else "ATTITUDE"
+        times = [one.fields[field] for one in rig.of(message)]
+        assert max(times) > 2**31 > min(times)
+        assert {"SERVO_OUTPUT_RAW", "ATTITUDE"} <= {one.name for one in rig.received}
+    assert "SERVO_OUTPUT_RAW" in usual
+    assert [one for one in events if isinstance(one, LinkState)] == []
+
+
+def test_what_a_field_does_not_hold_is_left_out_and_the_rest_goes_on(rig: Bench) -> None:
+    dropped: list[LinkState] = []
+    rig.kernel.record = dropped.append
+    rig.command(511, 33, 100_000.0)
+    rig.vehicle.set_home(47.0, 8.0, 1e9)
+    rig.run(3.0)
+    assert [one.state for one in dropped if isinstance(one, LinkState)] == ["dropped", "dropped"]
+    rig.received.clear()
+    rig.run(2.0)
+    assert "HEARTBEAT" in {one.name for one in rig.received}
+    assert "GLOBAL_POSITION_INT" not in {one.name for one in rig.received}
+
+
+@pytest.mark.parametrize("altitude", [-3e6, 3e6, 1e38, nan, inf])
+def test_a_home_position_beyond_all_limits_is_denied(rig: Bench, altitude: float) -> None:
+    before = rig.vehicle.home
+    assert rig.command(179, 0, 0, 0, 0, 47.0, 8.0, altitude) == 2
+    assert rig.command_int(179, frame=0, x=470_000_000, y=80_000_000, z=altitude) == 2
+    assert rig.vehicle.home == before
+
+
+def test_a_flood_of_frames_is_bounded_and_another_client_goes_on(rig: Bench) -> None:
+    dropped: list[LinkState] = []
+    rig.kernel.record = dropped.append
+    flooding = rig.another_link()
+    for _ in range(10_000):
+        flooding.send(Frame("HEARTBEAT", {"type": 6, "autopilot": 8}, 77, 1))
+    rig.send("PING", seq=5, target_system=0, target_component=0)
+    for system in range(1, 250):
+        for _ in range(40):
+            flooding.send(Frame("HEARTBEAT", {"type": 6, "autopilot": 8}, system, 1))
+    handled = 0
+
+    def count(*_: Any) -> None:
+        nonlocal handled
+        handled += 1
+
+    rig.autopilot.endpoint.channels[1].take = count  # type: ignore[attr-defined]
+    rig.run(1.0)
+    assert handled == MOST_WAITING_ON_LINK
+    assert "PING" in {one.name for one in rig.received}
+    assert {one.state for one in dropped if isinstance(one, LinkState)} == {"dropped"}

@@ -15,6 +15,7 @@ from volery.links.in_process_link import in_process_pair
 from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor, Rover
+from volery.trace.events import Record, ignore
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 STATION, STATION_COMPONENT = 255, 190
@@ -42,6 +43,7 @@ class Station:
     home: LocalFrame
     heading: float = 0.0
     looks_per_second = 20  # while it waits
+    record: Record = staticmethod(ignore)  # of the events of the run
 
     def __init__(
         self,
@@ -53,7 +55,7 @@ class Station:
         seed: int = 3,
         **options: Any,
     ) -> None:
-        self.kernel = VirtualKernel()
+        self.kernel = VirtualKernel(self.record)
         body = Multirotor if kind == "copter" else Rover
         spec = body(sensors=sensors, heading_deg=self.heading)
         self.world, (self.flight,) = make_world(self.kernel.now, [spec], seed=seed, frame=self.home)

@@ -407,7 +407,7 @@ class VirtualKernel:
         while True:
             self._current = None
             self._horizon = self._until if pacer is None else NEVER
-            while inbox:
+            for _ in range(len(inbox)):  # what is posted meanwhile waits: it must not delay what is due
                 inbox.popleft()()
             if self.root.cancelled:
                 return

@@ -16,15 +16,15 @@ from functools import partial
 import serial
 
 from volery.base.errors import UsageError
-from volery.base.time import Ns, S
+from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.coded_link import CONNECTION_FAULTS, MAX_UNSENT, ByteStream, CodedLink, StreamLink
 from volery.links.link import Codec, FrameParser
 from volery.links.mavlink_codec import MAVLINK
 
 MAX_CLIENTS = 64
-"""Clients of one server. One more takes the place of the client that has been silent longest; clients that
-have sent a frame are kept before those that have not."""
+"""Clients of one server. One more takes the place of another: of clients that have sent a frame, the one that
+has been silent longest, but first of those that only listen, the one that has connected last."""
 ACCEPT_RETRY: Ns = S
 """Time after which connections are accepted again when the process had no descriptor left."""
 NOTICE_PERIOD: Ns = 10 * S
@@ -34,6 +34,8 @@ _JOIN_S = 5.0
 _READ_SIZE = 65_536
 _CLIENT_READ_SIZE = 4096
 """Bytes of one client that are handled before the other clients have their turn."""
+_READ_PERIOD: Ns = 10 * MS
+"""Time between two such portions of a client that sends faster than they are handled: its socket fills."""
 _NO_ROOM = frozenset((errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM))
 
 
@@ -165,6 +167,7 @@ class _Client:
     stream: _SocketStream
     peer: str
     parser: FrameParser
+    connected_at: Ns
     last_received: Ns
     unsent: bytearray = field(default_factory=bytearray)
 
@@ -178,8 +181,9 @@ class _Client:
             del self.unsent[:taken]
 
     def precedence(self) -> tuple[bool, Ns]:
-        """Return what decides who is kept when there is no room: frames sent, then the latest bytes."""
-        return self.parser.statistics.frames > 0, self.last_received
+        """Return what decides who is kept when there is no room; the least is closed."""
+        sends = self.parser.statistics.frames > 0
+        return sends, self.last_received if sends else -self.connected_at
 
 
 class TcpServer(CodedLink):
@@ -262,7 +266,8 @@ class TcpServer(CodedLink):
         except OSError:  # it has gone already
             connected.close()
             return
-        self._clients[connected] = _Client(stream, peer, self._codec.parser(), self._kernel.now())
+        now = self._kernel.now()
+        self._clients[connected] = _Client(stream, peer, self._codec.parser(), now, now)
         self._record("up", f"{peer} has connected")
         self._watcher.watch(connected)
         if self._on_connect is not None:
@@ -288,13 +293,20 @@ class TcpServer(CodedLink):
         if data == b"":
             self._disconnect(readable, "has disconnected")
             return
-        self._watcher.watch(readable)
+        if data is not None and len(data) == _CLIENT_READ_SIZE:
+            self._kernel.call_at(self._kernel.now() + _READ_PERIOD, partial(self._read_on, readable))
+        else:
+            self._watcher.watch(readable)
         if data is None:
             return
         client.last_received = self._kernel.now()
         for frame in client.parser.feed(data):
             if self._receiver is not None:
                 self._receiver(frame)
+
+    def _read_on(self, readable: socket.socket) -> None:
+        if readable in self._clients:
+            self._watcher.watch(readable)
 
     def _disconnect(self, connected: socket.socket, how: str) -> None:
         client = self._clients.pop(connected)

@@ -36,7 +36,7 @@ class VehicleServer:
         speed: Simulated seconds per second.
         seed: Seed of the simulation.
         signing: File with the key of signed MAVLink; empty for unsigned.
-        notice: Receives a line for the user when a link has no room for a client.
+        notice: Receives a line for the user when a link has no room for a client, or drops what one sends.
 
     Raises:
         UsageError: The address cannot be opened, or the firmware has no links.
@@ -89,7 +89,7 @@ class VehicleServer:
             return listen(self.kernel, address.with_option(LOCAL_PORT, "0"), on_connect=greet, codec=codec)
 
     def _record(self, event: Event) -> None:
-        if isinstance(event, LinkState) and event.state == "full":
+        if isinstance(event, LinkState) and event.state in ("full", "dropped"):
             self._notice(f"{event.link}: {event.detail}")
 
     def _greet(self, place: int) -> None:

@@ -20,6 +20,7 @@ from volery.simulation.autopilots.mavlink.messages import (
     Command,
     Fields,
     Handler,
+    finite,
 )
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.state_groups import NEVER, CameraState
@@ -170,7 +171,7 @@ def on_digicam_configure(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_DIGICAM_CONFIGURE, which is for the components."""
     if vehicle.outputs.camera.kind == COMPONENTS:
         params = (command.param1, command.param2, command.param3, command.param4)
-        _forward(vehicle, DIGICAM_CONFIGURE, *params, command.fifth, command.sixth, command.z)
+        _forward(vehicle, DIGICAM_CONFIGURE, *params, command.fifth, command.sixth, finite(command.z))
     return ACCEPTED
 
 

@@ -323,7 +323,7 @@ def on_reboot(vehicle: Vehicle, command: Command) -> int:
     """Handle PREFLIGHT_REBOOT_SHUTDOWN: 1 and 3 restart after the answer; an armed vehicle needs force."""
     if round(command.param1) not in (1, 3):
         return UNSUPPORTED
-    if vehicle.armed and round(command.y) != 20_190_226:
+    if vehicle.armed and command.y != 20_190_226.0:
         return FAILED
     vehicle.parameters.set("STAT_BOOTCNT", vehicle.parameters["STAT_BOOTCNT"] + 1.0)
     vehicle.output.after_reply(vehicle.restart)

@@ -11,11 +11,12 @@ from collections.abc import Callable
 from math import hypot, inf
 
 from volery.base.frames import Vector
+from volery.base.time import MS
 from volery.simulation.autopilots.ardupilot.fence_points import FENCE, clear_if_emptied
 from volery.simulation.autopilots.ardupilot.fence_shapes import shapes
 from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, NOTICE, Check, change_mode, disarm
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
-from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, to_uint32
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CEILING, CIRCLE, POLYGON, FLOOR = 1, 2, 4, 8
@@ -117,9 +118,9 @@ def fence_status(vehicle: Vehicle) -> Fields | None:
     kinds = {FLOOR: BELOW, CEILING: ABOVE, CIRCLE: BOUNDARY, POLYGON: BOUNDARY}
     return {
         "breach_status": int(bool(fence.breached)),
-        "breach_count": fence.count,
+        "breach_count": fence.count % 65_536,
         "breach_type": next((kind for limit, kind in kinds.items() if limit in fence.breached), NO_BREACH),
-        "breach_time": fence.breached_at // 1_000_000,
+        "breach_time": to_uint32(fence.breached_at // MS),
     }
 
 

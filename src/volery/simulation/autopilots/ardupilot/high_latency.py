@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from math import hypot
 
-from volery.base.time import MS
 from volery.simulation.autopilots.ardupilot import airspeed, sensor_status, telemetry
 from volery.simulation.autopilots.ardupilot.modes import NOTICE
 from volery.simulation.autopilots.mavlink.firmware import Builder
-from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, boot_ms
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CONTROL_HIGH_LATENCY = 2600
@@ -68,7 +67,7 @@ def report(kind: int, system_status: Builder) -> Builder:
         base_mode = telemetry.heartbeat(vehicle, kind, 0)["base_mode"]
         healthy = status["onboard_control_sensors_health"]
         return {
-            "timestamp": vehicle.uptime() // MS,
+            "timestamp": boot_ms(vehicle),
             "type": kind,
             "autopilot": 3,
             "custom_mode": vehicle.mode.number,

@@ -29,7 +29,15 @@ from volery.simulation.autopilots.ardupilot.mount import (
     set_default_mode,
     set_mount_mode,
 )
-from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, Handler, boot_ms
+from volery.simulation.autopilots.mavlink.messages import (
+    ACCEPTED,
+    FAILED,
+    Command,
+    Fields,
+    Handler,
+    boot_ms,
+    finite,
+)
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -73,7 +81,7 @@ def on_mount_control(vehicle: Vehicle, command: Command) -> int:
     """
     if mount_of(vehicle) is None:
         return FAILED
-    mode, pitch, roll, yaw = int(command.z), command.param1, command.param2, command.param3
+    mode, pitch, roll, yaw = int(finite(command.z)), command.param1, command.param2, command.param3
     if mode in (RETRACT, NEUTRAL, BY_PILOT, AT_HOME):
         set_mount_mode(vehicle, mode)
     elif mode == BY_MESSAGE:

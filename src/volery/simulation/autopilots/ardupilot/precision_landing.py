@@ -18,6 +18,7 @@ from volery.simulation.autopilots.ardupilot.modes import CRITICAL, INFO
 from volery.simulation.autopilots.ardupilot.range_finder import range_below
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
+from volery.simulation.autopilots.mavlink.messages import to_uint32
 from volery.simulation.autopilots.onboard_log import LogRow
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -193,6 +194,6 @@ def precision_rows(vehicle: Vehicle) -> tuple[LogRow, ...]:
     north, east = (there - at for there, at in zip(state.place, here[:2], strict=True))
     speed = vehicle.estimate.velocity
     seen = (north, east, -speed[0], -speed[1], north, east, state.down) if state.acquired else (0.0,) * 7
-    at_ms = max(0, (state.measured_at - vehicle.boot_at) // MS)
+    at_ms = to_uint32(max(0, (state.measured_at - vehicle.boot_at) // MS))
     kind = vehicle.parameters["PLND_EST_TYPE"]
     return (("PL", (1.0, float(state.acquired), *seen, float(at_ms), 0.0, kind)),)

@@ -23,6 +23,7 @@ from volery.simulation.autopilots.mavlink.messages import (
     heading_cdeg,
     to_int16,
     to_uint16,
+    to_uint32,
 )
 from volery.simulation.autopilots.onboard_mission import OnboardMission
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -405,7 +406,7 @@ def servo_output(vehicle: Vehicle) -> Fields:
     """Return SERVO_OUTPUT_RAW."""
     first, second, third, fourth = vehicle.estimate.motor_pwm
     return {
-        "time_usec": boot_us(vehicle),
+        "time_usec": to_uint32(boot_us(vehicle)),
         "port": 0,
         "servo1_raw": first,
         "servo2_raw": second,

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from volery.base.errors import UsageError
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.frame import Frame
 from volery.links.link import ByteLink, Link, SelectiveLink
 from volery.links.mavlink_messages import MessageStreams
 from volery.simulation.autopilots.state_groups import NEVER
+from volery.trace.events import LinkState
 
 AUTOPILOT = 1
 """MAV_COMP_ID_AUTOPILOT1."""
@@ -27,6 +29,12 @@ GROUND_STATION = 6
 
 HIGH_LATENCY_STREAMS: Mapping[str, Ns] = {"HIGH_LATENCY2": 5 * S}
 """Periods of the streams that a link of high latency carries without a request, as in ArduPilot."""
+
+MOST_WAITING = 256
+"""Frames of one sender that wait to be handled; what it sends beyond them is dropped."""
+
+MOST_WAITING_ON_LINK = 4096
+"""The same for all senders of a link together."""
 
 Chunks = list[dict[str, Any]]
 
@@ -103,14 +111,19 @@ class StatusTextQueue:
 class MavlinkChannel:
     """A link with its streams.
 
+    What the autopilot cannot send or handle is left out with one line in the trace for each kind: a message
+    with a value that its field does not hold, and frames that come faster than they are handled.
+
     Args:
+        kernel: Clock and trace.
         link: The autopilot's end of the link.
         index: Number of the link among those that are open.
         system: MAVLink system id of the autopilot.
         usual: Periods of the streams that are sent without a request.
     """
 
-    def __init__(self, link: Link, index: int, system: int, usual: Mapping[str, Ns]) -> None:
+    def __init__(self, kernel: Kernel, link: Link, index: int, system: int, usual: Mapping[str, Ns]) -> None:
+        self._kernel = kernel
         self.link = link
         self.index = index
         self._usual = usual
@@ -122,6 +135,9 @@ class MavlinkChannel:
         self.silent: Callable[[], bool] | None = None
         """Whether nothing is sent now: of links of high latency only, which are switched on by a command."""
         self._system = system
+        self._waiting: Counter[tuple[int, int]] = Counter()
+        """Frames that wait to be handled, by their sender."""
+        self._reported: set[str] = set()
         self._selective = link if isinstance(link, SelectiveLink) else None
 
     @property
@@ -139,12 +155,44 @@ class MavlinkChannel:
     def send(self, name: str, fields: dict[str, Any]) -> None:
         """Send a message as the autopilot, while the channel is open."""
         if self._carries():
-            self.link.send(Frame(name, fields, self._system, AUTOPILOT))
+            self._put(Frame(name, fields, self._system, AUTOPILOT))
 
     def pass_on(self, frame: Frame) -> None:
         """Send a message of another system or component, while the channel is open."""
         if self._carries() and self.is_wanted(frame.name):
+            self._put(frame)
+
+    def _put(self, frame: Frame) -> None:
+        try:
             self.link.send(frame)
+        except UsageError as error:
+            self.leave_out(f"{frame.name} is not sent", str(error))
+
+    def leave_out(self, what: str, reason: str) -> None:
+        """Record that something is left out, once for each *what*."""
+        if what not in self._reported:
+            self._reported.add(what)
+            now = self._kernel.now()
+            self._kernel.record(LinkState(now, self.link.name, "dropped", f"{what}: {reason}"))
+
+    def admit(self, frame: Frame) -> bool:
+        """Count a frame that has arrived among those that wait; return False if it is dropped instead."""
+        sender = frame.system, frame.component
+        if self._waiting[sender] >= MOST_WAITING or self._waiting.total() >= MOST_WAITING_ON_LINK:
+            self.leave_out(
+                f"what system {frame.system}, component {frame.component} sends",
+                f"more than {MOST_WAITING} of its messages wait to be handled",
+            )
+            return False
+        self._waiting[sender] += 1
+        return True
+
+    def take(self, frame: Frame) -> None:
+        """Count a frame that waited as handled."""
+        sender = frame.system, frame.component
+        self._waiting[sender] -= 1
+        if not self._waiting[sender]:
+            del self._waiting[sender]
 
     def stream(self) -> None:
         """Start the streams: the usual ones and those that were requested."""

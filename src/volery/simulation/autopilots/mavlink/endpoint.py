@@ -104,7 +104,8 @@ class MavlinkEndpoint:
         vehicle, uses = self._vehicle, self.firmware.telemetry.link_uses
         taken = {channel.index for channel in self.channels}
         index = next(index for index in count() if index not in taken)
-        channel = MavlinkChannel(link, index, vehicle.system, uses[use] if use else next(iter(uses.values())))
+        usual = uses[use] if use else next(iter(uses.values()))
+        channel = MavlinkChannel(self._kernel, link, index, vehicle.system, usual)
         channel.streams = MessageStreams(
             self._kernel,
             self.firmware.telemetry.message_order,
@@ -277,13 +278,25 @@ class MavlinkEndpoint:
     # -- receiving
 
     def _receive(self, channel: MavlinkChannel, frame: Frame) -> None:
-        if not channel.open:
+        if not channel.open or not channel.admit(frame):
             return
         self._arrived.append((channel, frame))
         self._kernel.call_at(self._kernel.now() + self.firmware.commands.answer_delay, self._handle)
 
     def _handle(self) -> None:
         channel, frame = self._arrived.popleft()
+        channel.take(frame)
+        try:
+            self._answer(channel, frame)
+        except (ArithmeticError, ValueError) as error:
+            channel.leave_out(f"{frame.name} has no effect", f"{error} ({frame.fields})")
+        self._handling = False
+        after, self._after = self._after, []
+        for action in after:
+            action()
+
+    def _answer(self, channel: MavlinkChannel, frame: Frame) -> None:
+        """Forward a frame, and let the handler of its message answer it."""
         fields = frame.fields
         channel.streams.resume()
         if self._routes is not None:
@@ -306,10 +319,6 @@ class MavlinkEndpoint:
             handler = self.firmware.commands.handlers.get(frame.name)
             if handler is not None:
                 handler(self._vehicle, fields, frame.system)
-        self._handling = False
-        after, self._after = self._after, []
-        for action in after:
-            action()
 
     def _is_addressed(self, frame: Frame) -> bool:
         fields, strict = frame.fields, self.firmware.commands.wrong_target is not None

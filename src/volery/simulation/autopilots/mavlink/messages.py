@@ -44,13 +44,18 @@ def to_uint16(value: float) -> int:
     return min(65_535, max(0, round(value)))
 
 
+def to_uint32(value: int) -> int:
+    """Return *value* as a counter of 32 bits shows it, which begins anew after 2^32."""
+    return value & 0xFFFF_FFFF
+
+
 def boot_ms(vehicle: Vehicle) -> int:
-    """Return the field ``time_boot_ms``."""
-    return vehicle.uptime() // MS
+    """Return the field ``time_boot_ms``, which begins anew after 49.7 days."""
+    return to_uint32(vehicle.uptime() // MS)
 
 
 def boot_us(vehicle: Vehicle) -> int:
-    """Return the field ``time_usec``, counted from boot."""
+    """Return a field ``time_usec`` of 64 bits, counted from boot."""
     return vehicle.uptime() // US
 
 
@@ -112,7 +117,8 @@ class Command(NamedTuple):
         is_int: Whether it arrived as COMMAND_INT.
         sender: System and component that sent it.
 
-    The others are NaN only for firmwares that read NaN as "not given".
+    A place (x, y, z) that is no number stays NaN, and is refused by what needs one. The other parameters are
+    NaN only for firmwares that read NaN as "not given".
     """
 
     number: int
@@ -130,12 +136,12 @@ class Command(NamedTuple):
     @property
     def fifth(self) -> float:
         """Fifth parameter as it was sent, where it is no latitude; likewise ``sixth``."""
-        return float(round(self.x * 1e7)) if self.is_int else self.x
+        return float(round(self.x * 1e7)) if self.is_int and isfinite(self.x) else finite(self.x)
 
     @property
     def sixth(self) -> float:
         """Sixth parameter as it was sent, where it is no longitude."""
-        return float(round(self.y * 1e7)) if self.is_int else self.y
+        return float(round(self.y * 1e7)) if self.is_int and isfinite(self.y) else finite(self.y)
 
 
 Handler = Callable[[Vehicle, Command], int | None]
@@ -151,9 +157,9 @@ def from_long(fields: dict[str, Any], reads_nan: bool = False) -> Command:
         read(fields["param2"]),
         read(fields["param3"]),
         _number_or_nan(fields["param4"]),
-        read(fields["param5"]),
-        read(fields["param6"]),
-        read(fields["param7"]),
+        _number_or_nan(fields["param5"]),
+        _number_or_nan(fields["param6"]),
+        _number_or_nan(fields["param7"]),
         GLOBAL_RELATIVE,
         is_int=False,
     )
@@ -174,7 +180,7 @@ def from_int(fields: dict[str, Any], reads_nan: bool = False) -> Command:
         _number_or_nan(fields["param4"]),
         x,
         y,
-        read(fields["z"]),
+        _number_or_nan(fields["z"]),
         fields["frame"],
         is_int=True,
     )

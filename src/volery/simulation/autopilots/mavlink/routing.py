@@ -15,6 +15,8 @@ from volery.simulation.autopilots.mavlink.channel import AUTOPILOT, MavlinkChann
 
 NOT_FORWARDED = ("ADSB_VEHICLE", "RADIO", "RADIO_STATUS")
 BROADCAST = 0
+MOST_KNOWN = 20
+"""Senders that are remembered (MAVLINK_MAX_ROUTES of ArduPilot 4.5)."""
 
 Sender = tuple[int, int]
 """System and component."""
@@ -45,7 +47,9 @@ class Routes:
         sender = frame.system, frame.component
         if sender == (self._own, AUTOPILOT):
             return
-        seen_on = self._known.setdefault(sender, [])
+        seen_on = self._known.get(sender, [])
+        if sender not in self._known and len(self._known) < MOST_KNOWN:
+            self._known[sender] = seen_on
         if origin.index not in seen_on:
             seen_on.append(origin.index)
         if origin.index in self._private or frame.name in NOT_FORWARDED:

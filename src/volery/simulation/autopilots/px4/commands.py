@@ -172,6 +172,10 @@ def on_change_speed(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
+HIGHEST_HOME = 1e6
+"""Largest altitude of home that is accepted [m]: heights above it fit into 32 bits as mm."""
+
+
 def on_set_home(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_SET_HOME."""
     if command.param1 == 1.0:
@@ -180,7 +184,7 @@ def on_set_home(vehicle: Vehicle, command: Command) -> int:
         vehicle.set_home_here(by_user=True)
         return ACCEPTED
     given = (command.x, command.y, command.z)
-    if not all_within(given) or abs(command.x) > 90.0 or abs(command.y) > 180.0:
+    if not all_within(given, HIGHEST_HOME) or abs(command.x) > 90.0 or abs(command.y) > 180.0:
         return DENIED
     vehicle.set_home(*given, by_user=True)
     return ACCEPTED

@@ -12,7 +12,7 @@ from collections import deque
 from itertools import islice
 from typing import Any, NamedTuple
 
-from volery.base.time import MS
+from volery.simulation.autopilots.mavlink.messages import boot_ms
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 
@@ -92,7 +92,7 @@ class EventLog:
         self.latest = (self.latest + 1) % 65_536
         fields = {
             "id": event.id,
-            "event_time_boot_ms": self._vehicle.uptime() // MS,
+            "event_time_boot_ms": boot_ms(self._vehicle),
             "sequence": self.latest,
             "log_levels": event.levels,
             "arguments": tuple(arguments),

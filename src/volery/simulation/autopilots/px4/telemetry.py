@@ -19,6 +19,7 @@ from volery.simulation.autopilots.mavlink.messages import (
     heading_cdeg,
     to_int16,
     to_uint16,
+    to_uint32,
 )
 from volery.simulation.autopilots.px4 import modes
 from volery.simulation.autopilots.px4.flight_modes import Orbit
@@ -435,7 +436,7 @@ def estimator_status(vehicle: Vehicle) -> Fields:
 def servo_output(vehicle: Vehicle) -> Fields:
     """Return SERVO_OUTPUT_RAW; 900 us is off."""
     pulses = vehicle.estimate.motor_pwm if vehicle.armed else (900,) * 4
-    fields: Fields = {"time_usec": boot_us(vehicle), "port": 0}
+    fields: Fields = {"time_usec": to_uint32(boot_us(vehicle)), "port": 0}
     for place, pulse in enumerate((*pulses, *([900] * 12)), start=1):
         fields[f"servo{place}_raw"] = pulse
     return fields
