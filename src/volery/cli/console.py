@@ -69,9 +69,9 @@ def _console(*, stderr: bool = False) -> Console:
 
 
 def make_table(*headings: Column | str, title: str | None = None, show_header: bool = True) -> Table:
-    """Return a table in the style of all commands."""
+    """Return a table in the style of all commands. A narrow terminal folds texts and cuts nothing off."""
     return Table(
-        *headings,
+        *(Column(one, overflow="fold") if isinstance(one, str) else one for one in headings),
         title=title,
         title_justify="left",
         title_style="bold",
@@ -81,9 +81,14 @@ def make_table(*headings: Column | str, title: str | None = None, show_header: b
     )
 
 
+def file_size(size: float) -> str:
+    """Return a number of bytes in kB, from a million on in MB."""
+    return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.1f} kB"
+
+
 def number_column(heading: str) -> Column:
     """Return a column whose cells are aligned to the right."""
-    return Column(heading, justify="right")
+    return Column(heading, justify="right", no_wrap=True)
 
 
 @dataclass(frozen=True)

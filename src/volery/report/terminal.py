@@ -84,12 +84,22 @@ def headline(record: RunRecord) -> Text:
     return line
 
 
-def summary_table(record: RunRecord) -> RenderableType:
-    """Return the summary of one run."""
+def summary_table(record: RunRecord, *, notes: bool = False) -> RenderableType:
+    """Return the summary of one run.
+
+    Args:
+        record: The run.
+        notes: List warnings and what was not counted; else one line says how many there are.
+    """
     parts: list[RenderableType] = [headline(record)]
     parts += [GridTable(grid) for grid in all_grids(record)]
-    parts += [Text(f"⚠ {line}", style="yellow") for line in record.warnings]
-    parts += [Text(f"not counted: {line}", style="dim") for line in record.not_counted]
+    if notes:
+        parts += [Text(f"⚠ {line}", style="yellow") for line in record.warnings]
+        parts += [Text(f"not counted: {line}", style="dim") for line in record.not_counted]
+    elif record.warnings or record.not_counted:
+        numbers = f"warnings: {len(record.warnings)}, not counted: {len(record.not_counted)}"
+        line = f"{numbers}; see the report, or `volery report --notes`"
+        parts.append(Text(line, style="yellow" if record.warnings else "dim"))
     return Group(*parts)
 
 

@@ -1,4 +1,6 @@
-"""Run folders: one that stays empty is not left behind, one with a file is."""
+"""Run folders: one that stays empty is not left behind; others are listed, reported and removed."""
+
+import json
 
 import pytest
 from typer.testing import CliRunner
@@ -37,3 +39,24 @@ def test_a_mission_that_cannot_be_loaded_leaves_no_folder(tmp_path, monkeypatch,
     result = CliRunner().invoke(application(), ["fly", "wrong.py", "--on", "sim:ardupilot"])
     assert result.exit_code == 2, result.output
     assert not (tmp_path / "runs").exists()
+
+
+def test_runs_are_listed_with_vehicles_and_size_reported_and_removed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "up.py").write_text("def mission(drone):\n    drone.takeoff(3)\n")
+    volery = CliRunner(env={"COLUMNS": "80"})
+    for autopilot in ("px4", "ardupilot"):
+        flown = volery.invoke(application(), ["fly", "up.py", "--on", f"sim:{autopilot}?start=warm"])
+        assert flown.exit_code == 0, flown.output
+    assert "not counted" not in flown.output
+    listed = json.loads(volery.invoke(application(), ["runs", "--json"]).stdout)
+    assert [(one["folder"], one["vehicles"]) for one in listed] == [("up-1", "px4"), ("up-2", "ardupilot")]
+    assert all(one["bytes"] > 10_000 for one in listed)
+    shown = volery.invoke(application(), ["runs"]).stdout
+    assert "ardupilot" in shown
+    assert "completed" in shown
+    refused = volery.invoke(application(), ["runs", "--remove", "up-3", "--remove", "up-1"])
+    assert refused.exit_code == 2
+    assert (tmp_path / "runs" / "up-1").is_dir()
+    assert volery.invoke(application(), ["runs", "--remove", "up-1"]).exit_code == 0
+    assert [one.name for one in (tmp_path / "runs").iterdir()] == ["up-2"]

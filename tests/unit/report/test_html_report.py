@@ -302,6 +302,9 @@ def test_tables_for_the_terminal(runs: tuple[Path, Path]) -> None:
     text = shown(summary_table(records[1]))
     for words in ("hospital-delivery", "not met", "drone_control", "not counted", "p95 ms", "60× real time"):
         assert words in text
+    first = records[1].not_counted[0].split()[0]
+    assert f"not counted: {first}" in shown(summary_table(records[1], notes=True))
+    assert f"not counted: {first}" not in text
     assert "fast" in shown(comparison_table(records))
     assert "slow" in shown(short_comparison(records), 100)
 

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from volery.cli.command import FAILED, OK, Commands
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import Output, file_size, make_table, number_column
 from volery.cli.options import Allocation, Model, Overrides, Scenario
 
 if TYPE_CHECKING:
@@ -208,6 +208,4 @@ def _seconds(seconds: float | None) -> str:
 
 
 def _size(size: float | None) -> str:
-    if size is None:
-        return NONE
-    return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.1f} kB"
+    return NONE if size is None else file_size(size)

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import os
+import shutil
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.text import Text
 
-from volery.base.errors import UsageError
+from volery.base.errors import UsageError, did_you_mean
 from volery.base.installed import require_extra
 from volery.cli.command import OK, Commands
-from volery.cli.console import Output, make_table, number_column
+from volery.cli.console import Output, file_size, make_table, number_column
 from volery.cli.options import (
     Allocation,
     Fidelity,
@@ -30,6 +32,9 @@ from volery.cli.options import (
     Speed,
     parse_speed,
 )
+
+if TYPE_CHECKING:
+    from volery.requirements.record import RunRecord
 
 model_commands = Commands("Simulate", group="model", summary="Check, draw, analyse and convert models.")
 
@@ -92,9 +97,11 @@ class Listed:
     allocation: str = ""
     scenario: str = ""
     fidelity: str = ""
+    vehicles: str = ""
     outcome: str = ""
     met: bool | None = None
     simulated_s: float | None = None
+    bytes: int = 0
 
 
 @commands.add("json", "debug")
@@ -103,19 +110,41 @@ def runs(
     folder: Annotated[Path, typer.Argument(help="Folder that contains run folders, at any depth.")] = Path(
         "runs"
     ),
+    remove: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RUN", help="Remove this run folder of the list; may be repeated."),
+    ] = None,
 ) -> int:
-    """List run folders with what was run and how it ended, the newest last."""
+    """List run folders with what was run, how it ended and how large they are, the newest last."""
     if not folder.is_dir():
         raise UsageError(f"there is no folder {folder}; `volery simulate` and `volery fly` make ./runs")
     found = sorted(_found(folder), key=lambda one: (one.written, one.folder))
-    listed = make_table("folder", "written", "run", "outcome", "requirements", number_column("time"))
+    if remove:
+        return _remove(output, folder, found, remove)
+    listed = make_table(
+        "folder", "written", "run", "vehicles", "outcome", number_column("time"), number_column("size")
+    )
     for one in found:
         run = " · ".join(filter(None, (one.system, one.allocation, one.scenario, one.fidelity)))
-        met = {None: "-", True: "met", False: "not met"}[one.met]
+        met = {None: "", True: ", met", False: ", not met"}[one.met]
         seconds = "-" if one.simulated_s is None else f"{one.simulated_s:.1f} s"
-        listed.add_row(one.folder, one.written, run or "-", one.outcome, met, seconds)
+        outcome, size = f"{one.outcome}{met}", file_size(one.bytes)
+        listed.add_row(one.folder, one.written[:-3], run or "-", one.vehicles or "-", outcome, seconds, size)
     output.show(listed if found else f"no run folder in {folder}")
     output.give([asdict(one) for one in found])
+    return OK
+
+
+def _remove(output: Output, folder: Path, found: list[Listed], names: list[str]) -> int:
+    known = {one.folder: one for one in found}
+    for name in names:
+        if name not in known:
+            raise UsageError(f"--remove {name}: no run of that name in {folder}{did_you_mean(name, known)}")
+        if any(other.startswith(f"{name}/") for other in known):
+            raise UsageError(f"--remove {name}: it contains other runs; remove these first")
+    for name in names:
+        shutil.rmtree(folder if name == str(folder) else folder / name)
+        output.note(f"removed {name}, {file_size(known[name].bytes)}")
     return OK
 
 
@@ -123,7 +152,8 @@ def _found(folder: Path) -> Iterator[Listed]:
     for name, below, files in os.walk(folder):
         here = Path(name)
         if RUN_FILE in files or TRACE_FILE in files:
-            yield _listed(here, folder)
+            size = sum((here / file).lstat().st_size for file in files)
+            yield replace(_listed(here, folder), bytes=size)
         elif here != folder and not below and not files:
             yield Listed(_name(here, folder), _written(here), outcome=EMPTY)
 
@@ -142,10 +172,15 @@ def _listed(here: Path, folder: Path) -> Listed:
         record.allocation,
         record.scenario,
         record.fidelity,
+        ", ".join(f"{count} {name}" if count > 1 else name for name, count in _autopilots(record).items()),
         record.outcome.status,
         record.outcome.requirements_met,
         record.sim_s,
     )
+
+
+def _autopilots(record: RunRecord) -> Counter[str]:
+    return Counter(one.autopilot for one in record.vehicles.values())
 
 
 def _name(here: Path, folder: Path) -> str:
@@ -218,6 +253,9 @@ def simulate(
 def report(
     output: Output,
     folders: Annotated[list[Path], typer.Argument(help="A run folder; several are compared.")],
+    notes: Annotated[
+        bool, typer.Option("--notes", help="List the warnings of the run and what was not counted.")
+    ] = False,
 ) -> int:
     """Write the report of a run again from its trace, or compare several runs.
 
@@ -230,7 +268,7 @@ def report(
     found = [recover(folder) for folder in folders]
     records = [one.record for one in found]
     if len(records) == 1:
-        output.show(summary_table(records[0]))
+        output.show(summary_table(records[0], notes=notes))
     else:
         output.show(comparison_table(records, [folder.name for folder in folders]))
     as_text = [record.model_dump_json(by_alias=True, indent=2) for record in records]
