@@ -1,9 +1,12 @@
 """Figures of step responses: steps of a set-point are found in a signal, and each response is judged.
 
-A step is a change of the set-point between two stretches in which it stands. Its response ends with the next
-step. Sizes are relative to where the measurement was at the step, because a controller that never reaches its
-set-point would otherwise be judged by the wrong size. A signal without a set-point is judged against the
-level at which it comes to rest.
+A step is a jump of the set-point between two stretches in which it stands; a slower change in one direction
+is a ramp, whose response is judged from the end of the ramp. A response ends with the next change of the
+set-point, or where the vehicle is disarmed or on the ground. What is neither step nor ramp, or was not held
+long enough, is not judged, and stated with the reason: a controller must not be blamed for it. Sizes are
+relative to where the measurement was at the step, because a controller that never reaches its set-point would
+otherwise be judged by the wrong size. A signal without a set-point is judged against the level at which it
+comes to rest.
 
 Definitions follow IEC 60050-351 (rise time 10 % to 90 %, settling time to a band that is not left again).
 """
@@ -26,7 +29,13 @@ Array = NDArray[np.float64]
 BANDS = (0.10, 0.03)
 """Settling bands as shares of the step, those of the thesis."""
 STANDS_S = 1.0
-"""Time for which a level must last to count as one, s."""
+"""Time for which a level must last to count as one, s, and for which a settled error stays in its band."""
+JUMP_S = 0.3
+"""Longest time in which a set-point jumps, s; one that is reported seldom may take two of its reports."""
+GAP_S = 1.0
+"""Time without a sample, s, after which a record goes on elsewhere."""
+HELD_S = 2.0
+"""Time for which a set-point must stand to be judged, s, unless the measurement has settled before."""
 REACTION = 0.05
 """Share of the step at which the delay ends."""
 LEAST_SAMPLES = 5
@@ -34,6 +43,22 @@ CALM = 0.3
 """Share of the settling band within which the error counts as small."""
 HALF_TURN = 170.0 / 360.0
 """Share of a turn from which a step counts as a half turn: either direction is right."""
+
+
+class Idle(NamedTuple):
+    """A stretch of a record, s, in which the vehicle does not fly, and why: ``disarmed`` ..."""
+
+    start: float
+    end: float
+    why: str
+
+
+class NotJudged(NamedTuple):
+    """A change of the set-point that is not judged, s, and why."""
+
+    start: float
+    end: float
+    why: str
 
 
 @dataclass(frozen=True)
@@ -48,6 +73,10 @@ class Signal:
         goal: set-point at the same times; ``None`` if the record has none.
         period: full turn of an angle; ``None`` if it is no angle.
         controller: name of what controlled it, for comparisons.
+        stated: times of the set-point's own records, s; those of the measurement if ``None``.
+        sent: times at which commands for this quantity were sent, s.
+        engaged: whether the record begins when the controller takes over: then its first set-point is a step.
+        idle: stretches in which the vehicle does not fly, in order.
     """
 
     name: str
@@ -57,6 +86,10 @@ class Signal:
     goal: Array | None = None
     period: float | None = None
     controller: str = ""
+    stated: Array | None = None
+    sent: Sequence[float] = ()
+    engaged: bool = True
+    idle: Sequence[Idle] = ()
 
     def between(self, start: float, end: float) -> Signal:
         """Return the part from *start* to *end*, s."""
@@ -86,11 +119,12 @@ def make_signal(
     """
     times, values = _in_order(*measured)
     aims: Array | None = None
+    at: Array | None = None
     if goal is not None and len(goal[0]):
         at, stated = _in_order(*goal)
         index = np.searchsorted(at, times, side="right") - 1
         aims = np.where(index >= 0, stated[np.maximum(index, 0)], np.nan)
-    return Signal(name, unit, times, values, aims, period, controller)
+    return Signal(name, unit, times, values, aims, period, controller, at)
 
 
 def _in_order(times: Array, values: Array) -> tuple[Array, Array]:
@@ -107,8 +141,9 @@ class StepResponse(NamedTuple):
     """The response to one step. Times in s after the step; NaN where there is none.
 
     Attributes:
-        start: time of the step in the record, s.
-        end: time of the next step, or of the end of the record, s.
+        start: time in the record at which the set-point was sent or, where that is not recorded, first
+            stated, s; of a ramp the time at which it ends.
+        end: time of the next change of the set-point, of the landing, or of the end of the record, s.
         origin: measured value at the step.
         goal: set-point after the step; of an angle the one in the direction that was taken.
         delay: time until 5 % of the step.
@@ -122,6 +157,8 @@ class StepResponse(NamedTuple):
         itae: integral of the absolute error times the time, unit s^2.
         pushed: greatest error of a disturbance after settling, in the unit of the signal.
         recovery: time from the beginning of that disturbance until the error stays within 10 % again.
+        ramp: duration of the ramp that the set-point made, s; 0 for a step. A ramp has no delay and no rise.
+        resolution: time by which the set-point may have been sent earlier than ``start``, s.
     """
 
     start: float
@@ -139,6 +176,8 @@ class StepResponse(NamedTuple):
     itae: float
     pushed: float
     recovery: float
+    ramp: float = 0.0
+    resolution: float = 0.0
 
     @property
     def size(self) -> float:
@@ -169,8 +208,20 @@ def default_threshold(signal: Signal) -> float:
     return max(float(np.ptp(known)) / 10.0, 1e-9) if len(known) else 1e-9
 
 
+class Judgement(NamedTuple):
+    """What was found in a signal, in order of time."""
+
+    responses: list[StepResponse]
+    not_judged: list[NotJudged]
+
+
 def step_responses(signal: Signal, least: float | None = None) -> list[StepResponse]:
-    """Return the response to each step of *signal*.
+    """Return the response to each step and ramp of *signal*; see ``judged``."""
+    return judged(signal, least).responses
+
+
+def judged(signal: Signal, least: float | None = None) -> Judgement:
+    """Return the responses in *signal*, and the changes of its set-point that are not judged.
 
     Args:
         signal: the record.
@@ -184,48 +235,165 @@ def step_responses(signal: Signal, least: float | None = None) -> list[StepRespo
     threshold = default_threshold(signal) if least is None else least
     if not threshold > 0.0:
         raise UsageError(f"steps of at least {threshold:g} {signal.unit}; give a size above 0")
-    levels = (
-        _goal_levels(signal, threshold) if signal.goal is not None else _resting_levels(signal, threshold)
-    )
-    found = []
-    for start, end, goal in levels:
-        response = judge(signal.between(start, end), goal)
-        if response is not None and abs(response.size) >= threshold:
-            found.append(response)
+    changes = _goal_changes(signal, threshold) if signal.goal is not None else _movements(signal, threshold)
+    found = Judgement([], [])
+    for one in changes:
+        outcome = _outcome(signal, one, threshold)
+        if isinstance(outcome, StepResponse):
+            found.responses.append(outcome)
+        elif outcome:
+            found.not_judged.append(NotJudged(one.leaves, one.end, outcome))
     return found
 
 
-def _goal_levels(signal: Signal, threshold: float) -> list[tuple[float, float, float]]:
-    """Return start, end and set-point of each step of the set-point.
+class _Change(NamedTuple):
+    """A change of the set-point: when it leaves its level, reaches the next, leaves that, and the level.
 
-    A step begins when the set-point leaves where it stood and ends at the next step, so a ramp counts as one
-    step. Stretches in which the set-point never stands are no steps. The set-point that is there at first is
-    a step from where the measurement is.
+    ``problem`` is why it is neither step nor ramp.
     """
+
+    leaves: float
+    start: float
+    end: float
+    goal: float
+    ramp: float = 0.0
+    resolution: float = 0.0
+    problem: str = ""
+
+
+def _outcome(signal: Signal, change: _Change, threshold: float) -> StepResponse | str:
+    """Return the response to a change, or why it is not judged; empty if it is not worth a word."""
+    end, cut = change.end, ""
+    for idle in signal.idle:
+        if idle.start <= change.start < idle.end:
+            moves = change.problem or abs(_size(signal, change)) >= threshold
+            return f"the vehicle is {idle.why}" if moves else ""
+        if change.start < idle.start < end:
+            end, cut = idle.start, f"the vehicle is {idle.why}"
+    if change.problem:
+        return change.problem
+    begin = change.leaves if change.ramp else change.start
+    response = judge(signal.between(begin, end), change.goal, change.start)
+    if response is None or abs(response.size) < threshold:
+        return ""
+    held = end - change.start
+    if held < HELD_S and not response.settled_10 <= held:
+        if not cut and end < signal.times[-1]:
+            return f"a pulse: it is held for less than {HELD_S:g} s"
+        return f"{cut or 'the record ends'} less than {HELD_S:g} s later"
+    if change.ramp:
+        response = response._replace(delay=np.nan, rise=np.nan)
+    return response._replace(ramp=change.ramp, resolution=change.resolution)
+
+
+def _size(signal: Signal, change: _Change) -> float:
+    """Return the size of a change from where the measurement is when it begins."""
+    begin = change.leaves if change.ramp else change.start
+    origin = float(np.interp(begin, signal.times, _unwrapped(signal.measured, signal.period)))
+    return _nearest_goal(np.array([origin]), change.goal, signal.period) - origin
+
+
+def _goal_changes(signal: Signal, threshold: float) -> list[_Change]:
+    """Return the changes of the set-point from one stretch in which it stands to the next."""
     assert signal.goal is not None
     known = np.isfinite(signal.goal)
     times, goal = signal.times[known], _unwrapped(signal.goal[known], signal.period)
+    if not len(times):
+        return []
     tolerance = threshold / 5.0
     stands = _stretches(_rests(times, goal, tolerance), np.abs(np.diff(goal)) > tolerance)
-    levels = []
-    for number, (begin, end) in enumerate(stands):
-        first = stands[number - 1][1] if number else begin
-        levels.append((float(times[first]), float(times[end - 1]), float(np.median(goal[begin:end]))))
-    return levels
+    reports = signal.stated if signal.stated is not None else times
+    reports = reports[(reports >= times[0]) & (reports <= times[-1])]
+    jump = max(JUMP_S, 2.05 * float(np.median(np.diff(reports)))) if len(reports) > 1 else JUMP_S
+    changes: list[_Change] = []
+    before: int | None = None  # the last sample at which the set-point stood
+    for begin, end in stands:
+        level = float(np.median(goal[begin:end]))
+        last = float(times[end - 1])
+        if before is None:
+            changes += _first_change(signal, float(times[begin]), last, level, begin == 0, threshold)
+        else:
+            change = _change(times[before : begin + 1], goal[before : begin + 1], tolerance, jump)
+            changes.append(change._replace(goal=level, end=change.end if change.problem else last))
+        before = end - 1
+    rest = (before or 0), len(goal) - 1
+    if before is None or rest[1] > before:
+        moved = float(np.ptp(goal[rest[0] : rest[1] + 1]))
+        if moved >= threshold:
+            why = f"it never stands for {STANDS_S:g} s"
+            at = float(times[rest[0]]), float(times[-1])
+            changes.append(_Change(at[0], at[0], at[1], float(goal[-1]), problem=why))
+    return [_dated(signal, one, reports) for one in changes if not _is_small(one, signal, threshold)]
 
 
-def _resting_levels(signal: Signal, threshold: float) -> list[tuple[float, float, float]]:
-    """Return start, end and level of each movement from rest to rest, for a record without set-points."""
+def _is_small(change: _Change, signal: Signal, threshold: float) -> bool:
+    return not change.problem and abs(_size(signal, change)) < threshold
+
+
+def _first_change(
+    signal: Signal, at: float, end: float, level: float, first: bool, threshold: float
+) -> list[_Change]:
+    """Return the step to the first set-point that stands, if there was a moment at which it came."""
+    whole = _Change(at, at, end, level)
+    if abs(_size(signal, whole)) < threshold:
+        return []
+    if not first:
+        why = f"it did not stand for {STANDS_S:g} s before"
+        return [whole._replace(leaves=float(signal.times[0]), problem=why)]
+    if not signal.engaged and at - signal.times[0] <= STANDS_S:
+        return [whole._replace(problem="it is there when the record begins")]
+    return [whole]
+
+
+def _change(times: Array, goal: Array, tolerance: float, jump: float) -> _Change:
+    """Return the change between two samples at which the set-point stands.
+
+    Args:
+        times: times of the samples from the one to the other, s.
+        goal: set-points.
+        tolerance: range within which it stands.
+        jump: longest time of a jump, s.
+    """
+    leaves, reaches = float(times[1]), float(times[-1])
+    found = _Change(leaves, reaches, reaches, float(goal[-1]))
+    if np.max(np.diff(times)) > max(GAP_S, jump):
+        return found._replace(start=leaves, problem="the record has a gap there")
+    moved = np.diff(goal)
+    back = moved[np.sign(moved) != np.sign(goal[-1] - goal[0])]
+    if np.sum(np.abs(back)) > 2.0 * tolerance:
+        return found._replace(start=leaves, problem="it moves to and fro before it stands")
+    if reaches - times[0] <= jump:
+        return found._replace(start=leaves)
+    return found._replace(ramp=reaches - leaves)
+
+
+def _dated(signal: Signal, change: _Change, reports: Array) -> _Change:
+    """Return the change with the time at which it was sent, or else that of its first report."""
+    if change.problem or change.ramp or not len(reports):
+        return change
+    index = int(np.searchsorted(reports, change.start, side="right")) - 1
+    if index < 1:
+        return change
+    report, earlier = float(reports[index]), float(reports[index - 1])
+    sent = next((one for one in signal.sent if earlier < one <= report), None)
+    if sent is not None:
+        return change._replace(start=sent)
+    return change._replace(start=report, resolution=report - earlier)
+
+
+def _movements(signal: Signal, threshold: float) -> list[_Change]:
+    """Return each movement from rest to rest, for a record without set-points."""
     times = signal.times
     values = _unwrapped(signal.measured, signal.period)
-    resting = _rests(times, values, threshold / 5.0)
-    stretches = _stretches(resting)
-    levels = []
+    tolerance = threshold / 5.0
+    stretches = _stretches(_rests(times, values, tolerance), np.abs(np.diff(values)) > tolerance)
+    changes = []
     for (_, left), (begin, end) in pairwise(stretches):
         level = float(np.median(values[begin:end]))
         if abs(level - values[left - 1]) >= threshold:
-            levels.append((float(times[left - 1]), float(times[end - 1]), level))
-    return levels
+            start = float(times[left - 1])
+            changes.append(_Change(start, start, float(times[end - 1]), level))
+    return changes
 
 
 def _rests(times: Array, values: Array, tolerance: float) -> NDArray[np.bool_]:
@@ -250,20 +418,22 @@ def _stretches(flags: NDArray[np.bool_], breaks: NDArray[np.bool_] | None = None
     return [(int(a), int(b)) for a, b in zip(begins, ends, strict=True)]
 
 
-def judge(signal: Signal, goal: float) -> StepResponse | None:
+def judge(signal: Signal, goal: float, start: float) -> StepResponse | None:
     """Return the figures of one response; ``None`` if it has too few samples.
 
     Args:
-        signal: the record from the step to the next one.
+        signal: the record from the step, or from the beginning of a ramp, to the next change.
         goal: set-point after the step.
+        start: time of the step, or of the end of the ramp, s.
     """
-    if len(signal.times) < LEAST_SAMPLES:
+    after = signal.times >= start
+    if np.count_nonzero(after) < LEAST_SAMPLES:
         return None
-    times = signal.times - signal.times[0]
     values = _unwrapped(signal.measured, signal.period)
     origin = float(values[0])
     goal = _nearest_goal(values, goal, signal.period)
     size = goal - origin
+    times, values = signal.times[after] - start, values[after]
     error = goal - values
     if size == 0.0:
         return None
@@ -280,7 +450,7 @@ def judge(signal: Signal, goal: float) -> StepResponse | None:
     mean = float(np.mean(error[quarter])) if quarter.any() else np.nan
     swing = float(np.ptp(error[quarter])) / 2.0 if quarter.any() else np.nan
     return StepResponse(
-        start=float(signal.times[0]),
+        start=start,
         end=float(signal.times[-1]),
         origin=origin,
         goal=goal,
@@ -327,12 +497,27 @@ def _first_time(times: Array, progress: Array, share: float) -> float:
 
 
 def _settling_time(times: Array, error: Array, band: float) -> float:
-    """Return when the error enters *band* for good; NaN if it is outside at the end."""
-    outside = np.flatnonzero(np.abs(error) > band)
-    if not len(outside):
+    """Return when the error enters *band* for good; NaN if it does not.
+
+    It is there for good if it stays for ``STANDS_S`` at least. An oscillation that passes through the band is
+    not settled: after two excursions to different sides, the stay must be longer than those between them.
+    """
+    outside = np.abs(error) > band
+    if not outside.any():
         return float(times[0]) if len(times) else float("nan")
-    last = int(outside[-1])
-    return float(times[last + 1]) if last + 1 < len(times) else float("nan")
+    last = int(np.flatnonzero(outside)[-1])
+    if last + 1 >= len(times):
+        return float("nan")
+    entered = float(times[last + 1])
+    stay = float(times[-1]) - entered
+    excursions = _stretches(outside)
+    between = [
+        float(times[begin] - times[end])
+        for (left, end), (begin, _) in pairwise(excursions)
+        if error[left] * error[begin] < 0.0
+    ]
+    swings = between[1:]  # the first is the way into the band
+    return entered if stay >= STANDS_S and stay > max(swings, default=0.0) else float("nan")
 
 
 def _disturbance(times: Array, error: Array, band: float) -> tuple[float, float, float] | None:
@@ -369,13 +554,15 @@ COLUMNS = (
     ("steady", "steady_error"),
     ("IAE", "iae"),
     ("ITAE", "itae"),
-    ("recovery", "recovery"),
+    ("back", "recovery"),
 )
 """Headings of a table of responses and the figures below them."""
 
 
-def as_record(signal: Signal, responses: Sequence[StepResponse]) -> dict[str, Any]:
-    """Return the responses of a signal as plain data, ``None`` for what is unknown."""
+def as_record(
+    signal: Signal, responses: Sequence[StepResponse], not_judged: Sequence[NotJudged] = ()
+) -> dict[str, Any]:
+    """Return what was found in a signal as plain data, ``None`` for what is unknown."""
 
     def plain(value: float) -> float | None:
         return round(value, 6) if np.isfinite(value) else None
@@ -388,5 +575,8 @@ def as_record(signal: Signal, responses: Sequence[StepResponse]) -> dict[str, An
         "steps": [
             {**{name: plain(value) for name, value in one._asdict().items()}, "size": plain(one.size)}
             for one in responses
+        ],
+        "not_judged": [
+            {"start": plain(one.start), "end": plain(one.end), "why": one.why} for one in not_judged
         ],
     }

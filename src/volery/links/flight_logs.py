@@ -8,7 +8,8 @@ not by their names. The libraries of the autopilots' projects decode DataFlash (
 from __future__ import annotations
 
 import struct
-from collections.abc import Collection, Iterable, Mapping
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from mmap import ACCESS_READ, mmap
@@ -21,8 +22,9 @@ from pymavlink import DFReader
 
 from volery.base.errors import UsageError
 from volery.base.installed import require_extra
+from volery.links.frame import Frame
 from volery.links.mavlink_messages import constant
-from volery.links.tlog import read_tlog
+from volery.links.tlog import LINK_BITS, Entry, has_links, read_tlog
 
 Table = Mapping[str, NDArray[np.float64]]
 Tables = dict[str, Table]
@@ -30,6 +32,8 @@ Tables = dict[str, Table]
 TIME = "time"
 STATION = "station."
 """Prefix of the messages that a ground station sent."""
+VEHICLE = "vehicle"
+"""Beginning of the prefix of the messages of a further vehicle; its system id follows."""
 DATAFLASH, ULOG, TLOG = "DataFlash", "ULog", "tlog"
 ULOG_MAGIC = b"ULog\x01\x12\x35"
 DATAFLASH_HEAD = b"\xa3\x95"
@@ -42,6 +46,7 @@ _ULOG_DATA, _ULOG_DEFINITIONS = b"ACL", b"BFIMPQ"
 _ULOG_LONGEST = 10_000
 """Length above which pyulog takes a message of unknown type for damage and reads on one byte later."""
 _NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
+_AUTOPILOT1 = constant("MAV_COMP_ID_AUTOPILOT1")
 
 
 def log_format(path: Path) -> str:
@@ -68,7 +73,7 @@ def log_format(path: Path) -> str:
     )
 
 
-def read_flight_log(path: Path, wanted: Collection[str] = ()) -> Tables:
+def read_flight_log(path: Path, wanted: Collection[str] = (), also: Collection[str] = ()) -> Tables:
     """Return the tables of a log.
 
     A log that is cut or damaged is read as far as that is possible.
@@ -76,17 +81,23 @@ def read_flight_log(path: Path, wanted: Collection[str] = ()) -> Tables:
     Args:
         path: a tlog, a DataFlash log (binary or text) or a ULog.
         wanted: names of the messages to read; all if empty. Reading few is faster.
+        also: names of messages to read besides, of which the log need not have any.
 
     Raises:
         UsageError: the file cannot be read, or holds no message that is wanted.
     """
     kind = log_format(path)
     read = {DATAFLASH: _dataflash, ULOG: _ulog, TLOG: _tlog}[kind]
-    tables = read(path, set(wanted))
-    if not tables:
+    tables = read(path, {*wanted, *also} if wanted else set())
+    if not tables or (wanted and not any(_plain_name(name) in wanted for name in tables)):
         names = f" among {', '.join(sorted(wanted))}" if wanted else ""
         raise UsageError(f"{path} ({kind}) holds no message{names}; was it cut before its first one?")
     return tables
+
+
+def _plain_name(name: str) -> str:
+    """Return the name of a table without the vehicle and the instance that it is about."""
+    return name.rpartition(".")[2].partition("[")[0] if not name.startswith(STATION) else name
 
 
 class _Rows:
@@ -123,22 +134,54 @@ class _Rows:
 _LONGEST_ARRAY = 8
 
 
+class _Senders:
+    """Names of the senders of a telemetry log; the first autopilot has none.
+
+    None is mixed with another: ``component154.`` is of the same system (a gimbal), ``vehicle2.`` another
+    system with an autopilot, ``station.`` a system without one. Before that stands ``link1.`` for a link of
+    MAVProxy on which fewer messages of the first autopilot came.
+    """
+
+    def __init__(self, entries: Sequence[Entry]) -> None:
+        self._autopilots: dict[int, int] = {}  # component of each system's, in the order of the log
+        for _, frame, _ in entries:
+            if frame.name == "HEARTBEAT" and frame.fields["autopilot"] != _NO_AUTOPILOT:
+                if frame.component == _AUTOPILOT1:
+                    self._autopilots[frame.system] = _AUTOPILOT1
+                else:  # a gimbal may state an autopilot, too
+                    self._autopilots.setdefault(frame.system, frame.component)
+        self._first = next(iter(self._autopilots), 0)
+        links: Counter[int] = Counter()
+        if has_links(entries):
+            links.update(at_us & LINK_BITS for at_us, frame, _ in entries if frame.system == self._first)
+        self._main = max(links, key=lambda link: links[link]) if links else None
+
+    def prefix(self, at_us: int, frame: Frame) -> str:
+        """Return the sender's name with a full stop behind it."""
+        if frame.system not in self._autopilots:
+            return STATION
+        link = at_us & LINK_BITS
+        prefix = "" if self._main in (None, link) else f"link{link}."
+        if frame.system != self._first:
+            prefix += f"{VEHICLE}{frame.system}."
+        if frame.component != self._autopilots[frame.system]:
+            prefix += f"component{frame.component}."
+        return prefix
+
+
 def _tlog(path: Path, wanted: set[str]) -> Tables:
-    """Read the messages of the first autopilot; those of other systems are the ground stations'."""
-    autopilot = 0
-    start = None
-    kept = []
-    for at_us, frame in read_tlog(path):
-        start = at_us if start is None else start
-        if not autopilot and frame.name == "HEARTBEAT" and frame.fields["autopilot"] != _NO_AUTOPILOT:
-            autopilot = frame.system
-        if not wanted or frame.name in wanted or f"{STATION}{frame.name}" in wanted:
-            kept.append((at_us, frame))
-    rows = _Rows((start or 0) / 1e6)
-    for at_us, frame in kept:
-        name = frame.name if frame.system == autopilot else f"{STATION}{frame.name}"
-        if not wanted or name in wanted:
-            rows.add(name, at_us / 1e6, frame.fields)
+    """Read a telemetry log; its tables are named after sender and message."""
+    entries = list(read_tlog(path))
+    senders = _Senders(entries)
+    rows = _Rows(entries[0].at_us / 1e6 if entries else 0.0)
+    for at_us, frame, _ in entries:
+        name = frame.name
+        if wanted and name not in wanted and f"{STATION}{name}" not in wanted:
+            continue
+        prefix = senders.prefix(at_us, frame)
+        other = prefix == f"{VEHICLE}{frame.system}."  # its autopilot's, wanted like the first one's
+        if not wanted or f"{prefix}{name}" in wanted or (other and name in wanted):
+            rows.add(f"{prefix}{name}", at_us / 1e6, frame.fields)
     return rows.tables()
 
 
@@ -220,17 +263,39 @@ def _dataflash(path: Path, wanted: set[str]) -> Tables:
             names = list(wanted) or None
             while (message := reader.recv_match(type=names)) is not None:
                 fields = {key: getattr(message, key) for key in message._fieldnames}
-                time = fields.pop("TimeUS", None)
-                instance = fields.get("I")
-                name = message.get_type()
-                if isinstance(instance, int) and instance > 0 and name not in {"MODE", "EV"}:
-                    name = f"{name}[{instance}]"
+                name, instance, time = message.get_type(), _instance(message), _dataflash_time(fields)
                 if time is not None:
-                    rows.add(name, time / 1e6, fields)
+                    rows.add(f"{name}[{instance}]" if instance else name, time, fields)
         except Exception as error:
             if type(error) is not Exception and not isinstance(error, _DAMAGE):
                 raise  # pymavlink raises bare ones at damage, too; what it read until then counts
     return rows.tables()
+
+
+_STAMPS = {"TimeUS": 1e-6, "T": 1e-3, "TimeMS": 1e-3}
+"""Columns with the time since boot and their units, s: ``TimeMS`` until 2014, but ``T`` in GPS."""
+
+
+def _dataflash_time(fields: dict[str, Any]) -> float | None:
+    """Remove the time from the fields of a message and return it in s; None if it has none."""
+    for column, unit in _STAMPS.items():
+        if isinstance(fields.get(column), int):
+            return float(fields.pop(column)) * unit
+    return None
+
+
+def _instance(message: Any) -> int:
+    """Return the sensor, estimator or motor of several that a message is about; 0 if it names none.
+
+    The log marks the column by the unit ``#`` in FMTU. Where it states no units (until 2018) the column
+    is ``I``; in MODE and EV it is something else.
+    """
+    definition = message.fmt
+    column = definition.instance_field
+    if column is None and definition.units is None and definition.name not in {"MODE", "EV"}:
+        column = "I"
+    value = getattr(message, column) if column in definition.columns else 0
+    return value if isinstance(value, int) else 0
 
 
 def _check_definitions(path: Path) -> None:

@@ -2,14 +2,16 @@
 
 The stamp is a big-endian number of 8 bytes in microseconds. QGroundControl, MAVExplorer and ``mavlogdump.py``
 read such files. The stamp is Unix time where the clock is real; in virtual time it counts from the start of
-the run.
+the run. MAVProxy writes the number of the link into its two lowest bits, and so does this module; other
+ground stations leave microseconds there.
 """
 
 from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,6 +22,8 @@ from volery.links.link import Link, Receiver
 from volery.links.mavlink_codec import STX, STX_V1, MavlinkParser, encode, frame_length
 
 _STAMP = struct.Struct(">Q")
+LINK_BITS = 3
+"""Bits of a stamp in which MAVProxy writes the number of the link."""
 _FRAME_START = re.compile(b"[" + bytes((STX, STX_V1)) + b"]")
 
 
@@ -31,10 +35,12 @@ class TlogTap:
         link: The link to record.
         path: File to write.
         epoch_us: Unix time at the start of the run, in microseconds.
+        number: Number of the link, 0 to 3.
     """
 
-    def __init__(self, kernel: Kernel, link: Link, path: Path, epoch_us: int = 0) -> None:
+    def __init__(self, kernel: Kernel, link: Link, path: Path, epoch_us: int = 0, number: int = 0) -> None:
         self.name = link.name
+        self._number = number
         self._kernel = kernel
         self._link = link
         self._epoch_us = epoch_us
@@ -77,17 +83,19 @@ class TlogTap:
         sequence = self._sequences.get(sender, 0)
         self._sequences[sender] = sequence + 1
         now = self._kernel.now()
-        self._file.write(_STAMP.pack(self._epoch_us + now // US) + encode(frame, sequence))
+        stamp = (self._epoch_us + now // US) & ~LINK_BITS | self._number
+        self._file.write(_STAMP.pack(stamp) + encode(frame, sequence))
         if now - self._flushed >= S:
             self._flushed = now
             self._file.flush()
 
 
 class Entry(NamedTuple):
-    """One frame of a log, with its stamp in microseconds."""
+    """One frame of a log: its stamp in microseconds, and its sequence number."""
 
     at_us: int
     frame: Frame
+    sequence: int
 
 
 def read_tlog(path: Path) -> Iterator[Entry]:
@@ -100,4 +108,21 @@ def read_tlog(path: Path) -> Iterator[Entry]:
         after = start + length if length else start + 1 - _STAMP.size
         frames = MavlinkParser().feed(data[start:after])
         if frames:
-            yield Entry(_STAMP.unpack_from(data, start - _STAMP.size)[0], frames[0])
+            sequence = data[start + (4 if data[start] == STX else 2)]
+            yield Entry(_STAMP.unpack_from(data, start - _STAMP.size)[0], frames[0], sequence)
+
+
+def has_links(entries: Iterable[Entry]) -> bool:
+    """Return whether the two lowest bits of the stamps are numbers of links, as in MAVProxy's logs.
+
+    A sender numbers its frames one by one on each link. If they follow each other within the frames of equal
+    bits, and not in the order of the log, the bits are links; else they are microseconds.
+    """
+    last: dict[tuple[int, ...], int] = {}
+    following: Counter[int] = Counter()
+    for at_us, frame, sequence in entries:
+        sender = frame.system, frame.component
+        for key in (sender, (*sender, at_us & LINK_BITS)):
+            following[len(key)] += last.get(key) == sequence
+            last[key] = (sequence + 1) % 256
+    return following[3] > following[2]

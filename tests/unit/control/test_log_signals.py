@@ -119,3 +119,78 @@ def test_the_poles_of_a_quaternion_are_finite_and_right(pitch: float) -> None:
     roll, found, yaw = euler_degrees(*(np.array([one]) for one in (w, x, y, z)))
     assert found[0] == pytest.approx(pitch, abs=0.1)
     assert (yaw[0] - roll[0] * np.sign(pitch) if abs(pitch) > 80 else yaw[0]) == pytest.approx(30.0, abs=0.1)
+
+
+def test_disarmed_stretches_of_each_format_are_known(tmp_path: Path) -> None:
+    """Armed at 4 s, in the air at 6 s, landed at 9 s and disarmed at 10 s."""
+    att = [(time, 0.0, 0.0) for time in TIMES]
+    events = [(4.0, 10.0), (6.0, 28.0), (9.0, 18.0), (10.0, 11.0)]
+    bin_log = dataflash(tmp_path / "1.bin", {"ATT": ("DesYaw,Yaw", att), "EV": ("Id", events)})
+    poses = [(time, *yaw_quaternion(0.0)) for time in TIMES]
+    states = {
+        "vehicle_attitude": ("float[4] q", poses),
+        "vehicle_status": ("float arming_state", [(0.0, 1.0), (4.0, 2.0), (10.0, 1.0)]),
+        "vehicle_land_detected": ("float landed", [(0.0, 1.0), (6.0, 0.0), (9.0, 1.0)]),
+    }
+    beats = [(0.0, 0), (1.0, 0), (4.0, 128), (10.0, 0)]
+    frames = [(at, Frame("HEARTBEAT", {**BEAT.fields, "base_mode": mode}, 1, 1)) for at, mode in beats]
+    for at, landed in ((0.0, 1), (6.0, 2), (9.0, 1)):
+        frames.append((at, Frame("EXTENDED_SYS_STATE", {"vtol_state": 0, "landed_state": landed}, 1, 1)))
+    frames += [(time, Frame("ATTITUDE", {"time_boot_ms": 1, "yaw": 0.0}, 1, 1)) for time in TIMES]
+    with create_bag(tmp_path / "1.bag") as bag:
+        for time in TIMES:
+            bag.write("/a/mavros/pose", round(time * 1000) * MS, messages.new("geometry_msgs/PoseStamped"))
+        for at, mode in beats:
+            state = messages.new("mavros_msgs/State", armed=mode > 0)
+            bag.write("/a/mavros/state", round(at * 1000) * MS, state)
+        for at, landed in ((0, 1), (6, 2), (9, 1)):
+            bag.write(
+                "/a/mavros/extended_state",
+                at * 1000 * MS,
+                messages.new("mavros_msgs/ExtendedState", landed_state=landed),
+            )
+    logs = [
+        bin_log,
+        ulog(tmp_path / "1.ulg", states),
+        tlog(tmp_path / "1.tlog", sorted(frames, key=lambda one: one[0])),
+        tmp_path / "1.bag",
+    ]
+    for log in logs:
+        (yaw,) = (one for one in read_signals(log) if one.name.endswith("yaw"))
+        assert not yaw.engaged
+        for why, begins, ends in (("disarmed", 10.0, 4.0), ("on the ground", 9.0, 6.0)):
+            (before, after) = (one for one in yaw.idle if one.why == why)
+            assert before.end == pytest.approx(ends), log
+            assert (before.start <= 0.0, after.end) == (True, np.inf)
+            assert after.start == pytest.approx(begins), log
+
+
+def test_a_step_of_a_tlog_is_dated_when_its_command_was_sent(tmp_path: Path) -> None:
+    """The set-point is reported four times a second, the turn commanded at 2.0 s."""
+    frames = [(0.0, BEAT)]
+    turn = {"target_system": 1, "target_component": 1, "command": 115, "confirmation": 0, "param1": 90.0}
+    frames.append((2.0, Frame("COMMAND_LONG", turn, 255, 190)))
+    for time, yaw in zip(TIMES, YAW, strict=True):
+        frames.append((time, Frame("ATTITUDE", {"time_boot_ms": 1, "yaw": radians(yaw)}, 1, 1)))
+    for time in np.arange(0.2, 12.0, 0.25):
+        bearing = 90 if time > 2.0 else 0
+        frames.append((time, Frame("NAV_CONTROLLER_OUTPUT", {"nav_bearing": bearing}, 1, 1)))
+    for command, resolution in ((True, 0.0), (False, 0.25)):
+        sent = [one for one in frames if command or one[1].name != "COMMAND_LONG"]
+        path = tlog(tmp_path / "1.tlog", sorted(sent, key=lambda one: one[0]))
+        (yaw,) = (one for one in read_signals(path) if one.name == "yaw")
+        (turned,) = step_responses(yaw)
+        assert turned.start == pytest.approx(2.0 if command else 2.2, abs=1e-6)
+        assert turned.resolution == pytest.approx(resolution, abs=1e-6)
+
+
+def test_each_vehicle_of_a_tlog_has_its_own_signals(tmp_path: Path) -> None:
+    frames = [(0.0, Frame("HEARTBEAT", BEAT.fields, system, 1)) for system in (1, 2)]
+    for time, yaw in zip(TIMES, YAW, strict=True):
+        for system, value in ((1, 0.0), (2, yaw)):
+            frames.append((time, Frame("ATTITUDE", {"time_boot_ms": 1, "yaw": radians(value)}, system, 1)))
+    signals = {one.name: one for one in read_signals(tlog(tmp_path / "1.tlog", frames))}
+    assert {"yaw", "vehicle2 yaw"} <= set(signals)
+    assert step_responses(signals["yaw"]) == []
+    (turned,) = step_responses(signals["vehicle2 yaw"])
+    assert turned.size == pytest.approx(90.0, abs=1.0)

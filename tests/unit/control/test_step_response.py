@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from volery.base.errors import UsageError
-from volery.control.step_response import Signal, make_signal, step_responses
+from volery.control.step_response import Idle, Signal, judged, make_signal, step_responses
 
 TIMES = np.arange(0.0, 20.0, 0.01)
 
@@ -101,10 +101,15 @@ def test_each_step_has_a_row():
     assert [one.start for one in found] == pytest.approx([5.0, 10.0, 15.0])
 
 
-def test_a_ramped_set_point_is_one_step():
+def test_a_ramp_is_judged_from_its_end_and_is_no_step():
     goal = np.clip(TIMES - 5.0, 0.0, 3.0) * 30.0
-    found = response_of(Signal("yaw", "deg", TIMES, goal, goal, 360.0))
-    assert found.size == pytest.approx(90.0, abs=1.5)  # it begins when the ramp leaves its level
+    late = np.interp(TIMES - 0.2, TIMES, goal)
+    found = response_of(Signal("yaw", "deg", TIMES, late, goal, 360.0))
+    assert (found.start, found.ramp) == pytest.approx((8.0, 3.0), abs=0.1)
+    assert found.size == pytest.approx(90.0, abs=0.5)
+    assert np.isnan([found.delay, found.rise]).all()
+    assert found.overshoot == pytest.approx(0.0, abs=1e-6)
+    assert found.settled_3 == pytest.approx(0.11, abs=0.06)  # 0.2 s late, less 3 % of 90 degrees at 30 deg/s
 
 
 def test_without_set_points_movements_between_rests_are_steps():
@@ -134,3 +139,111 @@ def test_too_few_samples_and_a_wrong_size_are_refused():
         step_responses(Signal("x", "m", TIMES[:2], TIMES[:2]))
     with pytest.raises(UsageError, match="above 0"):
         step_responses(Signal("x", "m", TIMES, TIMES), -1.0)
+
+
+def reasons(signal):
+    """Return why each change of the set-point is not judged, where nothing is."""
+    found = judged(signal)
+    assert found.responses == []
+    return [one.why for one in found.not_judged]
+
+
+def following(goal, lag=0.3, **more):
+    """Return a signal whose measurement follows *goal* as a lag of first order."""
+    values = np.zeros_like(goal)
+    for index in range(1, len(goal)):
+        values[index] = values[index - 1] + (goal[index - 1] - values[index - 1]) * 0.01 / lag
+    return Signal("roll", "deg", TIMES, values, goal, 360.0, **more)
+
+
+def test_an_oscillation_that_passes_through_the_band_is_not_settled():
+    swing = one_step(lambda t: 90.0 + 30.0 * np.sin(1.3 * t) - 90.0 * (t == 0.0), 90.0, "deg")
+    for length in range(900, len(TIMES), 37):  # wherever the record ends
+        found = response_of(Signal("x", "deg", TIMES[:length], swing.measured[:length], swing.goal[:length]))
+        assert np.isnan([found.settled_10, found.settled_3]).all()
+
+
+def test_what_enters_the_band_at_the_end_of_the_record_is_not_settled():
+    assert np.isnan(response_of(one_step(lambda t: np.where(t > 17.5, 1.0, 0.0))).settled_10)
+    assert response_of(one_step(lambda t: np.where(t > 16.5, 1.0, 0.0))).settled_10 == pytest.approx(
+        16.5, abs=0.02
+    )
+
+
+def test_an_oscillation_that_dies_is_settled():
+    found = response_of(one_step(lambda t: 1.0 - np.exp(-0.5 * t) * np.cos(4.0 * t)))
+    assert found.settled_10 == pytest.approx(log(10.0) / 0.5, abs=0.8)
+
+
+@pytest.mark.parametrize("hold", [1.2, 1.9])
+def test_stick_pulses_are_not_judged(hold):
+    goal = np.where((TIMES >= 5.0) & (5.0 + hold > TIMES), -15.0, 0.0)
+    goal = np.where((5.0 + hold <= TIMES) & (5.0 + 2 * hold > TIMES), 15.0, goal)
+    slow = following(goal, lag=1.2)
+    found = judged(slow)
+    assert [one.why for one in found.not_judged] == ["a pulse: it is held for less than 2 s"] * 2
+    assert [round(one.start, 1) for one in found.responses] == [5.0 + 2 * hold]  # back to 0, held
+
+
+def test_a_short_hold_in_which_it_settles_is_judged():
+    goal = np.where((TIMES >= 5.0) & (TIMES < 6.8), 20.0, 0.0)
+    assert [round(one.size) for one in step_responses(following(goal, lag=0.1))] == [20, -20]
+
+
+def test_a_set_point_that_goes_up_and_comes_back_is_not_a_step():
+    goal = np.interp(TIMES, [5.0, 8.0, 13.0], [0.0, 20.0, -6.0])
+    assert reasons(following(goal)) == ["it moves to and fro before it stands"]
+
+
+def test_a_set_point_that_never_stands_is_not_judged():
+    assert reasons(following(15.0 * np.sin(TIMES))) == ["it never stands for 1 s"]
+
+
+def test_disarmed_and_landed_stretches_are_not_judged():
+    goal = np.where(TIMES < 4.0, 0.0, np.where(TIMES < 10.0, 30.0, np.where(TIMES < 15.0, -30.0, 60.0)))
+    idle = (Idle(-np.inf, 6.0, "disarmed"), Idle(15.5, np.inf, "on the ground"))
+    found = judged(following(goal, idle=idle))
+    assert [(round(one.start), round(one.end)) for one in found.responses] == [(10, 15)]
+    assert [one.why for one in found.not_judged] == [
+        "the vehicle is disarmed",
+        "the vehicle is on the ground less than 2 s later",
+    ]
+
+
+def test_a_response_ends_when_the_vehicle_lands():
+    goal = np.where(TIMES < 4.0, 0.0, 30.0)
+    (found,) = step_responses(following(goal, idle=(Idle(12.0, np.inf, "on the ground"),)))
+    assert found.end == pytest.approx(12.0)
+
+
+def test_the_set_point_at_the_beginning_is_a_step_only_where_a_controller_takes_over():
+    goal = np.full_like(TIMES, 30.0)
+    assert [round(one.size) for one in step_responses(following(goal))] == [30]
+    assert reasons(following(goal, engaged=False)) == ["it is there when the record begins"]
+
+
+def test_a_gap_in_the_record_is_no_ramp():
+    keep = (TIMES < 5.0) | (TIMES > 9.0)
+    goal = np.where(TIMES < 7.0, 0.0, 30.0)
+    whole = following(goal)
+    assert reasons(Signal("x", "deg", TIMES[keep], whole.measured[keep], goal[keep], 360.0)) == [
+        "the record has a gap there"
+    ]
+
+
+def test_a_step_is_dated_when_it_was_sent_or_else_by_its_report_with_the_resolution():
+    reports = np.arange(0.1, 20.0, 0.25)
+    value = following(np.where(TIMES >= 5.0, 90.0, 0.0), lag=0.5)
+    aims = np.where(reports >= 5.0, 90.0, 0.0)
+    late = make_signal("yaw", "deg", (TIMES, value.measured), (reports, aims), period=360.0)
+    (found,) = step_responses(late)
+    assert (found.start, found.resolution) == pytest.approx((5.1, 0.25))
+    exact = Signal(**{**vars(late), "sent": [1.0, 5.0, 9.0]})
+    (found,) = step_responses(exact)
+    assert (found.start, found.resolution) == (5.0, 0.0)
+    assert found.settled_10 == pytest.approx(0.5 * log(10.0), abs=0.02)
+
+
+def test_a_jump_without_a_set_point_is_a_step():
+    found = step_responses(Signal("roll", "deg", TIMES, np.where(TIMES < 6.0, 0.0, 10.0), None, 360.0))
+    assert [(round(one.start), round(one.size)) for one in found] == [(6, 10)]

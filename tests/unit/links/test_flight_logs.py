@@ -12,6 +12,7 @@ from rigs.flight_log_files import dataflash, tlog, ulog
 from volery.base.errors import UsageError
 from volery.links.flight_logs import DATAFLASH, TLOG, ULOG, columns_of, log_format, read_flight_log
 from volery.links.frame import Frame
+from volery.links.mavlink_codec import encode
 
 BEAT = Frame("HEARTBEAT", {"type": 2, "autopilot": 3, "custom_mode": 4, "mavlink_version": 3}, 1, 1)
 
@@ -63,6 +64,73 @@ def test_a_tlog_keeps_the_station_apart(station: Path) -> None:
     assert tables["station.COMMAND_LONG"]["param1"].tolist() == [90.0]
     assert "ATTITUDE.yaw" in list(columns_of(tables))
     assert "ATTITUDE.time" not in list(columns_of(tables))
+
+
+def test_a_tlog_keeps_components_and_vehicles_apart(tmp_path: Path) -> None:
+    """A gimbal states an autopilot before the aircraft does; a second aircraft has the same components."""
+    beats = [Frame("HEARTBEAT", {**BEAT.fields}, *sender) for sender in ((1, 154), (1, 1), (2, 1), (2, 154))]
+    frames = [(0.01 * number, beat) for number, beat in enumerate(beats)]
+    for step in range(10):
+        for number, (system, component) in enumerate([(1, 1), (1, 154), (2, 1), (2, 154), (255, 190)]):
+            of = Frame("ATTITUDE", {"time_boot_ms": 1, "pitch": float(number)}, system, component)
+            frames.append((0.1 * step + 0.1, of))
+    path = tlog(tmp_path / "two.tlog", frames)
+    named = ["", "component154.", "vehicle2.", "vehicle2.component154.", "station."]
+    tables = read_flight_log(path)
+    pitches = {name: set(table["pitch"]) for name, table in tables.items() if name.endswith("ATTITUDE")}
+    assert pitches == {f"{prefix}ATTITUDE": {float(number)} for number, prefix in enumerate(named)}
+    assert set(read_flight_log(path, {"ATTITUDE"})) == {"ATTITUDE", "vehicle2.ATTITUDE"}
+
+
+def test_the_links_of_a_tlog_of_mavproxy_are_kept_apart(tmp_path: Path) -> None:
+    records = [(1_000_000 + 20_000 * step, encode(attitude(0.01 * step), step)) for step in range(200)]
+    records.append((1_000_000, encode(BEAT, 199)))
+    both = [(at, 0, data) for at, data in records] + [(at + 1_500_000, 1, data) for at, data in records]
+    path = tmp_path / "two.tlog"
+    stamped = sorted(both, key=lambda one: one[0])
+    path.write_bytes(b"".join(struct.pack(">Q", at & ~3 | link) + data for at, link, data in stamped))
+    tables = read_flight_log(path)
+    assert set(tables) == {"HEARTBEAT", "ATTITUDE", "link1.HEARTBEAT", "link1.ATTITUDE"}
+    assert tables["ATTITUDE"]["yaw"] == pytest.approx(0.01 * np.arange(200))
+    assert tables["link1.ATTITUDE"]["time"][0] == pytest.approx(1.5, abs=1e-4)
+
+
+def test_instances_are_those_that_the_units_of_a_dataflash_log_mark(tmp_path: Path) -> None:
+    """XKF1 has its number in C, BAT in Inst; the I of ISO is no instance, and MODE has none."""
+    columns = {"XKF1": ("QBf", "TimeUS,C,Yaw", "s#d"), "BAT": ("QBf", "TimeUS,Inst,Volt", "s#v")}
+    columns |= {"ISO": ("QBf", "TimeUS,I,X", "s--")}
+    out = _defined(128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
+    out += _defined(129, 44, b"FMTU", b"QBNN", b"TimeUS,FmtType,UnitIds,MultIds")
+    for kind, (name, (form, names, units)) in enumerate(columns.items(), 130):
+        out += _defined(kind, 16, name.encode(), form.encode(), names.encode())
+        out += b"\xa3\x95\x81" + struct.pack("<QB16s16s", 1, kind, units.encode(), b"F--")
+    for step in range(5):
+        for kind in range(130, 133):
+            for number in range(3):
+                out += struct.pack("<2sBQBf", b"\xa3\x95", kind, step, number, 10.0 * number)
+    path = tmp_path / "cores.bin"
+    path.write_bytes(out)
+    tables = read_flight_log(path)
+    for name, column in (("XKF1", "Yaw"), ("BAT", "Volt")):
+        for number, table in enumerate((name, f"{name}[1]", f"{name}[2]")):
+            assert set(tables[table][column]) == {10.0 * number}
+    assert len(tables["ISO"]["X"]) == 15
+    assert "ISO[1]" not in tables
+
+
+def test_a_dataflash_log_of_before_2015_has_its_times_in_milliseconds(tmp_path: Path) -> None:
+    out = _defined(128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
+    out += _defined(129, 11, b"ATT", b"If", b"TimeMS,Roll")
+    out += _defined(130, 15, b"GPS", b"IfI", b"TimeMS,Alt,T")  # its TimeMS is that of the week
+    for step in range(5):
+        out += b"\xa3\x95\x81" + struct.pack("<If", 1000 + 100 * step, step)
+        out += b"\xa3\x95\x82" + struct.pack("<IfI", 345_600_000, step, 1000 + 100 * step)
+    path = tmp_path / "old.bin"
+    path.write_bytes(out)
+    tables = read_flight_log(path)
+    for name, column in (("ATT", "Roll"), ("GPS", "Alt")):
+        assert tables[name]["time"] == pytest.approx(1.0 + 0.1 * np.arange(5))
+        assert tables[name][column].tolist() == [0, 1, 2, 3, 4]
 
 
 def test_a_log_that_was_cut_is_read_up_to_the_cut(copter: Path, px4: Path, station: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.text import Text
 
 from volery.base.errors import UsageError
 from volery.cli.command import OK, Commands
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from volery.control.step_response import Signal, StepResponse
+    from volery.control.step_response import Judgement, Signal, StepResponse
 
 commands = Commands("Fly")
 
@@ -62,7 +63,7 @@ def response(
 ) -> int:
     """Find the steps in records of flights; print rise time, overshoot, settling, steady error and more."""
     from volery.control.log_signals import chosen_signal, read_signals
-    from volery.control.step_response import as_record, step_responses
+    from volery.control.step_response import as_record, judged
     from volery.report.response_figure import check_format, draw_comparison, draw_records
 
     if plot is not None:
@@ -73,19 +74,21 @@ def response(
         raise UsageError("give the record of a flight, or --thesis")
     if goal is not None and measured is None:
         raise UsageError(f"--goal {goal}: state --measured, too")
-    judged = []
+    found: list[tuple[Path, Signal, Judgement]] = []
     for file in files:
         if not file.exists():
             raise UsageError(f"there is no file or folder {file}")
-        found = [chosen_signal(file, measured, goal, unit)] if measured else read_signals(file)
-        for one in _chosen(found, signal or [], file):
-            judged.append((file, one, step_responses(one, step)))
-    shown = [one for one in judged if one[2]] or judged
-    output.show(*_tables(shown, several=len(files) > 1))
-    output.give([{"file": str(file), **as_record(one, responses)} for file, one, responses in judged])
+        read = [chosen_signal(file, measured, goal, unit)] if measured else read_signals(file)
+        found += [(file, one, judged(one, step)) for one in _chosen(read, signal or [], file)]
+    several = len(files) > 1
+    shown = [(file, one, result.responses) for file, one, result in found if result.responses]
+    output.show(*_tables(shown, several=several))
+    output.show(*_not_judged(found, several=several))
+    output.give([{"file": str(file), **as_record(one, *result)} for file, one, result in found])
     if plot is not None:
-        draw = draw_comparison if len(files) > 1 else draw_records
-        draw([(_named(file, one, len(files) > 1), responses) for file, one, responses in shown], plot)
+        draw = draw_comparison if several else draw_records
+        drawn = shown or [(file, one, result.responses) for file, one, result in found]
+        draw([(_named(file, one, several), responses) for file, one, responses in drawn], plot)
         output.note(f"plot: {plot}")
     return OK
 
@@ -106,33 +109,77 @@ def _named(file: Path, signal: Signal, several: bool) -> Signal:
     return replace(signal, controller=file.name) if several and not signal.controller else signal
 
 
+WIDEST_NAME = 8
+"""Characters of a record's name that stand beside its figures; longer ones are numbered, and listed below."""
+
+
 def _tables(
     judged: Sequence[tuple[Path, Signal, Sequence[StepResponse]]], *, several: bool
-) -> list[Table | str]:
-    """Return one table for each quantity, with the responses of all records."""
-    from rich.table import Column
-
+) -> list[Table | Text | str]:
+    """Return one table for each quantity, with the responses of all records, for 80 characters."""
     from volery.control.step_response import COLUMNS
 
-    names = list(dict.fromkeys((one.name, one.unit) for _, one, responses in judged if responses))
-    shown: list[Table | str] = []
+    names = list(dict.fromkeys((one.name, one.unit) for _, one, _ in judged))
+    shown: list[Table | Text | str] = []
+    labels: dict[str, str] = {}
     for name, unit in names:
         same = [row for row in judged if (row[1].name, row[1].unit) == (name, unit)]
         titled = several or any(one.controller for _, one, _ in same)
-        headings = [number_column(title) for title, _ in COLUMNS]
-        columns = (Column("record", min_width=12, overflow="fold"), *headings) if titled else headings
-        rests = all(one.goal is None for _, one, _ in same)
-        what = f"{name} in {unit}" if unit else name
-        title = f"{what}, times in s{', no set-point: steps to where it rests' if rests else ''}"
-        table = make_table(*columns, title=title)
+        known = [
+            (title, field)
+            for title, field in COLUMNS
+            if any(not isnan(getattr(found, field)) for _, _, all_found in same for found in all_found)
+            or field.startswith("settled")
+        ]
+        ramps = any(found.ramp for _, _, all_found in same for found in all_found)
+        headings = [number_column(title) for title, _ in known]
+        if ramps:
+            headings.insert(2, number_column("ramp"))
+        table = make_table(*(["of", *headings] if titled else headings))
         table.padding = (0, 1, 0, 0)
         for file, one, responses in same:
             record = " ".join(filter(None, (file.name if several else "", one.controller)))
+            if len(record) > WIDEST_NAME:
+                record = labels.setdefault(record, str(len(labels) + 1))
             for found in responses:
-                cells = [_cell(found, field) for _, field in COLUMNS]
-                table.add_row(*((record, *cells) if titled else cells))
-        shown.append(table)
+                cells = [_cell(found, field) for _, field in known]
+                if ramps:
+                    cells.insert(2, f"{found.ramp:.1f}" if found.ramp else NOTHING)
+                table.add_row(*((Text(record), *cells) if titled else cells))
+        shown += [_title(name, unit, same), table]
+    shown += [Text(f"{label}: {record}") for record, label in labels.items()]
     return shown or ["no step was found; --step gives the least size of one"]
+
+
+def _title(name: str, unit: str, same: Sequence[tuple[Path, Signal, Sequence[StepResponse]]]) -> Text:
+    """Return what a table is about, and by how much its steps may be dated too late."""
+    about = [f"{name} in {unit}" if unit else name, "times in s"]
+    late = max(found.resolution for _, _, responses in same for found in responses)
+    if late > 0.0:
+        about.append(f"from the set-point's report, up to {late:.2f} s after it was sent")
+    if all(one.goal is None for _, one, _ in same):
+        about.append("no set-point: steps to where it rests")
+    return Text(", ".join(about), "bold")
+
+
+def _not_judged(judged: Sequence[tuple[Path, Signal, Judgement]], *, several: bool) -> list[Text]:
+    """Return a line for each reason for which changes of set-points were not judged."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for file, one, result in judged:
+        record = f"{file.name} {one.name}" if several else one.name
+        for left in result.not_judged:
+            reasons.setdefault((record, left.why), []).append(f"{left.start:.1f}")
+    lines: dict[tuple[str, str], list[str]] = {}
+    for (record, why), times in reasons.items():
+        more = f" and {len(times) - MOST_TIMES} more" if len(times) > MOST_TIMES else ""
+        lines.setdefault((f"{', '.join(times[:MOST_TIMES])} s{more}", why), []).append(record)
+    return [
+        Text(f"not judged: {', '.join(records)} at {times}: {why}") for (times, why), records in lines.items()
+    ]
+
+
+MOST_TIMES = 6
+"""Times of changes that one reason lists."""
 
 
 def _cell(found: StepResponse, field: str) -> str:
@@ -159,7 +206,7 @@ def _thesis(output: Output, out: Path | None, plot: Path | None) -> int:
 
     with run_folder(out, "thesis") as folder:
         flown = fly_thesis_comparison(folder)
-    headings = (number_column(one) for one in ("step", "10 %", "3 %", "over", "steady", "push", "recovery"))
+    headings = (number_column(one) for one in ("step", "10 %", "3 %", "over", "steady", "push", "back"))
     table = make_table(
         "law", *headings, title="yaw in deg, times in s, on a simulated ArduCopter by RC override"
     )
@@ -171,7 +218,7 @@ def _thesis(output: Output, out: Path | None, plot: Path | None) -> int:
     for one in flown:
         for step, found in zip(STEPS, one.responses, strict=True):
             pushed = NOTHING if isnan(found.pushed) else f"{found.pushed:.0f}"
-            over = f"{found.overshoot:.1f} ({_cell(found, 'overshoot')})"
+            over = f"{found.overshoot:.1f} ({found.overshoot_share:.0%})"
             shown = (_cell(found, name) for name in ("settled_10", "settled_3"))
             table.add_row(
                 one.law,

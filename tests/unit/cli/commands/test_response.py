@@ -41,8 +41,13 @@ def test_several_records_are_compared_and_drawn(tmp_path: Path) -> None:
     assert shown.exit_code == 0
     assert "fast.bin" in shown.stdout
     assert "slow.bin" in shown.stdout
+    assert all(heading in shown.stdout for heading in ("delay", "10 %", "steady", "ITAE"))
+    assert max(len(line.rstrip()) for line in shown.stdout.splitlines()) <= 80
+    assert "…" not in shown.stdout
     assert figure.read_bytes().startswith(b"\x89PNG")
-    assert run(fast, "--plot", tmp_path / "one.svg").exit_code == 0
+    named = fast.rename(tmp_path / "a long name of a log.bin")
+    assert "1: a long name of a log.bin" in run(named, slow).stdout
+    assert run(named, "--plot", tmp_path / "one.svg").exit_code == 0
     assert b"<svg" in (tmp_path / "one.svg").read_bytes()
 
 
@@ -65,6 +70,21 @@ def test_bad_input_is_named(tmp_path: Path, arguments: tuple[str, ...], said: st
     assert result.exit_code == 2
     assert said in result.stderr
     assert "Traceback" not in result.stderr
+
+
+def test_what_is_not_judged_is_listed_with_the_reason(tmp_path: Path) -> None:
+    times = np.arange(0.0, 30.0, 0.05)
+    pulse = np.where((times >= 5.0) & (times < 6.2), 15.0, 0.0)
+    lagging = np.interp(times - 1.0, times, np.where(times >= 20.0, 30.0, pulse * 0.2))
+    rows = zip(times, np.where(times >= 20.0, 30.0, pulse), lagging, strict=True)
+    events = [(0.0, 10.0), (19.0, 11.0)]
+    log = dataflash(tmp_path / "a.bin", {"ATT": ("DesYaw,Yaw", rows), "EV": ("Id", events)})
+    shown = " ".join(run(log).stdout.split())
+    assert "not judged: yaw at 5.0 s: a pulse: it is held for less than 2 s" in shown
+    assert "not judged: yaw at 20.0 s: the vehicle is disarmed" in shown
+    (found,) = json.loads(run(log, "--json").stdout)
+    assert found["steps"] == []
+    assert [one["why"] for one in found["not_judged"]][-1] == "the vehicle is disarmed"
 
 
 def test_a_record_without_steps_says_so(tmp_path: Path) -> None:
