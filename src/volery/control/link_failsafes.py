@@ -55,7 +55,7 @@ def _ardupilot(values: Values, channel: int | None) -> list[str]:
     action, options = round(values["FS_GCS_ENABLE"]), round(values["FS_OPTIONS"])
     stated = f"FS_GCS_ENABLE={action}, FS_OPTIONS={options}"
     if action == 0:
-        lost = f"nothing lands it ({stated}); FS_GCS_ENABLE=5 with FS_OPTIONS=0 lands at LAND_SPEED"
+        lost = f"nothing lands it ({stated}); FS_GCS_ENABLE=5 with FS_OPTIONS=0 lands"
     elif options & CONTINUES_FOR_PILOT:
         lost = f"the failsafe leaves it to the transmitter's sticks ({stated}); FS_OPTIONS=0 lets it act"
     elif action == 5:
@@ -71,16 +71,30 @@ def _ardupilot(values: Values, channel: int | None) -> list[str]:
     return lines
 
 
+_MAY_FLY = "a transmitter that sends may fly instead"
+_FLIES = "a transmitter that sends flies instead"
+_PX4_STICKS: Mapping[int, str] = {
+    0: "the sticks of this link are ignored, only a transmitter flies",
+    2: _MAY_FLY,
+    3: _MAY_FLY,
+    4: "the sticks of this link are ignored, as all are",
+    5: _FLIES,
+    6: _MAY_FLY,
+    7: _FLIES,
+    8: _MAY_FLY,
+}
+"""Values of COM_RC_IN_MODE; 5 to 8 since PX4 1.17 (commander_params.c): which source has priority."""
+
+
 def _px4(values: Values, channel: int | None) -> list[str]:
     source = round(values["COM_RC_IN_MODE"])
     lasts, action = values["COM_RC_LOSS_T"], round(values["NAV_RCL_ACT"])
     after = f"{lasts:g} s after the last sticks {_PX4_ACTIONS.get(action, 'its failsafe acts')}"
     line = f"{after} (NAV_RCL_ACT={action})"
     lines = [line if action == 3 else f"{line}; 3 lands where it is"]
-    if source in {0, 2, 3}:
-        lines[0] += (
-            f"; a transmitter that sends may fly instead (COM_RC_IN_MODE={source}; 1 is this link only)"
-        )
+    other = _PX4_STICKS.get(source)
+    if other is not None:
+        lines[0] += f"; {other} (COM_RC_IN_MODE={source}; 1 is this link only)"
     station = round(values["NAV_DLL_ACT"])
     lines.append(
         f"of the ground station's link alone: {_PX4_ACTIONS.get(station, 'its failsafe acts')} "

@@ -38,6 +38,7 @@ _CODES: Mapping[str, str] = {
     "int64_t": "q",
     "float": "f",
     "double": "d",
+    "char": "s",
 }
 
 
@@ -82,6 +83,13 @@ def _crc_extra(name: str, ordered: list[FieldDefinition]) -> int:
 
 
 NEWER_MESSAGES = (
+    MessageDefinition(
+        397,
+        "COMPONENT_METADATA",
+        FieldDefinition("uint32_t", "time_boot_ms"),
+        FieldDefinition("uint32_t", "file_crc"),
+        FieldDefinition("char", "uri", 100),
+    ),
     MessageDefinition(
         410,
         "EVENT",

@@ -133,7 +133,7 @@ class Step:
         fails: returns why the step can no longer be done, which ends it at once; else empty.
         failure: error that is raised then.
         keep: repeated until the step ends.
-        advice: remedy if the step is refused or late.
+        advice: remedy if the step is refused or late, or a function that returns it then.
     """
 
     ask: str
@@ -151,7 +151,7 @@ class Step:
     fails: Callable[[], str] = _never
     failure: type[VehicleError] = NotArrived
     keep: Repeat | None = None
-    advice: str = ""
+    advice: str | Callable[[], str] = ""
 
 
 class ManualControl(NamedTuple):

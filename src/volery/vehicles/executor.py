@@ -535,7 +535,9 @@ class _StepRun:
         return NotArrived(self._driver.name, self._asked, f"{what}{said}{self._advice()}")
 
     def _advice(self) -> str:
-        return f"; {self._step.advice}" if self._step.advice else ""
+        advice = self._step.advice
+        said = advice if isinstance(advice, str) else advice()
+        return f"; {said}" if said else ""
 
 
 def _repeat(kernel: Kernel, period: Ns, action: Action) -> Handle:

@@ -13,6 +13,7 @@ from volery.testing.stage import Stage
 from volery.vehicles import Capability
 
 SAYS_WITHIN_S = 15.0
+READY_FOR_S, READY_AGAIN_WITHIN_S = 5.0, 15.0
 
 
 @check(kind="")
@@ -59,10 +60,15 @@ def _asking(stage: Stage) -> dict[Capability, Callable[[], None]]:
 
 @check(kind="")
 def readiness(stage: Stage) -> str:
-    """Check that wait_ready() returns when the vehicle can arm and navigate: position and home are known."""
+    """Check that wait_ready() returns when the vehicle can arm and navigate, and that this lasts.
+
+    A second call states what would refuse a take-off.
+    """
     stage.drone.wait_ready()
     seen = stage.drone.telemetry
     demand(seen.ready or seen.armed, "it returned although the vehicle is not ready")
+    stage.sleep(READY_FOR_S)
+    stage.drone.wait_ready(within=READY_AGAIN_WITHIN_S)
     here, home = stage.drone.position, stage.drone.home
     north, east, _ = stage.offset(home, here)
     demand(north * north + east * east < 1e8, f"home is {home}, but it stands at {here}")

@@ -95,7 +95,7 @@ def mode_step(
     )
 
 
-def ready_step(within: Ns, advice: str, keep: Repeat | None = None) -> Step:
+def ready_step(within: Ns, advice: str | Callable[[], str], keep: Repeat | None = None) -> Step:
     """Return a step that waits until the vehicle could arm and go to a position."""
     return Step(
         ask="be ready to arm and to go by position",

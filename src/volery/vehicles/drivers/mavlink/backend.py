@@ -179,6 +179,9 @@ class Backend(Protocol):
     def lasting_reasons(self, since: Ns) -> Sequence[str]:
         """Return the arming checks that fail since then and that waiting does not mend."""
 
+    def failing_checks(self) -> Sequence[str]:
+        """Return the arming checks that are known to fail now; where they arrive as texts, nothing."""
+
     def upload(self, items: Sequence[Item]) -> None:
         """Replace the mission; continues an upload in progress."""
 

@@ -479,6 +479,10 @@ class MavlinkClient:
         """Send RUN_PREARM_CHECKS; the reasons arrive as texts."""
         self._command("MAV_CMD_RUN_PREARM_CHECKS")
 
+    def failing_checks(self) -> Sequence[str]:
+        """Return nothing: they arrive as texts, which errors quote."""
+        return ()
+
     def upload(self, items: Sequence[Item]) -> None:
         """Upload a mission; a repeated call starts again only if the autopilot requests no more items."""
         if self._upload is None or not self._upload.alive(self._kernel.now()):

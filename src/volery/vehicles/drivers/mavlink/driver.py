@@ -30,7 +30,7 @@ from volery.vehicles.drivers.steps import (
     send_nothing,
 )
 from volery.vehicles.services import Item
-from volery.vehicles.telemetry import Telemetry
+from volery.vehicles.telemetry import UNFIXED, Telemetry
 
 COMPLETE_FOR: Ns = 2500 * MS
 """Time in which the messages about the end of a mission and the next heartbeat arrive."""
@@ -147,7 +147,6 @@ class MavlinkDriver:
 
     def ready(self, within: Ns) -> Sequence[Step]:
         """Wait until the arming checks pass and there is a position."""
-        advice = "give it a view of the sky, stand it still and level, and look at its arming checks"
         keep = Repeat(ARMING_CHECKS_PERIOD, self._backend.request_arming_checks)
         began: Ns | None = None
 
@@ -162,8 +161,23 @@ class MavlinkDriver:
             reasons = "; ".join(self._backend.lasting_reasons(began))
             return f"arming checks fail that waiting does not mend: {reasons}" if reasons else ""
 
-        step = ready_step(within, advice, keep)
+        step = ready_step(within, self._missing, keep)
         return (replace(step, send=send, fails=never, failure=Refused),)
+
+    def _missing(self) -> str:
+        """Return what it lacks to be ready, by its own telemetry, and what can be done."""
+        seen = self.telemetry
+        if seen.fix in UNFIXED or (not seen.fix and seen.position is None):
+            fix = f"its GPS reports {seen.fix or 'nothing'}, {seen.satellites} satellites"
+            return f"{fix}: give it a view of the sky"
+        if seen.position is None:
+            return "its estimator has no position yet: stand it still and level"
+        if seen.home is None:
+            return "it has not reported its home"
+        if not seen.armable:
+            reasons = "; ".join(self._backend.failing_checks())
+            return f"its arming checks fail: {reasons}" if reasons else "its arming checks fail; look at them"
+        return "its estimator has no valid position: stand it still and level"
 
     def arm(self) -> Sequence[Step]:
         """Arm in the present mode."""

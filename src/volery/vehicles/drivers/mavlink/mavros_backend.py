@@ -281,6 +281,10 @@ class MavrosBackend:
             self._arrived.popleft().run()
         self._decoder.update_flying()
 
+    def failing_checks(self) -> Sequence[str]:
+        """Return nothing: no arming checks pass MAVROS but as texts."""
+        return ()
+
     @property
     def parameters(self) -> Mapping[str, float] | None:
         """Always ``None``: parameters are not read over a graph."""

@@ -15,7 +15,14 @@ from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Lock
 from volery.links.frame import Frame
-from volery.links.mavlink_messages import constant, entry_name, from_bytewise, mission_type, to_bytewise
+from volery.links.mavlink_messages import (
+    constant,
+    entry_name,
+    from_bytewise,
+    message_type,
+    mission_type,
+    to_bytewise,
+)
 from volery.vehicles.drivers.mavlink.file_transfer import FileTransfer
 from volery.vehicles.drivers.mavlink.pending_requests import PendingRequests
 from volery.vehicles.rtcm import correction_parts
@@ -32,6 +39,7 @@ LOG_PART = 90
 _ACCEPTED = constant("MAV_RESULT_ACCEPTED")
 _IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
 _UNSUPPORTED = constant("MAV_RESULT_UNSUPPORTED")
+_REQUEST_MESSAGE = constant("MAV_CMD_REQUEST_MESSAGE")
 _REAL32, _REAL64 = constant("MAV_PARAM_TYPE_REAL32"), constant("MAV_PARAM_TYPE_REAL64")
 
 Send = Callable[..., None]
@@ -184,6 +192,27 @@ class MavlinkServices(PendingRequests):
             so_far=so_far,
         )
         return {found.name: found for _, found in sorted(by_index.items())}
+
+    # -- metadata
+
+    def metadata_uri(self) -> str:
+        """Return the URI of the file that names the vehicle's files of metadata (COMPONENT_METADATA)."""
+        number = float(message_type("COMPONENT_METADATA").id)
+
+        def stated(frame: Frame) -> str | None:
+            fields = frame.fields
+            if frame.name == "COMPONENT_METADATA":
+                return str(fields["uri"])
+            refused = fields["command"] == _REQUEST_MESSAGE if frame.name == "COMMAND_ACK" else False
+            if refused and fields["result"] == _UNSUPPORTED:
+                raise CapabilityError(f"{self._name}: it states no metadata")
+            return None
+
+        return self.ask(
+            "name its metadata",
+            lambda: self._send_to("COMMAND_LONG", command=_REQUEST_MESSAGE, param1=number),
+            stated,
+        )
 
     # -- plans
 

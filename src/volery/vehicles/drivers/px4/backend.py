@@ -11,11 +11,12 @@ from collections.abc import Mapping, Sequence
 from math import nan, radians
 from typing import Any, NamedTuple, Protocol
 
-from volery.base.errors import UsageError
+from volery.base.errors import UsageError, VoleryError
 from volery.base.geoid import EGM96, Geoid
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
+from volery.kernel.task import ExecutionContext
 from volery.links.mavlink_messages import constant
 from volery.ros.graph import Node
 from volery.ros.messages import new, request
@@ -30,7 +31,15 @@ from volery.vehicles.drivers.mavlink.backend import (
 )
 from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
 from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend
+from volery.vehicles.drivers.mavlink.services import MavlinkServices
 from volery.vehicles.drivers.px4.decoder import PX4Decoder
+from volery.vehicles.drivers.px4.events import (
+    LARGEST_FILE,
+    EventTexts,
+    path_of_events,
+    path_on_board,
+    uncompressed,
+)
 from volery.vehicles.drivers.px4.modes import HOLD, LINK_LOSS_PARAMETERS, MODES
 from volery.vehicles.drivers.px4.versions import COVERAGE
 from volery.vehicles.drivers.steps import DRONE_KIND
@@ -122,9 +131,16 @@ class PX4Mavlink(MavlinkClient):
 
     firmware = PX4_FIRMWARE
     _decoder: PX4Decoder
+    _event_texts_read = False
 
     def _make_decoder(self, record: bool) -> PX4Decoder:
-        return PX4Decoder(self._kernel, self.telemetry, record=record, request=self._request_events)
+        return PX4Decoder(
+            self._kernel,
+            self.telemetry,
+            record=record,
+            request=self._request_events,
+            on_unknown=self._read_event_texts,
+        )
 
     def _requested_parameters(self) -> Sequence[str]:
         return LINK_LOSS_PARAMETERS
@@ -142,9 +158,30 @@ class PX4Mavlink(MavlinkClient):
         """Send RUN_PREARM_CHECKS, which reports all failing checks; without it only changes are reported."""
         self._command("MAV_CMD_RUN_PREARM_CHECKS")
 
+    def failing_checks(self) -> Sequence[str]:
+        """Return the arming checks that forbid to arm in the present mode."""
+        return self._decoder.failing_checks()
+
     def lasting_reasons(self, since: Ns) -> Sequence[str]:
         """Return the arming checks that fail and that waiting does not mend."""
         return self._decoder.lasting_reasons()
+
+    def _read_event_texts(self) -> None:
+        """Read the vehicle's own texts of events, once, on the ground: some 16 kB by MAVLink FTP."""
+        if self._event_texts_read or self.telemetry.armed:
+            return
+        self._event_texts_read = True
+        name = f"texts of events of {self.telemetry.name}"
+
+        def read() -> None:
+            try:
+                texts = read_event_texts(self.services)
+            except (VoleryError, ValueError):
+                return  # their numbers are shown
+            with self._kernel:
+                self._decoder.set_event_texts(texts)
+
+        self._kernel.spawn(read, name, ExecutionContext(self.telemetry.name))
 
     def _request_events(self, first: int, last: int) -> None:
         self._send_to("REQUEST_EVENT", first_sequence=first, last_sequence=last)
@@ -194,6 +231,35 @@ class PX4Mavlink(MavlinkClient):
     def rewind_mission(self) -> None:
         """Send MISSION_SET_CURRENT."""
         self._send_to("MISSION_SET_CURRENT", seq=0)
+
+
+def read_event_texts(services: MavlinkServices) -> EventTexts:
+    """Return the texts of events that the vehicle keeps on board.
+
+    Raises:
+        VoleryError: it keeps none, or does not answer.
+        ValueError: what it keeps is no file of events.
+    """
+    general = path_on_board(services.metadata_uri())
+    path = path_of_events(_on_board(services, general)) if general else ""
+    if not path:
+        raise ValueError("the vehicle names no file of events on board")
+    return EventTexts(_on_board(services, path))
+
+
+def _on_board(services: MavlinkServices, path: str) -> bytes:
+    files = services.files
+    size = files.open(path)
+    try:
+        data = b""
+        while len(data) < min(size, LARGEST_FILE):
+            part = files.read(path, len(data))
+            if not part:
+                break
+            data += part
+    finally:
+        files.close()
+    return uncompressed(path, data)
 
 
 class PX4Mavros(MavrosBackend):

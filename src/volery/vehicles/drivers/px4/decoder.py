@@ -1,213 +1,36 @@
-"""Decoder of PX4: mode names, estimator status, and events.
-
-PX4 reports arming checks and state changes as numbered events. The number consists of the component (1, the
-autopilot) in the high byte and the 24 low bits of the FNV-1a hash of the event's name. The meanings stand
-only in the firmware's sources; here are the recorded events of PX4 1.14 and the arming checks that users
-meet. Others are shown as their number.
-"""
+"""Decoder of PX4: mode names, estimator status, events, and a home whose altitude is corrected."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable
 
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.vehicles.drivers.mavlink.decoder import Fields, TelemetryDecoder
-from volery.vehicles.drivers.px4.modes import HOLD, MANUAL_MODES, MODES, mode_name
+from volery.vehicles.drivers.px4.events import (
+    KNOWN_EVENTS,
+    REPORT_ENDS,
+    WARNING,
+    WITHOUT_TEXT,
+    ArmingChecks,
+    EventTexts,
+    event_of,
+)
+from volery.vehicles.drivers.px4.modes import HOLD, mode_name
 from volery.vehicles.drivers.px4.versions import HOME_ALTITUDE_CORRECTED, NO_HORIZONTAL_POSITION
 from volery.vehicles.telemetry import SAME_HOME_UP_M, Telemetry
 
-ALL_MODES = 0xFFFFFFFF
-ERROR, WARNING = 3, 4
-"""Log levels of syslog. An arming check for all modes that is not an error is only a warning."""
 NOT_FOR_PEOPLE = 8
 SEQUENCES = 65_536
 KEPT_EVENTS = 20
 """Number of past events that are requested; those that PX4 keeps no longer are reported as errors."""
 HOME_SMOOTHED_OVER: Ns = 10 * S
 """Time constant of home's altitude, which PX4 1.17 corrects up to four times a second by +-1.5 m of noise."""
+ESTIMATOR_REPORTS_WITHIN: Ns = 3 * S
+"""Time after which a PX4 that was asked for its estimator's status will not send it."""
 EXPLAINS_WITHIN: Ns = S
 """Time after a refusal within which a report of the arming checks is its reason."""
-
-_BASIS, _PRIME = 0x811C9DC5, 0x01000193
-_AUTOPILOT = 1 << 24
-
-
-def event_id(name: str) -> int:
-    """Return the number of the autopilot's event *name*."""
-    value = _BASIS
-    for octet in name.encode():
-        value = (value ^ octet) * _PRIME & 0xFFFFFFFF
-    return value & 0xFFFFFF | _AUTOPILOT
-
-
-class Event(NamedTuple):
-    """An event. Of an arming check, ``modes`` has a bit for the ``state`` of each mode that it forbids."""
-
-    id: int
-    severity: int
-    modes: int
-
-
-REPORT_BEGINS = event_id("commander_arming_check_summary")
-REPORT_ENDS = event_id("commander_health_summary")
-"""Between these two events PX4 sends all failing arming checks, each time one of them changes."""
-
-NO_MANUAL_CONTROL = event_id("check_modes_manual_control")
-
-_CHECK_NAMES: Mapping[str, str] = {
-    "check_modes_cannot_takeoff": "mode not suitable for arming",
-    "check_modes_angular_velocity": "angular velocity not valid",
-    "check_modes_attitude": "no valid attitude estimate",
-    "check_modes_local_pos": "no valid local position estimate",
-    "check_modes_global_pos": "no valid global position estimate",
-    "check_modes_local_alt": "no valid altitude estimate",
-    "check_modes_mission": "no valid mission available",
-    "check_modes_home_position": "home position not set",
-    "check_modes_manual_control": "no manual control input",
-    "check_modes_offboard_signal": "no offboard signal",
-    "check_modes_not_supported": "mode not supported by this vehicle",
-    "check_rc_dl_no_dllink": "no connection to the ground station",
-    "check_estimator_missing_data": "waiting for the estimator",
-    "check_missing_gps": "no GPS",
-    "check_estimator_gps_fix_too_low": "GPS fix too low",
-    "check_estimator_gps_num_sats_too_low": "too few GPS satellites",
-    "check_battery_low": "low battery",
-    "check_battery_critical": "critically low battery",
-    "check_system_usb_connected": "USB connected",
-    "check_gyro_missing": "no gyroscope",
-    "check_accel_missing": "no accelerometer",
-    "check_mag_missing": "no compass",
-    "check_baro_missing": "no barometer",
-}
-CHECKS: Mapping[int, str] = {event_id(name): words for name, words in _CHECK_NAMES.items()}
-"""Arming checks."""
-
-_PASSING = (
-    "estimator",
-    "gps",
-    "_pos",
-    "home",
-    "attitude",
-    "angular",
-    "local_alt",
-    "heading",
-    "offboard",
-    "_mag",
-)
-
-LASTING_CHECKS = frozenset(
-    event_id(name) for name in _CHECK_NAMES if not any(word in name for word in _PASSING)
-)
-"""Arming checks that stay until they are mended: batteries, missions, sticks, missing hardware."""
-
-KNOWN_EVENTS: Mapping[int, str] = {
-    event_id(name): words
-    for name, words in {
-        "commander_armed_by": "armed",
-        "commander_disarmed_by": "disarmed",
-        "commander_takeoff_detected": "take-off detected",
-        "commander_landing_detected": "landing detected",
-        "commander_landing_current_pos": "landing at current position",
-        "commander_rtl": "returning to launch",
-        "commander_modeswitch_not_avail": "this mode is not available now",
-        "commander_rc_lost": "manual control lost",
-        "commander_rc_regained": "manual control regained",
-        "commander_rc_override": "pilot took over using sticks",
-        "failsafe_rc_override": "pilot took over using sticks",
-        "commander_arm_denied_throttle_center": "arming denied: throttle above center",
-        "commander_disarming_denied_not_landed": "disarming denied: not landed",
-        "commander_failsafe_enter": "failsafe activated",
-        "commander_failsafe_enter_generic": "failsafe activated",
-        "commander_failsafe_enter_hold": "failsafe activated, holding first",
-        "mission_takeoff_to": "taking off",
-        "navigator_takeoff_min_alt": "using the minimum take-off altitude",
-        "navigator_takeoff_already_higher": "already higher than the take-off altitude",
-        "navigator_rtl_home_activated": "RTL: activated",
-        "rtl_land_at_home": "RTL: landing at home",
-        "rtl_climb_to": "RTL: climbing",
-        "rtl_return_at": "RTL: returning",
-        "rtl_descend_to": "RTL: descending",
-        "rtl_land_at_destination": "RTL: landing",
-        "mavlink_rcv_sp_target_unsup_coord": "set-point in a frame that PX4 does not take",
-        "mavlink_rcv_sp_target_invalid": "set-point that sets nothing",
-    }.items()
-}
-"""Other events. Most of those that were recorded are also sent as texts."""
-
-WITHOUT_TEXT = frozenset(
-    event_id(name)
-    for name in (
-        "commander_rc_lost",
-        "commander_rc_regained",
-        "failsafe_rc_override",
-        "navigator_takeoff_already_higher",
-    )
-)
-
-
-def event_text(number: int) -> str:
-    """Return the text of an event; its number if the event is not known."""
-    return CHECKS.get(number) or KNOWN_EVENTS.get(number) or f"event {number:#010x}"
-
-
-def event_of(fields: Mapping[str, Any]) -> Event:
-    """Return the event of an EVENT message; the low four bits of ``log_levels`` are its external severity."""
-    arguments: Sequence[int] = fields["arguments"]
-    modes = int.from_bytes(bytes(arguments[:4]), "little")
-    return Event(fields["id"], fields["log_levels"] & 0x0F, modes)
-
-
-class ArmingChecks:
-    """The arming checks that fail now, collected from reports."""
-
-    def __init__(self) -> None:
-        self.reported = False
-        self._failing: tuple[Event, ...] = ()
-        self._report: list[Event] | None = None
-
-    def handle_event(self, event: Event) -> bool:
-        """Process an event; return whether it belongs to a report."""
-        if event.id == REPORT_BEGINS:
-            self._report = []
-            return True
-        if self._report is None:
-            return False
-        if event.id == REPORT_ENDS:
-            self.reported = True
-            self._failing = tuple(self._report)
-            self._report = None
-        elif event.id in KNOWN_EVENTS:
-            return False
-        else:
-            self._report.append(event)
-        return True
-
-    def reasons(self, mode: str) -> list[str]:
-        """Return why the vehicle cannot arm in *mode*.
-
-        A check for all modes that is milder than an error is reported in the same way whether it forbids
-        arming or not: COM_ARM_MIS_REQ's is an information. It is the reason if there is no other.
-        """
-        found = [event for event in self._failing if _forbids(event, mode)]
-        found = found or [event for event in self._failing if event.modes == ALL_MODES]
-        return [event_text(event.id) for event in found]
-
-    def lasting(self, mode: str) -> list[str]:
-        """Return the reasons that waiting does not mend."""
-        staying = [event_text(event.id) for event in self._failing if event.id in LASTING_CHECKS]
-        return [reason for reason in self.reasons(mode) if reason in staying]
-
-
-def _forbids(event: Event, mode: str) -> bool:
-    """Return whether an event forbids arming in *mode*; missing manual control forbids manual modes."""
-    if event.id == NO_MANUAL_CONTROL:
-        return mode in MANUAL_MODES
-    if event.modes == ALL_MODES:
-        return event.severity <= ERROR
-    return bool(event.modes >> MODES[mode].state & 1) if mode in MODES else True
 
 
 class PX4Decoder(TelemetryDecoder):
@@ -227,15 +50,18 @@ class PX4Decoder(TelemetryDecoder):
         *,
         record: bool = True,
         request: Callable[[int, int], None] = lambda first, last: None,
+        on_unknown: Callable[[], None] = lambda: None,
     ) -> None:
         super().__init__(kernel, telemetry, record=record)
         self._checks = ArmingChecks()
         self._request = request  # requests events by their first and last sequence number
+        self._on_unknown = on_unknown  # an event has arrived that has no text
         self._sequence: int | None = None  # of the newest event that was received or requested
         self._past: set[int] = set()  # requested events from before this program has connected
         self._explains_until: Ns = -1
         self._handlers["CURRENT_EVENT_SEQUENCE"] = lambda fields: self._request_missed(fields["sequence"])
         self._estimator_reports = False
+        self._first_ns: Ns = -1  # first time that readiness was judged
         self._home_altitude: float | None = None  # smoothed, m AMSL, while PX4 corrects it
         self._home_altitude_ns: Ns = 0
         self._handlers["ESTIMATOR_STATUS"] = self._estimator_status
@@ -277,9 +103,11 @@ class PX4Decoder(TelemetryDecoder):
         self._telemetry.home = Position(home.latitude, home.longitude, AMSL(altitude))
 
     def _update_ready(self) -> None:
-        """Update ``ready``; without an estimator report, a reported position counts."""
+        """Update ``ready``; where no estimator report comes, a reported position counts."""
+        now = self._kernel.now()
+        self._first_ns = now if self._first_ns < 0 else self._first_ns
         if not self._estimator_reports:
-            self._estimates_position = True
+            self._estimates_position = now - self._first_ns >= ESTIMATOR_REPORTS_WITHIN
         super()._update_ready()
 
     def _estimator_status(self, fields: Fields) -> None:
@@ -290,8 +118,14 @@ class PX4Decoder(TelemetryDecoder):
         """Add a text of the autopilot, without the final tabulator."""
         super().add_text(severity, text.rstrip("\t"))
 
+    def set_event_texts(self, texts: EventTexts) -> None:
+        """Show the vehicle's own texts of events from now on."""
+        self._checks.texts = texts
+
     def _event(self, fields: Fields) -> None:
         event, sequence = event_of(fields), fields["sequence"]
+        if not self._checks.knows(event):
+            self._on_unknown()
         past = sequence in self._past
         self._past.discard(sequence)
         if not past:
@@ -305,7 +139,7 @@ class PX4Decoder(TelemetryDecoder):
             return
         unknown = event.id not in KNOWN_EVENTS and event.severity <= WARNING
         if event.id in WITHOUT_TEXT or unknown:
-            self.add_text(event.severity, event_text(event.id))
+            self.add_text(event.severity, self._checks.text(event))
 
     def _request_missed(self, sequence: int) -> None:
         """Request the events up to *sequence* that were missed; at first those that PX4 still keeps.
@@ -331,6 +165,10 @@ class PX4Decoder(TelemetryDecoder):
         for reason in reasons:
             self.add_text(WARNING, f"Arming check: {reason}")
         return bool(reasons)
+
+    def failing_checks(self) -> list[str]:
+        """Return the arming checks that forbid to arm in the present mode."""
+        return self._checks.reasons(self._telemetry.mode)
 
     def lasting_reasons(self) -> list[str]:
         """Return the arming checks that fail in the present mode and that waiting does not mend."""

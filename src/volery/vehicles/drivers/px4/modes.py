@@ -32,6 +32,7 @@ MODES: Mapping[str, Mode] = {
     ALTCTL: Mode(2, 0, 1),
     POSCTL: Mode(3, 0, 2),
     "POSCTL.ORBIT": Mode(3, 1, 21),
+    "POSCTL.SLOW": Mode(3, 2, 6),  # since 1.15
     "AUTO.READY": Mode(4, 1, 4),
     TAKEOFF: Mode(4, 2, 17),
     HOLD: Mode(4, 3, 4),
@@ -41,14 +42,22 @@ MODES: Mapping[str, Mode] = {
     "AUTO.FOLLOW_TARGET": Mode(4, 8, 19),
     "AUTO.PRECLAND": Mode(4, 9, 20),
     "AUTO.VTOL_TAKEOFF": Mode(4, 10, 22),
+    **{f"AUTO.EXTERNAL{number}": Mode(4, 10 + number, 22 + number) for number in range(1, 9)},  # since 1.15
     ACRO: Mode(5, 0, 10),
     OFFBOARD: Mode(6, 0, 14),
     STABILIZED: Mode(7, 0, 15),
     "RATTITUDE": Mode(8, 0, 16),
+    "TERMINATION": Mode(10, 0, 13),  # since 1.15; before, it is reported as MANUAL
+    "ALTITUDE_CRUISE": Mode(11, 0, 8),  # since 1.17
 }
-"""Modes by name."""
+"""Modes by name. No number has two meanings in any version."""
 
-MANUAL_MODES = frozenset({MANUAL, STABILIZED, ALTCTL, POSCTL, ACRO, "POSCTL.ORBIT", "RATTITUDE"})
+MANUAL_MODES = frozenset(
+    {
+        *(MANUAL, STABILIZED, ALTCTL, POSCTL, ACRO),
+        *("POSCTL.ORBIT", "POSCTL.SLOW", "ALTITUDE_CRUISE", "RATTITUDE"),
+    }
+)
 """Modes that are flown by manual control."""
 
 _NAMES = {mode.number: name for name, mode in MODES.items()}

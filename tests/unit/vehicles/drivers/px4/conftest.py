@@ -17,7 +17,7 @@ from rigs.scripted import ACCEPTED, ASK, GET_HOME, INTERVAL, STREAMED, Scripted
 from volery.base.time import MS, S
 from volery.links.frame import Frame
 from volery.vehicles.drivers.px4 import open_driver
-from volery.vehicles.drivers.px4.decoder import event_id
+from volery.vehicles.drivers.px4.events import event_id
 from volery.vehicles.drivers.px4.modes import HOLD, LAND, MANUAL_MODES, MODES, OFFBOARD, RTL, TAKEOFF
 
 HOME = (454671168, -737578362, 32_575)  # degE7, degE7, mm AMSL

@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+import json
+import lzma
+import struct
+
 import pytest
 
 from rigs.recorded import Recorded, extract
 from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
 from volery.links.mavlink_codec import MavlinkParser, encode
-from volery.vehicles.drivers.px4.decoder import KNOWN_EVENTS, PX4Decoder, event_id, event_text
+from volery.vehicles.drivers.px4.decoder import PX4Decoder
+from volery.vehicles.drivers.px4.events import (
+    ALL_MODES,
+    CHECKS,
+    KNOWN_EVENTS,
+    REPORT_BEGINS,
+    REPORT_ENDS,
+    ArmingChecks,
+    Event,
+    EventTexts,
+    event_id,
+    event_text,
+    path_of_events,
+    uncompressed,
+)
+from volery.vehicles.drivers.px4.modes import HOLD, MODES, mode_name
 from volery.vehicles.firmware_versions import FirmwareVersion
 from volery.vehicles.telemetry import Telemetry
 
@@ -149,13 +168,13 @@ def test_numbers_of_events_are_made_of_their_names() -> None:
         for _, kind, fields in extract(FOLDER, name)
         if kind == "EVENT"
     }
+    recorded |= {fields["id"] for _, kind, fields in extract(FOLDER, "guided-1.17") if kind == "EVENT"}
     known = {number for number in recorded if not event_text(number).startswith("event")}
     assert event_id("commander_armed_by") == 0x0190CAF3
     assert event_id("check_modes_attitude") == 0x019F748F
     assert {f"{number:#010x}" for number in recorded - known} == {
         "0x01a893e0",  # begins a report of arming checks
         "0x011d3727",  # ends it
-        "0x01125bef",  # beside the logger's text
     }
     assert len(known & KNOWN_EVENTS.keys()) >= 15
 
@@ -173,3 +192,117 @@ def test_events_as_they_came_over_the_wire() -> None:
     assert encode(frame, 0x7A) == raw
     (sequence,) = MavlinkParser().feed(bytes.fromhex("fd0300002503019b0100f6ff01ee37"))
     assert (sequence.name, sequence.fields["sequence"]) == ("CURRENT_EVENT_SEQUENCE", 65526)
+
+
+def test_all_checks_of_1_14_to_1_18_have_words() -> None:
+    assert len(CHECKS) == 160
+    assert event_text(event_id("check_estimator_gps_pdop_too_high")) == "estimator GPS pdop too high"
+    assert event_text(event_id("commander_disarm_denied_not_landed")) == "disarming denied: not landed"
+    assert event_text(0x01000001) == "event 0x01000001"
+
+
+@pytest.mark.parametrize(
+    ("number", "name"),
+    [
+        (0x02030000, "POSCTL.SLOW"),
+        (0x0B040000, "AUTO.EXTERNAL1"),
+        (0x12040000, "AUTO.EXTERNAL8"),
+        (0x000A0000, "TERMINATION"),
+        (0x000B0000, "ALTITUDE_CRUISE"),
+        (0x000C0000, "MODE 0x000c0000"),
+    ],
+)
+def test_modes_of_1_15_to_1_17(number: int, name: str) -> None:
+    assert mode_name(number) == name
+
+
+def report(*failing: Event, can_arm: int) -> ArmingChecks:
+    checks = ArmingChecks()
+    summary = bytes(17) + struct.pack("<II", can_arm, can_arm)
+    for event in (Event(REPORT_BEGINS, 8, 0, summary), *failing, Event(REPORT_ENDS, 8, 0)):
+        checks.handle_event(event)
+    return checks
+
+
+def test_a_check_that_only_warns_is_no_reason() -> None:
+    """As PX4 1.17 reports without a transmitter: the warning is for all modes, and it can arm in Hold."""
+    hold = 1 << MODES[HOLD].state
+    warning = Event(event_id("check_modes_manual_control"), 4, ALL_MODES)
+    low = Event(event_id("check_battery_low"), 4, ALL_MODES)
+    assert report(warning, low, can_arm=hold).reasons(HOLD) == []
+    assert report(warning, low, can_arm=hold).lasting(HOLD) == []
+    assert report(warning, low, can_arm=0).reasons(HOLD) == ["low battery"]
+    assert report(warning, low, can_arm=0).lasting("MANUAL") == ["no manual control input"]
+    missing = Event(event_id("check_modes_mission"), 6, ALL_MODES)  # COM_ARM_MIS_REQ
+    assert report(warning, missing, can_arm=0).lasting(HOLD) == ["no valid mission available"]
+    station = Event(event_id("check_rc_dl_no_dllink"), 3, ALL_MODES)
+    assert report(station, can_arm=0).lasting(HOLD) == []  # heartbeats are lost on this very link
+
+
+OWN_EVENTS = {
+    "version": 2,
+    "components": {
+        "0": {"namespace": "common", "event_groups": {}, "enums": {}},
+        "1": {
+            "namespace": "px4",
+            "enums": {
+                "place_t": {"type": "uint8_t", "entries": {"3": {"name": "nest", "description": "the nest"}}},
+                "group_t": {"type": "uint32_t", "is_bitfield": True, "entries": {}},
+            },
+            "event_groups": {
+                "arming_check": {
+                    "events": {
+                        "17": {
+                            "name": "check_own",
+                            "message": r"Wind {3:.1m/s} at <param>{2}</param>, \<{4}",
+                            "arguments": [
+                                {"type": "group_t", "name": "modes"},
+                                {"type": "place_t", "name": "place"},
+                                {"type": "float", "name": "speed"},
+                            ],
+                        }
+                    }
+                }
+            },
+        },
+    },
+}
+
+
+def test_texts_of_events_from_the_vehicles_own_file() -> None:
+    packed = lzma.compress(json.dumps(OWN_EVENTS).encode())
+    texts = EventTexts(uncompressed("/etc/extras/all_events.json.xz", packed))
+    own = Event(0x01000011, 3, ALL_MODES, struct.pack("<IBf", ALL_MODES, 3, 7.25).ljust(40, b"\0"))
+    assert texts.text(own) == "Wind 7.2 m/s at the nest, <?"
+    assert texts.text(Event(0x01000012, 3, 0)) == ""
+    checks = report(own, can_arm=0)
+    assert checks.reasons(HOLD) == ["event 0x01000011"]
+    assert not checks.knows(own)
+    checks.texts = texts
+    assert checks.knows(own)
+    assert checks.reasons(HOLD) == ["Wind 7.2 m/s at the nest, <?"]
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        b"",
+        b"[]",
+        b"{}",
+        b'{"components": 3}',
+        b'{"components": {"1": {"event_groups": {"x": {"events": 1}}}}}',
+    ],
+)
+def test_what_is_no_file_of_events_is_refused(document: bytes) -> None:
+    with pytest.raises(ValueError, match=r"no file of events|Expecting value"):
+        EventTexts(document)
+
+
+def test_where_the_file_of_events_is() -> None:
+    kinds = [{"type": 1, "uri": "x"}, {"type": 4, "uri": "mftp://etc/extras/all_events.json.xz"}]
+    general = json.dumps({"version": 1, "metadataTypes": kinds}).encode()
+    assert path_of_events(general) == "/etc/extras/all_events.json.xz"
+    assert path_of_events(general.replace(b"mftp", b"https")) == ""
+    assert path_of_events(b"{") == ""
+    with pytest.raises(ValueError, match=r"Corrupt|unsupported|format"):
+        uncompressed("x.xz", b"no xz")

@@ -10,7 +10,7 @@ import pytest
 from volery.base.errors import Refused
 from volery.base.time import S
 from volery.kernel.waiting import sleep
-from volery.vehicles.drivers.px4.decoder import ALL_MODES, event_id
+from volery.vehicles.drivers.px4.events import ALL_MODES, event_id
 from volery.vehicles.drivers.px4.modes import HOLD, MODES
 
 Make = Callable[..., Any]
