@@ -25,6 +25,7 @@ import typer
 
 from volery.base.errors import CapabilityError, EstimateError, ModelError, UsageError, VoleryError
 from volery.base.installed import missing_extra
+from volery.base.process import interrupted_by_signals
 from volery.cli.console import Output
 from volery.cli.options import Debug, Json, Quiet
 
@@ -121,9 +122,12 @@ def _command_line_function(
 
 
 def exit_status(output: Output, command: Callable[[], int]) -> int:
-    """Call *command* and return its exit status; an exception becomes a message and a status."""
+    """Call *command* and return its exit status; an exception becomes a message and a status.
+
+    SIGTERM and SIGHUP end every command as Ctrl-C does, unless it takes them itself.
+    """
     try:
-        with resend_lost_interrupts():
+        with interrupted_by_signals(), resend_lost_interrupts():
             return command()
     except VoleryError as error:
         if output.debug:

@@ -17,8 +17,9 @@ import typer
 
 from volery.base.errors import UsageError
 from volery.base.garbage import seldom_collected
+from volery.base.process import outlive_output
 from volery.cli import commands
-from volery.cli.command import BAD_INPUT, SECTIONS, Commands
+from volery.cli.command import BAD_INPUT, FAILED, SECTIONS, Commands
 from volery.cli.configuration import read_defaults
 from volery.cli.console import Output
 
@@ -78,8 +79,10 @@ def main() -> None:
     """Run the command line of this process, with the defaults of the nearest configuration file.
 
     numpy computes with one thread, unless OPENBLAS_NUM_THREADS is set: results do not depend on the number of
-    cores, and no thread waits for work, which takes as much processor time as numpy's import.
+    cores, and no thread waits for work, which takes as much processor time as numpy's import. A result that
+    could not be printed, as on a full disk, is a failure; one that nobody reads any more is none.
     """
+    printed = outlive_output()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     atexit.register(gc.freeze)  # at its end Python looks for garbage in all that exists; nothing needs it
     command = typer.main.get_command(application(next(iter(sys.argv[1:]), "")))
@@ -90,4 +93,10 @@ def main() -> None:
         Output().complain(f"volery: {error}")
         if not INFORMATION.intersection(sys.argv[1:]) and sys.argv[1:]:
             raise SystemExit(BAD_INPUT) from None
-    command(prog_name="volery", default_map=defaults)
+    try:
+        command(prog_name="volery", default_map=defaults)
+    finally:
+        sys.stdout.flush()
+        if printed is not None and printed.problem:
+            Output().complain(f"volery: standard output cannot be written: {printed.problem}")
+            raise SystemExit(FAILED)

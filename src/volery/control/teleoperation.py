@@ -14,7 +14,7 @@ import sys
 import termios
 import tty
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from math import radians
 from pathlib import Path
@@ -144,7 +144,10 @@ class Keyboard:
         """Return the meaning of the newest key; other keys are ignored."""
         newest: Intent | str | None = None
         while select.select([self._file], [], [], 0.0)[0]:
-            data = os.read(self._file, 64)
+            try:
+                data = os.read(self._file, 64)
+            except OSError:  # the terminal was closed
+                data = b""
             if not data:
                 return QUIT
             for letter in data.decode(errors="ignore").lower():
@@ -170,7 +173,8 @@ def keyboard() -> Iterator[Keyboard]:
     try:
         yield Keyboard(file)
     finally:
-        termios.tcsetattr(file, termios.TCSADRAIN, before)
+        with suppress(termios.error):  # the terminal was closed
+            termios.tcsetattr(file, termios.TCSADRAIN, before)
 
 
 _EVENT = struct.Struct("<IhBB")

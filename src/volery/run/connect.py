@@ -13,6 +13,7 @@ from logging import getLogger
 from typing import TypeVar
 
 from volery.base.errors import UsageError, VoleryError
+from volery.base.process import interrupted_by_signals, without_hang_ups
 from volery.kernel.wall import WallKernel
 from volery.run.assembly.vehicles import OpenedVehicles, VehicleSettings, open_vehicles
 from volery.vehicles import Drone, Fence, Fleet, Limits, Vehicle
@@ -46,7 +47,8 @@ def connect(
     While a real one does not know where it is, the logger ``volery`` says every few seconds what is missing.
     A simulated vehicle (``sim:ardupilot``) lives in virtual time, which passes only while a call blocks. A
     real vehicle lives in real time. The connection ends with the ``with`` block, by ``close()``, or when
-    Python exits: then an armed vehicle lands, unless an operator has taken it over.
+    Python exits: then an armed vehicle lands, unless an operator has taken it over. SIGTERM and a closed
+    terminal (SIGHUP) interrupt the script as Ctrl-C does, if it has no handlers of its own.
 
     Args:
         url: Address, such as ``sim:px4`` or ``ardupilot+serial:///dev/ttyUSB0``.
@@ -183,11 +185,13 @@ def _ending(come_to_rest: Callable[[], object]) -> Iterator[None]:
         yield
     except BaseException as failure:
         try:
-            come_to_rest()
+            with without_hang_ups():
+                come_to_rest()
         except VoleryError as error:
             failure.add_note(f"at the end of the program: {error}")
         raise
-    come_to_rest()
+    with without_hang_ups():
+        come_to_rest()
 
 
 @contextmanager
@@ -200,7 +204,7 @@ def _opened(
     if isinstance(kernel, WallKernel):
         kernel.start()
     try:
-        with kernel.adopt(SCRIPT):
+        with interrupted_by_signals(), kernel.adopt(SCRIPT):
             yield opened
     finally:
         for vehicle in opened.vehicles:

@@ -1,15 +1,14 @@
-"""How a run ends, whatever ends it: time, a goal, a failure, Ctrl-C, SIGTERM.
+"""How a run ends, whatever ends it: time, a goal, a failure, Ctrl-C, SIGTERM, a closed terminal (SIGHUP).
 
 The order is always the same. The components are cancelled. Safety tasks land every armed vehicle that no
 operator controls, while components execute their final callbacks. The rest is cancelled, and the kernel names
-the tasks that did not end. The first signal starts this; a second one stops at once.
+the tasks that did not end. The first signal starts this; a second one stops at once, but for SIGHUP.
 """
 
 from __future__ import annotations
 
 import gc
 import signal
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -18,6 +17,7 @@ from types import FrameType
 from typing import Protocol
 
 from volery.base.errors import VoleryError
+from volery.base.process import on_ending_signals
 from volery.base.time import MINUTE, Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext, Scope
@@ -149,21 +149,22 @@ class Ending:
 
     @contextmanager
     def signals(self) -> Iterator[None]:
-        """Let SIGINT and SIGTERM end the run in order, and a second one raise ``KeyboardInterrupt``."""
-        if threading.current_thread() is not threading.main_thread():
-            yield
-            return
+        """Let SIGINT, SIGTERM and SIGHUP end the run in order.
+
+        A second SIGINT or SIGTERM raises ``KeyboardInterrupt``; so does the first one if the run ends
+        already, but for the reason of a SIGHUP: who closes a session may send both.
+        """
+        received: list[int] = []
 
         def handle(number: int, frame: FrameType | None) -> None:
-            if self.begun or received:
+            second = signal.SIGINT in received or signal.SIGTERM in received
+            if number != signal.SIGHUP and (second or (self.begun and not received)):
                 raise KeyboardInterrupt
             received.append(number)
-            self._kernel.post(lambda: self.begin("interrupted", f"{signal.Signals(number).name} received"))
+            if not self.begun:
+                self._kernel.post(
+                    lambda: self.begin("interrupted", f"{signal.Signals(number).name} received")
+                )
 
-        received: list[int] = []
-        before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
-        try:
+        with on_ending_signals(handle):
             yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)

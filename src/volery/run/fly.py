@@ -188,18 +188,18 @@ class _Flight:
             name = f"mission of {vehicle.name}"
             kernel.spawn(partial(self._fly, vehicle), name, ExecutionContext(FUNCTION), ending.users)
         left: Sequence[str] = ()
-        try:
-            with ending.signals():
+        with ending.signals():  # a terminal that is closed does not end the writing of the record either
+            try:
                 left = ending.pass_time()
-        except BaseException as fault:
-            ending.stop_hard("failed", f"{type(fault).__name__}: {fault}")
-            raise
-        finally:
-            for vehicle in self._opened.vehicles:
-                vehicle.close()
-            self._opened.leave()
-            self._states.record_states()
-            record = self._recording.finish(ending.status, ending.reason, kernel.now(), ())
+            except BaseException as fault:
+                ending.stop_hard("failed", f"{type(fault).__name__}: {fault}")
+                raise
+            finally:
+                for vehicle in self._opened.vehicles:
+                    vehicle.close()
+                self._opened.leave()
+                self._states.record_states()
+                record = self._recording.finish(ending.status, ending.reason, kernel.now(), ())
         return Run(
             record,
             self._recording.folder,

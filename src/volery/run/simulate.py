@@ -196,15 +196,15 @@ class _Simulation:
         """Start, let time pass, end in order and finish the recording, even after an internal error."""
         kernel, ending = self._kernel, self._ending
         kernel.call_at(self._system.limits.duration_ns, lambda: ending.begin("completed", "its time is up"))
-        try:
-            with ending.signals():
+        with ending.signals():  # a terminal that is closed does not end the writing of the record either
+            try:
                 self._start()
                 left = ending.pass_time()
-        except BaseException as fault:
-            ending.stop_hard("failed", f"{type(fault).__name__}: {fault}")
-            self._close(())
-            raise
-        return self._close([*left, *self.leave()])
+            except BaseException as fault:
+                ending.stop_hard("failed", f"{type(fault).__name__}: {fault}")
+                self._close(())
+                raise
+            return self._close([*left, *self.leave()])
 
     def _start(self) -> None:
         self._built.start()

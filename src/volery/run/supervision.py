@@ -11,7 +11,6 @@ import ctypes
 import os
 import signal
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from pathlib import Path
 from types import FrameType
 
 from volery.base.errors import UsageError, VoleryError
+from volery.base.process import ending_signals, on_ending_signals
 from volery.components.cpp.framework import Crash, framework_runtime, read_crash
 from volery.kernel.virtual import VirtualKernel
 from volery.model.system import System
@@ -41,7 +41,6 @@ RecoverRun = Callable[[VoleryError, str], Run]
 """Finishes the recording of a run that died of an error, blamed on a component or on ``run``."""
 
 _PR_SET_PDEATHSIG = 1
-_FORWARDED = (signal.SIGINT, signal.SIGTERM)
 
 
 @dataclass(frozen=True)
@@ -111,15 +110,11 @@ def _recover(child: BaseProcess, crash: Crash | None, recover: RecoverRun) -> Ru
 
 @contextmanager
 def _started(child: BaseProcess) -> Iterator[None]:
-    """Start the child and pass SIGINT and SIGTERM on to it until the block ends.
+    """Start the child and pass the signals that end a run on to it until the block ends.
 
-    The handlers are in place before the fork, and the child begins with both signals blocked: Python drops
+    The handlers are in place before the fork, and the child begins with these signals blocked: Python drops
     an exception that a signal raises during a fork, and the child must have its own handlers first.
     """
-    if threading.current_thread() is not threading.main_thread():
-        child.start()
-        yield
-        return
     early: list[int] = []
 
     def forward(number: int, frame: FrameType | None) -> None:
@@ -128,9 +123,8 @@ def _started(child: BaseProcess) -> Iterator[None]:
         elif child.is_alive():
             os.kill(child.pid, number)
 
-    before = {number: signal.signal(number, forward) for number in _FORWARDED}
-    try:
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, _FORWARDED)
+    with on_ending_signals(forward):
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, ending_signals())
         try:
             child.start()
         finally:
@@ -138,9 +132,6 @@ def _started(child: BaseProcess) -> Iterator[None]:
         for number in early:
             forward(number, None)
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 # -- in the child
@@ -149,7 +140,8 @@ def _started(child: BaseProcess) -> Iterator[None]:
 def _child_main(work: Work, shown: bool, supervision: Supervision, to: Connection, crash_pipe: int) -> None:
     os.setpgid(0, 0)  # Ctrl-C reaches the parent, which forwards it
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    for number in _FORWARDED:
+    stopping = ending_signals()
+    for number in stopping:
         signal.signal(number, signal.default_int_handler)
     framework_runtime(supervision.framework).supervise(crash_pipe, supervision.patience_s)
 
@@ -157,7 +149,7 @@ def _child_main(work: Work, shown: bool, supervision: Supervision, to: Connectio
         to.send(("show", progress))
 
     try:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _FORWARDED)  # may raise KeyboardInterrupt at once
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, stopping)  # may raise KeyboardInterrupt at once
         to.send(("run", work(show if shown else None)))
     except BaseException as error:
         to.send(("raised", error))

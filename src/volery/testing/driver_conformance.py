@@ -21,6 +21,7 @@ from functools import partial
 from typing import Any
 
 from volery.base.errors import LowBattery, Refused, UsageError, VoleryError, choices, did_you_mean
+from volery.base.process import without_hang_ups
 from volery.base.time import to_seconds
 from volery.testing.checks import CHECKS, Check, CheckFailedError, NotPossibleError
 from volery.testing.driver_checks import GROUPS
@@ -199,7 +200,8 @@ def _real(wanted: list[Check], stage: RealStage, fly: bool, report: Show, result
 def _left_in_the_air(stage: RealStage) -> str:
     """Bring the vehicle to rest at the end; a second signal ends that, too."""
     try:
-        return _not_at_rest(stage)
+        with without_hang_ups():
+            return _not_at_rest(stage)
     except KeyboardInterrupt:
         flying = ", FLYING" if stage.in_the_air else ""
         return f"a second signal ended its landing: {describe_state(stage.drone.telemetry)}{flying}"

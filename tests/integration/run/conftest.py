@@ -93,15 +93,24 @@ class Commands:
         self.folder = folder
         self._started: list[subprocess.Popen[str]] = []
 
-    def start(self, *arguments: object, prelude: str = "", **environment: str) -> subprocess.Popen[str]:
-        """Begin a command; *prelude* is Python that its process runs first."""
+    def start(
+        self, *arguments: object, prelude: str = "", terminal: int | None = None, **environment: str
+    ) -> subprocess.Popen[str]:
+        """Begin a command.
+
+        *prelude* is Python that its process runs first, *terminal* the controlling terminal of a session.
+        """
+        if terminal is not None:
+            prelude = f"import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); {prelude}"
         command = [*COMMAND[:2], f"{prelude}\n{COMMAND[2]}", *map(str, arguments)]
         process = subprocess.Popen(
             command,
             cwd=self.folder,
             env={**os.environ, **environment},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stdin=terminal,
+            stdout=subprocess.PIPE if terminal is None else terminal,
+            stderr=subprocess.PIPE if terminal is None else terminal,
+            start_new_session=terminal is not None,
             text=True,
         )
         self._started.append(process)

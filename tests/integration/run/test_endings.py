@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import select
 import signal
 from dataclasses import replace
 
@@ -57,7 +59,7 @@ def in_the_air(commands, one_drone):
     return begin
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_a_run_in_order(commands, in_the_air, number):
     process = in_the_air(20)
     process.send_signal(number)
@@ -86,6 +88,67 @@ def test_a_second_ctrl_c_stops_at_once(commands, in_the_air):
     trace, states = truths(commands.folder / "out")
     assert trace.complete
     assert states[-1].z > 1.0
+
+
+TALKS = """
+import volery
+from pathlib import Path
+
+def mission(drone):
+    drone.takeoff(8)
+    for second in range(1500):
+        print(second, flush=True)
+        Path("printed").write_text(str(second))
+        if Path("closed").exists() and second > int(Path("closed").read_text()) + 3:
+            break
+        volery.sleep(1)
+    drone.land()
+"""
+
+
+@pytest.fixture
+def on_a_terminal(commands):
+    """A flight that has begun to print on a terminal of its own, which is read until then."""
+    (commands.folder / "talks.py").write_text(TALKS)
+
+    def begin(prelude=""):
+        master, line = os.openpty()
+        arguments = ("fly", "talks.py", "--on", "sim:ardupilot", "--speed", 10, "--out", "out")
+        process = commands.start(*arguments, prelude=prelude, terminal=line)
+        os.close(line)
+
+        def printed():
+            while select.select([master], [], [], 0.0)[0]:
+                os.read(master, 65536)
+            return (commands.folder / "printed").exists()
+
+        commands.until(process, printed)
+        return process, master
+
+    return begin
+
+
+def test_a_flight_lands_when_its_terminal_is_closed(commands, on_a_terminal):
+    process, master = on_a_terminal()
+    os.close(master)
+    assert commands.end_of(process).returncode == 1
+    outcome = record(commands.folder / "out")["outcome"]
+    assert (outcome["status"], outcome["reason"]) == ("interrupted", "SIGHUP received")
+    _, states = truths(commands.folder / "out")
+    assert max(state.z for state in states) > 3.0
+    assert states[-1].z < 0.5
+    assert not states[-1].armed
+    assert (commands.folder / "out" / "report.html").exists()
+
+
+def test_a_flight_under_nohup_goes_on_when_its_terminal_is_closed(commands, on_a_terminal):
+    process, master = on_a_terminal("import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)")
+    os.close(master)
+    closed = commands.folder / "closed.part"
+    closed.write_text((commands.folder / "printed").read_text())
+    closed.rename(commands.folder / "closed")
+    assert commands.end_of(process).returncode == 0
+    assert record(commands.folder / "out")["outcome"]["status"] == "completed"
 
 
 def test_after_a_kill_the_report_recovers_the_run(commands, in_the_air):

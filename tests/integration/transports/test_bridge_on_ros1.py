@@ -196,7 +196,8 @@ def test_over_a_serial_line_it_asks_as_it_is_told(ros: Run, start: Start) -> Non
     tty.setraw(line)
     address = f"ardupilot+serial://{os.ttyname(line)}?baud=57600"
     options = ("--names", "roscopter", "--namespace", "/serial", "--rate", "20", "--source-system", "254")
-    bridge = start(*COMMAND, "bridge", address, *options)
+    in_a_script = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # begun with &
+    bridge = start(*COMMAND[:2], f"{in_a_script}; {COMMAND[2]}", "bridge", address, *options)
     assert "bridging" in bridge.stdout.readline()
     os.write(autopilot, BEAT)
     asks_for_streams(lambda: os.read(autopilot, 4096))
@@ -205,6 +206,7 @@ def test_over_a_serial_line_it_asks_as_it_is_told(ros: Run, start: Start) -> Non
     assert "/serial/send_rc" not in listed  # nobody has allowed it
     bridge.send_signal(signal.SIGTERM)  # as a service is ended
     assert bridge.wait(LIMIT_S) == 0
+    assert "/serial/vfr_hud" not in ros("rostopic", "list").split()
     os.close(autopilot)
     os.close(line)
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -60,8 +58,9 @@ def conformance(
 
     Each check gets a new simulated vehicle, which flies in virtual time. A real vehicle goes through the
     checks in order and in real time; checks that arm or fly it are skipped without --fly. It is landed after
-    each check, and after Ctrl-C or SIGTERM; if that fails, the report says so. conformance.json is written
-    after every check. Exit status: 0 if all checks were run and none failed, 2 for bad input, 1 otherwise.
+    each check, and after Ctrl-C, SIGTERM or SIGHUP; if that fails, the report says so. conformance.json is
+    written after every check. Exit status: 0 if all checks were run and none failed, 2 for bad input, 1
+    otherwise.
     """
     from volery.run.recording import make_folder
     from volery.testing.driver_conformance import Report, chosen
@@ -73,7 +72,7 @@ def conformance(
         return OK
     folder = make_folder(out) if out is not None else None
     found: list[Result] = []
-    with _ended_by_signals(), _progress(output, len(chosen(names, kind))) as progress:
+    with _progress(output, len(chosen(names, kind))) as progress:
 
         def show(one: Check, result: Result | None) -> None:
             if result is not None:
@@ -92,22 +91,6 @@ def conformance(
     if report.left:
         output.complain(f"volery: {url}: THE VEHICLE IS NOT DOWN: {report.left}")
     return OK if report.conforms else FAILED
-
-
-@contextmanager
-def _ended_by_signals() -> Iterator[None]:
-    """Let SIGINT and SIGTERM raise ``KeyboardInterrupt``, also in a job that a shell started with ``&``."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    signal.signal(signal.SIGTERM, lambda number, frame: signal.raise_signal(signal.SIGINT))
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _write(folder: Path | None, report: Report) -> None:

@@ -1,9 +1,9 @@
 """``volery demo`` and ``volery new``: the examples that come with volery; ``volery doctor``: installed parts.
 
-The demo runs the delivery service on two allocations at once, each in a process of its own. Ctrl-C reaches
-every process of the terminal, and SIGTERM is forwarded: each simulation ends in order and this process waits
-for them. If this process is killed they receive SIGTERM. ``doctor`` lists what each missing part would enable
-and how to install it.
+The demo runs the delivery service on two allocations at once, each in a process of its own and out of reach
+of the terminal. A signal that ends this process is passed on to them as SIGTERM: each simulation ends in
+order and this process waits for them. If this process is killed they receive SIGTERM, too. ``doctor`` lists
+what each missing part would enable and how to install it.
 """
 
 from __future__ import annotations
@@ -15,16 +15,17 @@ import shutil
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.text import Text
@@ -32,6 +33,7 @@ from rich.text import Text
 import volery
 from volery.base.errors import UsageError, VoleryError
 from volery.base.installed import install_command, require_extra
+from volery.base.process import on_ending_signals
 from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output
 from volery.cli.options import Seed
@@ -45,8 +47,7 @@ commands = Commands("First steps")
 
 DEMO_MODEL, STARTER_MODEL = "delivery", "starter"
 
-IMPORTED_ONCE = [
-    "__main__",
+IMPORTED_ONCE = (
     "networkx",  # of a component of the demo
     "volery.bridge",
     "volery.report.html_report",
@@ -54,11 +55,10 @@ IMPORTED_ONCE = [
     "volery.simulation.autopilots.ardupilot.copter",
     "volery.simulation.autopilots.ardupilot.rover",
     "volery.vehicles.drivers.ardupilot",
-]
+)
 """Modules that the processes of simulations share: nearly all that they import."""
 
-POLL_PERIOD_S = 0.1
-"""Wall seconds between two reads of the progress that the processes send."""
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 def example(name: str) -> Path:
@@ -162,61 +162,91 @@ def run_all(output: Output, jobs: Mapping[str, Job]) -> dict[str, JobOutcome]:
     """Run all *jobs* and return their outcomes by name. Raises the error of the first that cannot start."""
     from volery.cli.run_display import live_progress
 
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload(IMPORTED_ONCE)
-    reports = context.SimpleQueue()
-    with (
-        live_progress(output) as drawings,
-        ProcessPoolExecutor(len(jobs), context, _begin_process, (reports if drawings else None,)) as pool,
-        _signals_left_to_processes(),
-    ):
-        futures = {name: pool.submit(_run, name, job) for name, job in jobs.items()}
-        _draw_until_done(list(futures.values()), reports, drawings)
-    try:
-        return {name: future.result() for name, future in futures.items()}
-    except BrokenProcessPool as error:  # ended while it started, by a signal or for want of memory
-        raise VoleryError("a process that ran a simulation was ended from outside") from error
+    for module in IMPORTED_ONCE:
+        import_module(module)
+    context = multiprocessing.get_context("fork")  # before a thread draws
+    started: dict[str, BaseProcess] = {}
+    sending: dict[Connection, str] = {}
+    stopped = False
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        nonlocal stopped
+        stopped = True
+        for process in started.values():
+            process.terminate()
+
+    with on_ending_signals(stop):
+        for name, job in jobs.items():
+            ours, theirs = context.Pipe(duplex=False)
+            sending[ours] = name
+            process = context.Process(target=_work, args=(name, job, theirs, tuple(sending)), name=name)
+            mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)  # until the child has its own handlers
+            try:
+                process.start()
+                started[name] = process
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+            theirs.close()
+            if stopped:
+                process.terminate()
+        try:
+            with live_progress(output) as drawings:
+                outcomes = _outcomes(sending, drawings)
+        except BaseException:
+            for one in started.values():
+                one.terminate()
+            raise
+        finally:
+            for one in started.values():
+                one.join()
+    return {name: outcomes[name] for name in jobs}
 
 
-def _draw_until_done(futures: list[Future[JobOutcome]], reports: Any, drawings: Drawings | None) -> None:
-    while wait(futures, timeout=POLL_PERIOD_S).not_done:
-        while drawings is not None and not reports.empty():
-            drawings.show(*reports.get())
+def _outcomes(sending: Mapping[Connection, str], drawings: Drawings | None) -> dict[str, JobOutcome]:
+    """Show the progress that processes send until each has sent its outcome, and return these by name."""
+    outcomes: dict[str, JobOutcome] = {}
+    while len(outcomes) < len(sending):
+        for ready in wait([one for one, name in sending.items() if name not in outcomes]):
+            assert isinstance(ready, Connection)
+            name = sending[ready]
+            try:
+                sent = ready.recv()
+            except EOFError:  # killed, for example for want of memory
+                raise VoleryError(f"the process that simulated {name} was ended from outside") from None
+            if isinstance(sent, JobOutcome):
+                outcomes[name] = sent
+            elif isinstance(sent, BaseException):
+                raise sent
+            elif drawings is not None:
+                drawings.show(name, sent)
+    return outcomes
 
 
-@contextmanager
-def _signals_left_to_processes() -> Iterator[None]:
-    """Leave SIGINT and SIGTERM to the processes that run the simulations.
+def _work(name: str, job: Job, to: Connection, of_parent: Sequence[Connection]) -> None:
+    """Run *job* in its own process, and send its progress and then its outcome or error.
 
-    The terminal sends SIGINT to them as well; SIGTERM is forwarded.
+    SIGTERM ends it, also when its parent ends. The kernel's own parent-death signal does not serve here: it
+    is sent again for each thread of the parent, and a second signal would stop the run at once.
     """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
+    from volery.cli.run_display import RateLimited
 
-    def forward(number: int, frame: FrameType | None) -> None:
-        for child in multiprocessing.active_children():
-            child.terminate()
-
-    before = {
-        signal.SIGINT: signal.signal(signal.SIGINT, signal.SIG_IGN),
-        signal.SIGTERM: signal.signal(signal.SIGTERM, forward),
-    }
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-
-
-def _begin_process(queue: Any) -> None:
-    """Begin a process that runs simulations: its queue for progress, and SIGTERM when its parent ends.
-
-    The kernel's own parent-death signal does not serve here: it is sent again for each thread of the parent,
-    and a second signal would stop the run at once.
-    """
-    _Reports.queue = queue
+    os.setpgid(0, 0)  # the terminal's signals reach the parent, which forwards them
+    for one in of_parent:
+        one.close()
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     threading.Thread(target=_end_with_parent, daemon=True).start()
+
+    def send(content: object) -> None:
+        with suppress(BrokenPipeError):  # the parent is gone
+            to.send(content)
+
+    try:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)  # may raise KeyboardInterrupt at once
+        send(_run(job, RateLimited(send)))
+    except BaseException as error:
+        send(error)
 
 
 def _end_with_parent() -> None:
@@ -225,29 +255,12 @@ def _end_with_parent() -> None:
         os.kill(os.getpid(), signal.SIGTERM)
 
 
-class _Reports:
-    """The queue for progress. It is set once when a process starts: a queue cannot be sent later."""
-
-    queue: Any = None
-
-    @classmethod
-    def sender(cls, name: str) -> Callable[[Progress], None] | None:
-        from volery.cli.run_display import RateLimited
-
-        queue = cls.queue
-        return None if queue is None else RateLimited(lambda progress: queue.put((name, progress)))
-
-
-def _run(name: str, job: Job) -> JobOutcome:
-    """Run *job* in its own process."""
+def _run(job: Job, show: Callable[[Progress], None]) -> JobOutcome:
     from volery.run.result import Options
     from volery.run.simulate import simulate
 
-    options = Options(fidelity="code", seed=job.seed, out=job.out, show=_Reports.sender(name))
+    options = Options(fidelity="code", seed=job.seed, out=job.out, show=show)
     run = simulate(job.model, options, allocation=job.allocation)
-    parent = multiprocessing.parent_process()
-    if parent is not None and not parent.is_alive():  # nothing would end this process
-        os._exit(FAILED)
     problems = [] if run.completed else [f"{run.record.outcome.status}: {run.record.outcome.reason}"]
     return JobOutcome(run.record, job.out, (*problems, *run.problems))
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -256,7 +255,6 @@ def bridge(
     below = made.namespace.rstrip("/")
     output.show(f"bridging {url} to {graph} under {made.names}'s names, {below}/...; Ctrl-C stops it")
     made.every(S, lambda: notes.status(made.kernel.now(), made.status))
-    signal.signal(signal.SIGTERM, lambda number, frame: signal.raise_signal(signal.SIGINT))  # of a service
     try:
         made.run()
     except KeyboardInterrupt:

@@ -20,6 +20,7 @@ from typing import Any
 
 from volery.base.errors import ModelError, VoleryError
 from volery.base.position import Position
+from volery.base.process import outlive_output
 from volery.base.time import S
 from volery.kernel.task import ExecutionContext
 from volery.model.instances import Instance, TargetKind
@@ -201,6 +202,7 @@ def main(model: Path, name: str, *, graph: str, allocation: str = "", scenario: 
 
     The command line of an entry point is read here; what launch files of ROS add is ignored.
     """
+    outlive_output()
     parser = argparse.ArgumentParser(description=f"Host the component {name}.")
     parser.add_argument(
         "--simulated", choices=("true", "false"), default="false", help="vehicles and time of a simulation"

@@ -17,6 +17,7 @@ from types import ModuleType
 
 from volery.base.errors import VoleryError
 from volery.base.position import Position
+from volery.base.process import outlive_output
 from volery.components.loader import Loader
 from volery.kernel.wall import FollowingKernel, WallKernel
 from volery.requirements.record import Status
@@ -131,6 +132,7 @@ class Worker:
 
 def main() -> None:
     """Run the component that the first message describes."""
+    outlive_output()
     run = Pipe(int(sys.argv[1]), int(sys.argv[2]))
     order = run.receive()
     try:
