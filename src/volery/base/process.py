@@ -1,4 +1,4 @@
-"""What the operating system does to this process: signals that end it, and output that nobody reads any more.
+"""What the operating system does to this process: signals that end it, and output without a reader.
 
 SIGINT and SIGTERM end what flies or serves in order, also in a job that a shell started with ``&`` and
 therefore with SIGINT ignored. SIGHUP, the signal of a terminal that was closed, does the same, unless it was
@@ -52,7 +52,9 @@ def interrupted_by_signals() -> Iterator[None]:
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         _take_hang_up(number)
-        signal.raise_signal(signal.SIGINT)
+        ctrl_c = signal.getsignal(signal.SIGINT)
+        if callable(ctrl_c):  # a kernel that runs has its own
+            ctrl_c(signal.SIGINT, frame)
 
     wanted: dict[signal.Signals, Any] = {
         number: interrupt for number in ending_signals() if signal.getsignal(number) is signal.SIG_DFL

@@ -80,7 +80,7 @@ def main() -> None:
 
     numpy computes with one thread, unless OPENBLAS_NUM_THREADS is set: results do not depend on the number of
     cores, and no thread waits for work, which takes as much processor time as numpy's import. A result that
-    could not be printed, as on a full disk, is a failure; one that nobody reads any more is none.
+    could not be printed, as on a full disk, is a failure; one that has no reader any more is none.
     """
     printed = outlive_output()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

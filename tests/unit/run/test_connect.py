@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -54,6 +55,17 @@ raise SystemExit(f"armed: {drone.armed} {fleet['a'].armed}")
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (done.stdout, done.stderr) == ("armed at the end: False False\n", "armed: True True\n")
+
+
+def test_sigterm_lands_the_vehicle_of_a_script() -> None:
+    drone = connect("sim:ardupilot")
+    drone.takeoff(5)
+    with pytest.raises(KeyboardInterrupt):
+        os.kill(os.getpid(), signal.SIGTERM)
+    assert drone.flying
+    drone.close()
+    assert not drone.armed
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
 
 
 def test_two_connections_end_in_any_order() -> None:
