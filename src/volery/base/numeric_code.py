@@ -16,6 +16,7 @@ import struct
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache, cached_property
+from logging import getLogger
 from pathlib import Path
 from runpy import run_path
 from types import FunctionType
@@ -134,9 +135,24 @@ class NumericCode:
     def by_numba(self, *, cache: bool) -> Any:
         """Return the function compiled by numba for the declared types."""
         from numba import njit  # noqa: PLC0415  # takes 0.4 s, and only the lack of object code needs it
+        from numba.core import event  # noqa: PLC0415  # likewise
 
         entry = _linked(self._function, {}, njit)
-        return njit(f"int64({', '.join(self.arguments)})", cache=cache, error_model="numpy")(entry)
+
+        name = self.name
+
+        class Notice(event.Listener):
+            """Says that the entry point is compiled and not read from the cache."""
+
+            def on_start(self, started: Any) -> None:
+                if started.data["dispatcher"].py_func is entry:
+                    getLogger("volery").warning("compiling %s for this computer, once: some 20 s", name)
+
+            def on_end(self, ended: Any) -> None:
+                pass
+
+        with event.install_listener("numba:compile", Notice()):
+            return njit(f"int64({', '.join(self.arguments)})", cache=cache, error_model="numpy")(entry)
 
 
 def _linked(function: Callable[..., Any], known: dict[Any, Any], njit: Callable[..., Any]) -> FunctionType:

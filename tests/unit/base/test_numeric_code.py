@@ -55,6 +55,16 @@ def test_a_numeric_function_is_plain_python():
     assert _scaled(2.0, 4.0) == 0.6
 
 
+def test_what_is_compiled_is_announced_once(caplog):
+    first, second = entry(), entry()
+    first.by_numba(cache=True)  # fills the cache, unless an earlier run has
+    caplog.clear()
+    second.by_numba(cache=True)
+    assert not caplog.messages
+    second.by_numba(cache=False)
+    assert [one.split(",")[0] for one in caplog.messages] == ["compiling scale_rows for this computer"]
+
+
 def test_without_object_code_numba_executes_it(tmp_path, monkeypatch):
     monkeypatch.setattr(numeric_code, "OBJECT_CODE", tmp_path)
     values, counts = rows()
