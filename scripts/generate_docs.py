@@ -51,7 +51,10 @@ def observables() -> str:
     """What a requirement may bound."""
     lines = [
         "# Observables\n",
-        "What a requirement of a model may bound, as `<subject>.<quantity>`.",
+        "What a requirement of a model may bound, as `<subject>.<quantity>`: `planner.response_time`.",
+        "The subject is the name of a component instance, processor, network, vehicle or chain, or",
+        "`application`. An operation is a subject by the names of its instance and itself, a ROS service by",
+        "the last word of its name: `planner.order_of.response_time`.",
         "An empty unit stands for a count or a share.\n",
     ]
     subject = ""

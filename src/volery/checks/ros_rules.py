@@ -1,9 +1,11 @@
-"""Rules of ROS: names that it takes, nodes of one name, topics of two types, topics without a publisher."""
+"""Rules of ROS: names, nodes of one name, topics of two types, without a publisher or a subscriber."""
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 from volery.checks.system_rules import instance_path
 from volery.model import rules
@@ -57,7 +59,7 @@ def full_topic(instance: Instance, name: str) -> str:
 
 
 def topics(system: System) -> Iterator[Finding]:
-    """Find topics of two types, and those that nothing publishes."""
+    """Find topics of two types, and those that nothing publishes or that end a chain unseen."""
     known: dict[str, tuple[str, str]] = {}
     ends = list(_topics_of(system))
     for instance, full, kind, _ in ends:
@@ -71,9 +73,70 @@ def topics(system: System) -> Iterator[Finding]:
         if not publishes and full not in published and not full.startswith(own):
             what = f"it subscribes to {full}, which no component publishes"
             yield Finding(rules.NOT_PUBLISHED, what, instance_path(instance), instance.where)
-    for chain in system.chains if published else ():
-        for missing in (one for one in chain.topics if one not in published and not one.startswith(own)):
-            yield Finding(rules.NOT_PUBLISHED, f"no component publishes {missing}", f"chains.{chain.name}")
+    for chain in system.chains:
+        at = f"chains.{chain.name}"
+        for missing in chain.topics if published else ():
+            if missing not in published and not missing.startswith(own):
+                yield Finding(rules.NOT_PUBLISHED, f"no component publishes {missing}", at, chain.where)
+        for topic in chain.topics:
+            if not topic.startswith(own) and not any(
+                _may_subscribe(system, one, topic) for one in system.instances
+            ):
+                what = f"nothing subscribes to {topic}: no message arrives there, and no latency is observed"
+                yield Finding(rules.NOT_SUBSCRIBED, what, at, chain.where)
+
+
+def _may_subscribe(system: System, instance: Instance, topic: str) -> bool:
+    """Return whether *instance* states that it subscribes to *topic*, or has code that may do so."""
+    component = instance.component
+    if any(full_topic(instance, name) == topic for name in component.subscribes if _ROS_NAME.match(name)):
+        return True
+    if component.subscribes or not component.path:
+        return False
+    names = _subscribed_in(system.file_of(component))
+    return names is None or any(
+        full_topic(instance, name) == topic for name in names if _ROS_NAME.match(name)
+    )
+
+
+_SUBSCRIBES = re.compile(r"[Ss]ubscri|wait_for_message")
+
+
+def _subscribed_in(file: Path) -> list[str] | None:
+    """Return the topics that a Python file subscribes to by constant names; None if that cannot be seen."""
+    try:
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+    except (
+        OSError,
+        ValueError,
+        SyntaxError,
+        RecursionError,
+    ):  # another language, or it is reported elsewhere
+        return None
+    found: list[str] = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom) and _imports_neighbour(node, file):
+            return None
+        if not isinstance(node, ast.Call) or not _SUBSCRIBES.search(ast.unparse(node.func)):
+            continue
+        given = [*node.args, *(one.value for one in node.keywords)]
+        texts = [one.value for one in given if isinstance(one, ast.Constant) and isinstance(one.value, str)]
+        if not texts:
+            return None
+        found += texts
+    return found
+
+
+def _imports_neighbour(node: ast.Import | ast.ImportFrom, file: Path) -> bool:
+    """Return whether a module is imported that lies beside *file* and may subscribe for it."""
+    if isinstance(node, ast.ImportFrom):
+        names = [node.module or ""] if not node.level else [""]
+    else:
+        names = [one.name for one in node.names]
+    tops = [name.partition(".")[0] for name in names]
+    return any(
+        not top or (file.parent / top).is_dir() or (file.parent / f"{top}.py").exists() for top in tops
+    )
 
 
 def _topics_of(system: System) -> Iterator[tuple[Instance, str, str, bool]]:

@@ -6,14 +6,16 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 
 from volery.analysis.system_analysis import analyse
-from volery.base.errors import EstimateError, Location, UsageError
+from volery.base.errors import EstimateError, Location, UsageError, choices
 from volery.base.time import to_seconds
 from volery.components.cpp.compiler import COMPILER_HINT, has_compiler
+from volery.cost import load_catalogue
 from volery.model import rules
 from volery.model.components import CPP_LANGUAGES
 from volery.model.instances import Instance
 from volery.model.rules import Finding
-from volery.model.system import Bound, System
+from volery.model.system import Bound, Processor, System
+from volery.run.assembly.computers import commanded_by, is_node
 
 _SHARES = ("utilisation", "battery_min")
 
@@ -82,11 +84,78 @@ def memory(system: System) -> Iterator[Finding]:
 
 
 def requirements(system: System) -> Iterator[Finding]:
-    """Find requirements that no run can meet, or that every run meets."""
+    """Find requirements that no run can meet, that every run meets, or of which nothing is observed."""
     for bound in system.requirements:
-        why = _unreachable(system, bound)
+        why = _unobserved(system, bound) or _unreachable(system, bound)
         if why:
             yield Finding(rules.UNREACHABLE, why, f"requirements.{bound.name}", bound.where)
+
+
+def _unobserved(system: System, bound: Bound) -> str:
+    """Return why nothing can be observed of what a bound is about; empty if something can."""
+    subject, _, quantity = bound.observe.rpartition(".")
+    name, _, operation = subject.partition(".")
+    instance = next((one for one in system.instances if one.name == name), None)
+    if instance is not None:
+        of_calls = operation or quantity.startswith("call")
+        return (
+            _no_calls(system, instance, quantity) if of_calls else _no_computing(system, instance, quantity)
+        )
+    if quantity in ("energy", "computing_energy"):
+        return _without_power(
+            system, [one for one in system.processors if subject in (one.name, "application")]
+        )
+    network = next((one for one in system.networks if one.name == subject), None)
+    if network is not None and quantity.startswith("delay"):
+        places = {*(one.processor for one in system.instances), *(one.processor for one in system.vehicles)}
+        used = places & {*network.between}
+        if len(used) < 2:
+            return f"nothing is sent over {network.name}: fewer than two of its processors execute anything"
+    if any(one.name == subject for one in system.vehicles) and quantity in _COMMANDED:
+        return _uncommanded(system, subject)
+    return ""
+
+
+_COMMANDED = ("landing_offset", "goto_error", "goto_error_vertical", "goto_error_by_estimate")
+"""Quantities of the operations that components command of a vehicle."""
+
+
+def _no_calls(system: System, instance: Instance, quantity: str) -> str:
+    """Return why no call of an instance is observed; calls of ROS services are known when it runs."""
+    targets = {
+        target.name for one in system.instances for connection in one.connections.values()
+        for target in connection.targets
+    }  # fmt: skip
+    if instance.name in targets or is_node(instance) or quantity in ("calls", "failures"):
+        return ""
+    return f"nothing is connected to {instance.name}: no operation of it is called"
+
+
+def _no_computing(system: System, instance: Instance, quantity: str) -> str:
+    name = instance.name
+    if quantity in ("cpu_time", "utilisation", "energy") and instance.processor is None:
+        return f"{name} is allocated to no processor: its computing is not counted"
+    if quantity == "energy":
+        return _without_power(system, [one for one in system.processors if one.name == instance.processor])
+    if quantity.startswith("response_time") and instance.activity is None:
+        return _no_calls(system, instance, quantity)
+    if quantity == "deadline_misses" and (instance.activity is None or instance.activity.deadline_ns is None):
+        return f"{name} has no deadline: there is nothing to judge"
+    if quantity == "period_violations" and (instance.activity is None or instance.activity.period_ns is None):
+        return f"{name} has no period: there is nothing to judge"
+    return ""
+
+
+def _without_power(system: System, processors: list[Processor]) -> str:
+    catalogue = load_catalogue(*system.catalogues).processors
+    unknown = [f"{one.name} ({one.kind})" for one in processors if catalogue[one.kind].power is None]
+    return f"nothing is known of the power of {choices(unknown)}: no energy is computed" if unknown else ""
+
+
+def _uncommanded(system: System, vehicle: str) -> str:
+    if any(vehicle in commanded_by(one) or is_node(one) for one in system.instances):
+        return ""
+    return f"no component commands {vehicle}: it does not fly anywhere"
 
 
 def _unreachable(system: System, bound: Bound) -> str:
@@ -120,11 +189,6 @@ def _unreachable_minimum(system: System, bound: Bound, quantity: str) -> str:
 
 
 def _unreachable_times(system: System, instance: Instance, quantity: str, bound: Bound) -> str:
-    deadline = instance.activity.deadline_ns if instance.activity is not None else None
-    if quantity == "deadline_misses" and deadline is None:
-        return f"{instance.name} has no deadline: there is nothing to judge"
-    if quantity == "period_violations" and (instance.activity is None or instance.activity.period_ns is None):
-        return f"{instance.name} has no period: there is nothing to judge"
     if instance.activity is None or not quantity.startswith("response_time") or instance.processor is None:
         return ""
     processor = system.processor(instance.processor)

@@ -266,6 +266,8 @@ def start(
     instance.on_failure = failed
 
     def body() -> None:
+        if not active and (task := instance.kernel.current()) is not None:
+            task.is_activated, task.released = False, None  # to be constructed is no response to anything
         made = instance.run_guarded(lambda: instance.set_object(program.make(given)), "its constructor")
         if not made:
             instance.set_unavailable("its constructor has failed")

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from volery.base.errors import LinkLost, UsageError
 from volery.base.time import Ns, S, to_seconds
 from volery.kernel.waiting import current_task
+from volery.trace.events import NONE, Transmission
 
 if TYPE_CHECKING:
     from random import Random
@@ -27,10 +28,11 @@ if TYPE_CHECKING:
 class Transfer:
     """A reliable transfer in progress; those of one `queue` must arrive in order."""
 
-    __slots__ = ("arrived", "deliver", "next", "queue", "size")
+    __slots__ = ("arrived", "begun", "deliver", "next", "occupied", "queue", "size")
 
-    def __init__(self, size: int, deliver: Action, queue: deque[Transfer]) -> None:
-        self.size, self.deliver, self.queue = size, deliver, queue
+    def __init__(self, begun: Ns, size: int, deliver: Action, queue: deque[Transfer]) -> None:
+        self.begun, self.size, self.deliver, self.queue = begun, size, deliver, queue
+        self.occupied: Ns = 0
         self.next: Handle | None = None
         self.arrived = False
 
@@ -83,16 +85,24 @@ class Network:
 
     def send(self, size: int, deliver: Action, lost: Action | None = None) -> None:
         """Send best-effort: call `deliver` at the arrival, or `lost` at that time. Never blocks."""
+        sent = self._kernel.now()
         _, arrival, is_lost = self._transmit(size)
         if not is_lost:
-            self._kernel.call_at(arrival, deliver)
-        elif lost is not None:
+            self._kernel.call_at(arrival, partial(self._deliver, sent, size, deliver))
+            return
+        self._kernel.record(Transmission(sent, NONE, self.serialisation(size), self.name, size))
+        if lost is not None:
             self._kernel.call_at(arrival, lost)
+
+    def _deliver(self, sent: Ns, size: int, deliver: Action) -> None:
+        kernel = self._kernel
+        kernel.record(Transmission(sent, kernel.now(), self.serialisation(size), self.name, size))
+        deliver()
 
     def send_reliable(self, size: int, deliver: Action, stream: str = "") -> None:
         """Send until it arrives, then call `deliver`. Transfers of one `stream` are delivered in order."""
         queue = self._queues.setdefault(stream, deque()) if stream else deque()
-        self._begin(Transfer(size, deliver, queue))
+        self._begin(Transfer(self._kernel.now(), size, deliver, queue))
 
     def carry(self, size: int, deadline: Ns | None = None) -> None:
         """Block the current task until `size` bytes have arrived, repeated as often as necessary.
@@ -103,7 +113,7 @@ class Network:
         with self._kernel as kernel:
             task = current_task(kernel)
             start = kernel.now()
-            transfer = Transfer(size, lambda: kernel.wake(task), deque())
+            transfer = Transfer(start, size, lambda: kernel.wake(task), deque())
             self._begin(transfer)
             try:
                 while not transfer.arrived:
@@ -113,6 +123,7 @@ class Network:
             finally:
                 if not transfer.arrived and transfer.next is not None:
                     transfer.next.cancel()
+                    kernel.record(Transmission(start, NONE, transfer.occupied, self.name, size))
 
     def _begin(self, transfer: Transfer) -> None:
         transfer.queue.append(transfer)
@@ -120,6 +131,7 @@ class Network:
 
     def _try(self, transfer: Transfer) -> None:
         start, arrival, is_lost = self._transmit(transfer.size)
+        transfer.occupied += self.serialisation(transfer.size)
         if is_lost:
             again = start + 2 * self._latency + self.serialisation(transfer.size)
             transfer.next = self._kernel.call_at(again, partial(self._try, transfer))
@@ -130,4 +142,6 @@ class Network:
         transfer.arrived = True
         queue = transfer.queue
         while queue and queue[0].arrived:
-            queue.popleft().deliver()
+            first, now = queue.popleft(), self._kernel.now()
+            self._kernel.record(Transmission(first.begun, now, first.occupied, self.name, first.size))
+            first.deliver()

@@ -77,6 +77,7 @@ class Task:
         self.released: Ns | None = None  # release time of the activation in progress
         self.counted_from: Ns = 0  # the next release is due a period after this
         self.readings: dict[object, Ns] = {}  # last reading of the clock in this activation, by its place
+        self.is_activated = True  # False while what it does belongs to no activation, as a construction
         self.done = False
         self.adopted = False  # the flow of a script: the kernel did not start it and cannot end it
         self.flow: Any = None
@@ -108,6 +109,8 @@ class Task:
             due: Its release, ns.
             counted_from: Time from which the next release counts, ns; by default `due`.
         """
+        if not self.is_activated:
+            return
         self.released = due
         self.counted_from = due if counted_from is None else counted_from
         self.readings.clear()

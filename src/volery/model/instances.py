@@ -75,7 +75,7 @@ class Connection:
 # -- connections
 
 
-def _component_of(reading: Reading, instance: str) -> Component | None:
+def component_of(reading: Reading, instance: str) -> Component | None:
     """Return the component of an instance, None if that is unknown."""
     node = reading.root.at((*APPLICATION, instance, "is")) or reading.root.at((*AROUND, instance, "is"))
     return reading.once(library).get(str(node.value)) if node is not None else None
@@ -101,7 +101,7 @@ def _candidates(reading: Reading, interface: str) -> str:
         names = [
             f"{name}.{port}"
             for name in reading.names(AROUND, APPLICATION)
-            if (component := _component_of(reading, name)) is not None
+            if (component := component_of(reading, name)) is not None
             for port, provided in component.provides.items()
             if provided == interface
         ]
@@ -116,7 +116,7 @@ class _Connections(Syntax):
 
     def read(self, node: Node, path: Path, reading: Reading) -> dict[str, Connection]:
         """See ``Syntax``. *path* is that of the instance."""
-        component = _component_of(reading, str(path[-1]))
+        component = component_of(reading, str(path[-1]))
         if component is None:  # reported where the instance names it
             return {}
         found = {}
@@ -186,7 +186,7 @@ def _instance_target(reading: Reading, path: Path, interface: str, text: str) ->
     name, dot, port = text.partition(".")
     if not reading.known(path, name, "component instance", reading.names(AROUND, APPLICATION)):
         return None
-    component = _component_of(reading, name)
+    component = component_of(reading, name)
     if component is None:  # what is wrong with it has been reported
         return None
     if dot and component.provides.get(port) == interface:
@@ -280,7 +280,7 @@ class Instance:
 def _with_component(node: Node, path: Path, reading: Reading) -> Node:
     """Add the entries of the component under the instance's own parameters and activity."""
     component = reading.root.at((*LIBRARY, str(node.items["is"].value))) if "is" in node.items else None
-    if component is None or _component_of(reading, str(path[-1])) is None:
+    if component is None or component_of(reading, str(path[-1])) is None:
         return node
     merged = dict(node.items)
     for key in ("parameters", "active"):

@@ -28,8 +28,8 @@ NOTE_PREFIX = "note"
 class Observable:
     """A quantity that requirements may bound: ``<subject>.<quantity>``.
 
-    ``subject`` is the kind of the observed thing: ``component``, ``processor``, ``vehicle``, ``chain`` or
-    ``application``. An empty ``unit`` stands for a count or a share.
+    ``subject`` is the kind of the observed thing: ``component``, ``operation``, ``processor``, ``network``,
+    ``vehicle``, ``chain`` or ``application``. An empty ``unit`` stands for a count or a share.
     """
 
     subject: str

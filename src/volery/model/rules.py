@@ -266,6 +266,13 @@ BAD_ROS_NAME = _rule(
     "Letters, digits, _ and /, no digit after a /.",
 )
 
+NOT_SUBSCRIBED = _warning(
+    "V505",
+    "topic-not-subscribed",
+    "A topic of a chain that no component subscribes to.",
+    "Correct the name or the `remap`, or end the chain before it.",
+)
+
 # -- requirements
 
 UNKNOWN_OBSERVABLE = _rule(
@@ -280,8 +287,8 @@ BAD_BOUND = _rule(
 UNREACHABLE = _warning(
     "V603",
     "unreachable-requirement",
-    "A requirement that no run can meet, or that every run meets.",
-    "Correct the bound, the number of orders, or the duration of the run.",
+    "A requirement that no run can meet, that every run meets, or of which nothing is observed.",
+    "Correct the subject, the bound, the number of orders, or the duration of the run.",
 )
 
 # -- code

@@ -43,7 +43,7 @@ from volery.model.fields import (
     Whole,
     WrongValueError,
 )
-from volery.model.instances import Instance
+from volery.model.instances import Instance, component_of
 from volery.model.reading import NOTE_PREFIX, Observable, Provenance, Reading
 from volery.model.resources import (
     CACHES,
@@ -180,6 +180,7 @@ class Chain:
 
     name: str
     topics: tuple[str, ...]
+    where: Location | None = field(default=None, compare=False)
 
 
 class _Chain(Syntax):
@@ -194,7 +195,7 @@ class _Chain(Syntax):
             if not topic.startswith("/"):
                 what = f"{topic!r}: write a topic's full name, such as '/{topic}'"
                 reading.problems.add((*path, place), what, rule=rules.BAD_ROS_NAME)
-        return Chain(str(path[-1]), topics)
+        return Chain(str(path[-1]), topics, node.where)
 
     def schema(self, definitions: Schema) -> Schema:
         """See ``Syntax``."""
@@ -280,20 +281,39 @@ def _observable(reading: Reading, path: Path, text: str) -> Observable | None:
         return _noted(reading, path, text)
     subject, _, quantity = text.rpartition(".")
     kinds = {
+        **dict.fromkeys(reading.names(("platform", "networks")), "network"),
         "application": "application",
         **dict.fromkeys(reading.names(("application",), ("environment", "components")), "component"),
         **dict.fromkeys(reading.names(("platform", "processors")), "processor"),
         **dict.fromkeys(reading.names(("environment", "vehicles")), "vehicle"),
         **dict.fromkeys(reading.names(("chains",)), "chain"),
     }
-    if not reading.known(path, subject, "subject to observe", kinds, rules.UNKNOWN_OBSERVABLE):
+    owner, dot, operation = subject.partition(".")
+    if dot and kinds.get(owner) == "component":
+        if not _is_operation(reading, path, owner, operation):
+            return None
+        kind = "operation"
+    elif reading.known(path, subject, "subject to observe", kinds, rules.UNKNOWN_OBSERVABLE):
+        kind = kinds[subject]
+    else:
         return None
-    kind = kinds[subject]
     offered = {one.quantity: one for one in reading.vocabulary.observables if one.subject == kind}
     noun = f"quantity of a {kind}"
     return (
         offered[quantity] if reading.known(path, quantity, noun, offered, rules.UNKNOWN_OBSERVABLE) else None
     )
+
+
+def _is_operation(reading: Reading, path: Path, instance: str, operation: str) -> bool:
+    """Return whether an instance provides an operation; the services of a ROS node are known when it runs."""
+    component = component_of(reading, instance)
+    if component is None or component.language in ROS_LANGUAGES:
+        return True
+    provided = [
+        name for interface in component.provides.values() for name in reading.names(("interfaces", interface))
+    ]
+    noun = f"operation of {instance}"
+    return reading.known(path, operation, noun, provided, rules.UNKNOWN_OBSERVABLE)
 
 
 def _noted(reading: Reading, path: Path, text: str) -> Observable | None:

@@ -6,9 +6,8 @@ Memory does not grow with time, only with the number of parts of the run and of 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
-from math import fsum
 from typing import Any, NamedTuple
 
 from volery.base.time import Ns, to_seconds
@@ -19,6 +18,7 @@ from volery.requirements.ledgers import (
     VehicleLedger,
     known,
     linear_energy,
+    processor_energy,
 )
 from volery.requirements.record import (
     ComponentRecord,
@@ -245,7 +245,9 @@ class Accounts:
         """Return the records of components, without the framework's own tasks, which are not set up."""
         bounds = self._response_bounds()
         return {
-            name: ledger.record(self._above_idle(ledger.processor), bounds.get(name))
+            name: ledger.record(
+                ledger.energy(self._processors.get(ledger.processor), self._energy), bounds.get(name)
+            )
             for name, ledger in self._components.items()
             if ledger.processor or name in self._declared
         }
@@ -265,15 +267,9 @@ class Accounts:
             for (processor, preempted, by), count in often
         ]
 
-    def _above_idle(self, processor: str) -> Callable[[float], float | None]:
-        setup = self._processors.get(processor)
-        return lambda busy_s: None if setup is None else self._energy(setup, busy_s, 0.0)
-
     def _processor_record(self, name: str, elapsed: float) -> ProcessorRecord:
         setup = self._processors[name]
-        mine = [ledger for ledger in self._components.values() if ledger.processor == name]
-        by_law = self._energy(setup, fsum(ledger.unpriced_s() for ledger in mine), elapsed)
-        stated = fsum(ledger.stated_j for ledger in mine)
+        joules = processor_energy(setup, self._components.values(), elapsed, self._energy)
         busy = to_seconds(self._busy[name])
         return ProcessorRecord(
             kind=setup.kind,
@@ -281,8 +277,8 @@ class Accounts:
             scheduler=setup.scheduler,
             cores=setup.cores,
             utilisation=busy / (elapsed * setup.cores) if elapsed else 0.0,
-            energy_j=None if by_law is None else by_law + stated,
-            energy_error=None if by_law is None else setup.power_error,
+            energy_j=joules,
+            energy_error=None if joules is None else setup.power_error,
         )
 
     def _requirements(self) -> dict[str, RequirementRecord]:

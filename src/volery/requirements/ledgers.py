@@ -13,9 +13,9 @@ Delay Calculation*, CRTS 2008.)
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from math import hypot, isnan, sqrt
+from math import fsum, hypot, isnan, sqrt
 
 from volery.base.time import Ns, to_seconds
 from volery.requirements.record import (
@@ -146,19 +146,20 @@ class ComponentLedger:
         """Return whether the component was active without any execution time of its own."""
         return not self.charges and bool(self.activations.count or self.calls.count)
 
-    def record(
-        self, energy: Callable[[float], float | None], response_bound: Ns | None = None
-    ) -> ComponentRecord:
-        """Return the record; *energy* gives joules above idle for busy core-seconds of the processor."""
-        unpriced = self.unpriced_s()
-        by_law = energy(unpriced)
+    def energy(self, processor: ProcessorSetup | None, law: EnergyLaw) -> float | None:
+        """Return joules: what the model states of its operations, else what *law* gives above idle."""
+        by_law = None if processor is None else law(processor, self.unpriced_s(), 0.0)
+        return None if by_law is None else self.stated_j + by_law
+
+    def record(self, energy_j: float | None, response_bound: Ns | None = None) -> ComponentRecord:
+        """Return the record."""
         return ComponentRecord(
             processor=self.processor,
             language=self.setup.language,
             cpu_s=to_seconds(self.executed),
             ros_cpu_s=to_seconds(min(self.ros, self.executed)),  # calls charged last may not have executed
             ros_calls=dict(sorted(self.ros_calls.items())),
-            energy_j=None if by_law is None else self.stated_j + by_law,
+            energy_j=energy_j,
             activations=self.activations.count,
             deadline_misses=self.misses,
             calls=self.calls.count,
@@ -166,18 +167,32 @@ class ComponentLedger:
             response_bound_s=None if response_bound is None else to_seconds(response_bound),
         )
 
+    def responses(self) -> Distribution:
+        """Return its response times: a passive component responds to calls, an active one to releases."""
+        first, other = (self.activations, self.calls) if self.setup.active else (self.calls, self.activations)
+        return first if first.count else other
+
     def _response(self) -> ResponseRecord:
-        spread = self.activations if self.activations.count else self.calls
+        spread = self.responses()
         mean, p95 = spread.mean(), spread.quantile(0.95)
         if mean is None or p95 is None:
             return ResponseRecord()
         return ResponseRecord(
-            of="activations" if self.activations.count else "calls",
+            of="activations" if spread is self.activations else "calls",
             count=spread.count,
             mean=mean * 1e-9,
             p95=to_seconds(p95),
             max=to_seconds(spread.largest),
         )
+
+
+def processor_energy(
+    processor: ProcessorSetup, ledgers: Iterable[ComponentLedger], elapsed_s: float, law: EnergyLaw
+) -> float | None:
+    """Return joules of a processor over *elapsed_s*, with what is stated of the *ledgers* allocated to it."""
+    here = [one for one in ledgers if one.processor == processor.name]
+    by_law = law(processor, fsum(one.unpriced_s() for one in here), elapsed_s)
+    return None if by_law is None else by_law + fsum(one.stated_j for one in here)
 
 
 @dataclass

@@ -12,25 +12,34 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isnan, nan
+from math import fsum, isnan, nan
 from typing import Any
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns, S, to_seconds
 from volery.model.reading import NOTE_PREFIX, Observable
 from volery.requirements.accounts import DELIVERED, FAILED, ORDERED, PARCEL
-from volery.requirements.ledgers import ChainLedger, ComponentLedger, Distribution, VehicleLedger
+from volery.requirements.ledgers import (
+    ChainLedger,
+    ComponentLedger,
+    Distribution,
+    VehicleLedger,
+    linear_energy,
+    processor_energy,
+)
 from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
 from volery.trace.events import (
     NONE,
     Activation,
     Call,
+    Charge,
     Event,
     Failure,
     Message,
     Milestone,
     Operation,
     Slice,
+    Transmission,
     VehicleState,
 )
 
@@ -75,10 +84,11 @@ Make = Callable[[str, RunSetup], Observer]
 
 
 def _response(reading: Callable[[Distribution], float | None]) -> Make:
-    """Observe activations from release to end; without any, calls from the call to its return."""
+    """Observe the responses of a component: see ``ComponentLedger.responses``."""
 
     def make(component: str, setup: RunSetup) -> Observer:
-        ledger = ComponentLedger(ComponentSetup(component), "")
+        known = next((one for one in setup.components if one.name == component), ComponentSetup(component))
+        ledger = ComponentLedger(known, "")
 
         def take(event: Activation | Call) -> None:
             if isinstance(event, Activation):
@@ -87,12 +97,42 @@ def _response(reading: Callable[[Distribution], float | None]) -> Make:
             elif event.callee == component:
                 ledger.call(event)
 
-        def value(at: Ns) -> float:
-            return _seconds(reading(ledger.activations if ledger.activations.count else ledger.calls))
-
-        return Observer((Activation, Call), take, value)
+        return Observer((Activation, Call), take, lambda at: _seconds(reading(ledger.responses())))
 
     return make
+
+
+def _serves(subject: str) -> Callable[[Call], bool]:
+    """Return what is true for the calls of a component, or of ``<component>.<operation>``.
+
+    A ROS service is an operation by the last word of its name.
+    """
+    component, _, operation = subject.partition(".")
+    return lambda event: event.callee == component and operation in ("", event.operation.rpartition("/")[2])
+
+
+def _call_times(reading: Callable[[Distribution], float | None]) -> Make:
+    """Observe the calls that a component, or one operation of it, served, as their callers saw them."""
+
+    def make(subject: str, setup: RunSetup) -> Observer:
+        mine, spread = _serves(subject), Distribution()
+
+        def take(event: Call) -> None:
+            if mine(event):
+                spread.add(event.end - event.start)
+
+        return Observer((Call,), take, lambda at: _seconds(reading(spread)))
+
+    return make
+
+
+def _calls(subject: str, setup: RunSetup) -> Observer:
+    return _count(Call, _serves(subject))
+
+
+def _failed_calls(subject: str, setup: RunSetup) -> Observer:
+    mine = _serves(subject)
+    return _count(Call, lambda event: mine(event) and event.outcome != OK)
 
 
 def _seconds(nanoseconds: float | None) -> float:
@@ -185,6 +225,85 @@ def _utilisation(processor: str, setup: RunSetup) -> Observer:
     return _busy(
         lambda event: event.processor == processor, lambda busy, elapsed: busy / (elapsed * known.cores)
     )
+
+
+# -- energy of computing
+
+
+def _energy(reading: Callable[[_Computing, str, float], float | None]) -> Make:
+    def make(subject: str, setup: RunSetup) -> Observer:
+        computing = _Computing(setup)
+
+        def value(at: Ns) -> float:
+            joules = reading(computing, subject, to_seconds(at))
+            return nan if joules is None else joules
+
+        return Observer((Slice, Charge), computing.take, value)
+
+    return make
+
+
+class _Computing:
+    """What energy is computed of: the ledgers of all components, and the processors."""
+
+    def __init__(self, setup: RunSetup) -> None:
+        self.ledgers = {one.name: ComponentLedger(one, one.processor) for one in setup.components}
+        self.processors = {one.name: one for one in setup.processors}
+
+    def take(self, event: Slice | Charge) -> None:
+        name = event.component
+        ledger = self.ledgers.get(name)
+        if ledger is None:
+            ledger = self.ledgers[name] = ComponentLedger(ComponentSetup(name), event.processor)
+        if isinstance(event, Slice):
+            ledger.executed += event.end - event.start
+        else:
+            ledger.charge(event)
+
+    def of_component(self, name: str, elapsed_s: float) -> float | None:
+        ledger = self.ledgers.get(name)
+        return None if ledger is None else ledger.energy(self.processors.get(ledger.processor), linear_energy)
+
+    def of_processor(self, name: str, elapsed_s: float) -> float | None:
+        known = self.processors.get(name)
+        if known is None:
+            return None
+        return processor_energy(known, self.ledgers.values(), elapsed_s, linear_energy)
+
+    def of_all(self, name: str, elapsed_s: float) -> float | None:
+        """Return the energy of all processors; None if one of them has no figures."""
+        found = [self.of_processor(one, elapsed_s) for one in self.processors]
+        return None if None in found or not found else fsum(one for one in found if one is not None)
+
+
+# -- networks
+
+
+def _network_utilisation(network: str, setup: RunSetup) -> Observer:
+    occupied = [0]
+
+    def take(event: Transmission) -> None:
+        if event.network == network:
+            occupied[0] += event.occupied
+
+    return Observer((Transmission,), take, lambda at: min(1.0, occupied[0] / at) if at else nan)
+
+
+def _delay(reading: Callable[[Distribution], float | None]) -> Make:
+    def make(network: str, setup: RunSetup) -> Observer:
+        spread = Distribution()
+
+        def take(event: Transmission) -> None:
+            if event.network == network and event.received != NONE:
+                spread.add(event.received - event.sent)
+
+        return Observer((Transmission,), take, lambda at: _seconds(reading(spread)))
+
+    return make
+
+
+def _lost_on(network: str, setup: RunSetup) -> Observer:
+    return _count(Transmission, lambda event: event.network == network and event.received == NONE)
 
 
 # -- vehicles
@@ -317,7 +436,7 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
         "component",
         "response_time",
         "s",
-        "longest response: of activations from release to end, else of calls served",
+        "longest response: an active component's activation from release to end, a passive one's call",
         _response(_largest),
     ),
     ("component", "response_time_mean", "s", "mean response", _response(Distribution.mean)),
@@ -346,7 +465,53 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
         _component_utilisation,
     ),
     ("component", "failures", "", "number of its failures", _component_failures),
+    (
+        "component",
+        "call_time",
+        "s",
+        "longest call that it served, as the caller saw it",
+        _call_times(_largest),
+    ),
+    ("component", "call_time_mean", "s", "mean call", _call_times(Distribution.mean)),
+    (
+        "component",
+        "call_time_p95",
+        "s",
+        "call that 95 % do not exceed, at most 0.2 % too high",
+        _call_times(_p95),
+    ),
+    ("component", "calls", "", "calls that it served", _calls),
+    (
+        "component",
+        "energy",
+        "J",
+        "energy of its computing: stated for its operations, else above its idle processor",
+        _energy(_Computing.of_component),
+    ),
+    ("operation", "response_time", "s", "longest call, as the caller saw it", _call_times(_largest)),
+    ("operation", "response_time_mean", "s", "mean call", _call_times(Distribution.mean)),
+    (
+        "operation",
+        "response_time_p95",
+        "s",
+        "call that 95 % do not exceed, at most 0.2 % too high",
+        _call_times(_p95),
+    ),
+    ("operation", "calls", "", "calls", _calls),
+    ("operation", "failures", "", "calls that ended with an error", _failed_calls),
     ("processor", "utilisation", "", "busy share of all its cores over the run, 0..1", _utilisation),
+    ("processor", "energy", "J", "energy over the run, idle and busy", _energy(_Computing.of_processor)),
+    (
+        "network",
+        "utilisation",
+        "",
+        "share of the run in which the medium was taken, 0..1",
+        _network_utilisation,
+    ),
+    ("network", "delay", "s", "longest time from the sender's request to the delivery", _delay(_largest)),
+    ("network", "delay_mean", "s", "mean delay", _delay(Distribution.mean)),
+    ("network", "delay_p95", "s", "delay that 95 % do not exceed, at most 0.2 % too high", _delay(_p95)),
+    ("network", "lost", "", "transmissions that never arrived", _lost_on),
     (
         "vehicle",
         "landing_offset",
@@ -412,6 +577,13 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
         "mean time from a parcel's first state to its delivery",
         _delivery_time(Distribution.mean),
     ),
+    (
+        "application",
+        "computing_energy",
+        "J",
+        "energy of all computers over the run, idle and busy",
+        _energy(_Computing.of_all),
+    ),
     ("application", "messages_lost", "", "ROS messages lost on the way", _lost_messages),
     ("application", "failures", "", "failures of components and of the run", _failures),
 )
@@ -462,11 +634,14 @@ def make_observer(expression: str, setup: RunSetup | None = None) -> Observer:
 def _kind(subject: str, quantity: str, setup: RunSetup) -> str:
     if subject == "application":
         return subject
+    if "." in subject:
+        return "operation"
     for kind, things in (
         ("component", setup.components),
         ("processor", setup.processors),
         ("vehicle", setup.vehicles),
         ("chain", setup.chains),
+        ("network", setup.networks),
     ):
         if any(one.name == subject for one in things):
             return kind

@@ -34,7 +34,10 @@ class OutcomeRecord(_Part):
 
 
 class ResponseRecord(_Part):
-    """Response times in seconds: of activations from release to end, else of calls as callers saw them."""
+    """Response times in seconds: of an active component's activations, of a passive one's calls.
+
+    Activations from release to end, calls as callers saw them. Where there are none, it is of the other kind.
+    """
 
     of: Literal["activations", "calls"] | None = None
     count: int = 0

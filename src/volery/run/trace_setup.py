@@ -20,6 +20,7 @@ from volery.trace.attachments import (
     ComponentSetup,
     LawSetup,
     Line,
+    NetworkSetup,
     Origin,
     Place,
     ProcessorSetup,
@@ -52,6 +53,7 @@ def setup_of(system: System, platform: Platform, seed: int, fidelity: str) -> Ru
             *_vehicle_nodes(system),
         ),
         processors=tuple(_processor(model, platform.prices[model.name]) for model in system.processors),
+        networks=tuple(NetworkSetup(one.name) for one in system.networks),
         vehicles=tuple(VehicleSetup(one.name, one.autopilot, one.kind) for one in system.vehicles),
         chains=tuple(ChainSetup(one.name, one.topics) for one in system.chains),
         requirements=tuple(

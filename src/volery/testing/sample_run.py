@@ -43,6 +43,7 @@ from volery.trace.events import (
     Published,
     Slice,
     Text,
+    Transmission,
     VehicleState,
     Verdict,
 )
@@ -267,6 +268,7 @@ def _cdr_string(text: str) -> bytes:
 def _talk(now: Ns) -> Iterator[Event]:
     data = _cdr_string("GUIDED")
     yield Published(now, "/drone_1/state", "std_msgs/msg/String", "drone_1", data)
+    yield Transmission(now, now + 3 * MS, MS, "radio", len(data))
     yield Message(now, now + 3 * MS, "/drone_1/state", "drone_1", "drone_control", len(data))
     lost = now % (30 * S) == 0
     yield Message(now, NONE if lost else now + 22 * MS, "/drone_1/state", "drone_1", "central", len(data))

@@ -109,6 +109,13 @@ class ProcessorSetup:
 
 
 @dataclass(frozen=True)
+class NetworkSetup:
+    """A network that joins processors."""
+
+    name: str
+
+
+@dataclass(frozen=True)
 class VehicleSetup:
     """A vehicle: ``kind`` is ``multirotor`` or ``rover``; ``autopilot`` the firmware that flies it."""
 
@@ -163,6 +170,7 @@ class RunSetup:
     seed: int = 0
     components: tuple[ComponentSetup, ...] = ()
     processors: tuple[ProcessorSetup, ...] = ()
+    networks: tuple[NetworkSetup, ...] = ()
     vehicles: tuple[VehicleSetup, ...] = ()
     chains: tuple[ChainSetup, ...] = ()
     requirements: tuple[RequirementSetup, ...] = ()

@@ -89,6 +89,19 @@ class Message(NamedTuple):
     size: int
 
 
+class Transmission(NamedTuple):
+    """Bytes went over a network: from the sender's request to the delivery, or lost (``received == NONE``).
+
+    ``occupied`` is how long the medium was taken, repetitions included.
+    """
+
+    sent: Ns
+    received: Ns
+    occupied: Ns
+    network: str
+    size: int
+
+
 class Published(NamedTuple):
     """The content of a ROS message as it was published, already in ROS 2 CDR encoding."""
 
@@ -239,6 +252,7 @@ Event = (
     | Activation
     | Call
     | Message
+    | Transmission
     | Published
     | VehicleState
     | Operation

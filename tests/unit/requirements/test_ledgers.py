@@ -85,20 +85,22 @@ def test_charges_of_ros_calls_of_code_and_of_stated_energy() -> None:
     )
     assert ledger.charges == 2
     assert ledger.unpriced_s() == 0.09
-    record = ledger.record(lambda busy_s: 2.0 * busy_s, 40 * MS)
+    onboard = ProcessorSetup("onboard")
+    record = ledger.record(ledger.energy(onboard, lambda processor, busy_s, elapsed: 2.0 * busy_s), 40 * MS)
     assert record.cpu_s == 0.1
     assert record.ros_cpu_s == 0.013
     assert list(record.ros_calls.items()) == [("param", 1), ("publish", 4)]
     assert record.energy_j == pytest.approx(0.5 + 2.0 * 0.09)
     assert record.response_bound_s == 0.04
-    assert ledger.record(lambda busy_s: None).energy_j is None
-    assert ledger.record(lambda busy_s: None).response_bound_s is None
+    assert ledger.energy(None, linear_energy) is None
+    assert ledger.record(None).energy_j is None
+    assert ledger.record(None).response_bound_s is None
 
 
 def test_ros_calls_take_no_more_than_what_was_executed() -> None:
     """Calls that were charged at the end of a run have not been executed."""
     ledger = component(Charge(0, "control", "onboard", "ros:publish", 3 * MS, 0, 0.0), executed=2 * MS)
-    assert ledger.record(lambda busy_s: None).ros_cpu_s == 0.002
+    assert ledger.record(None).ros_cpu_s == 0.002
 
 
 def test_more_stated_than_executed_leaves_nothing_for_the_law() -> None:
@@ -126,16 +128,20 @@ def test_a_deadline_is_missed_after_it_and_not_at_it() -> None:
     assert ledger.misses == 2
 
 
-def test_responses_are_of_activations_and_without_them_of_calls() -> None:
+def test_a_passive_component_responds_to_calls_and_an_active_one_to_releases() -> None:
     calls = [Call(S, S + n * MS, "a", "control", "ask", "ok") for n in range(1, 101)]
-    spread = component(*calls).record(lambda busy_s: None).response_s
+    release = Activation(2 * S, 2 * S + 7 * MS, "control", NONE)
+    spread = component(*calls, release).record(None).response_s
     assert (spread.of, spread.count, spread.max) == ("calls", 100, 0.1)
     assert spread.mean == pytest.approx(0.0505)
     assert spread.p95 == pytest.approx(0.095, rel=2e-3)
-    one = component(*calls, Activation(2 * S, 2 * S + 7 * MS, "control", NONE))
-    spread = one.record(lambda busy_s: None).response_s
+    spread = component(release).record(None).response_s  # a node that has callbacks only
     assert (spread.of, spread.count, spread.mean) == ("activations", 1, 0.007)
-    assert component().record(lambda busy_s: None).response_s.count == 0
+    active = component(*calls, release)
+    active.setup = ComponentSetup("control", active=True)
+    spread = active.record(None).response_s
+    assert (spread.of, spread.count, spread.mean) == ("activations", 1, 0.007)
+    assert component().record(None).response_s.count == 0
 
 
 def test_energy_of_a_processor() -> None:
@@ -251,7 +257,7 @@ def test_a_chain_of_one_topic_is_the_latency_of_a_message() -> None:
 
 
 def test_a_component_that_did_nothing_has_used_nothing() -> None:
-    record = ComponentLedger(ComponentSetup("idle"), "onboard").record(lambda seconds: seconds)
+    record = ComponentLedger(ComponentSetup("idle"), "onboard").record(0.0)
     assert (record.cpu_s, record.ros_cpu_s, record.energy_j) == (0.0, 0.0, 0.0)
     assert (record.activations, record.deadline_misses, record.calls) == (0, 0, 0)
 

@@ -1,5 +1,6 @@
 """Observables: what each comes to, and the verdicts on bounds."""
 
+from dataclasses import replace
 from math import isnan, nan
 
 import pytest
@@ -10,9 +11,12 @@ from volery.base.units import unit
 from volery.model.system import Bound
 from volery.requirements.observables import OBSERVABLES, make_observer
 from volery.requirements.verdicts import Observers, bounds_of, judge
+from volery.run.result import Options
+from volery.run.simulate import simulate
 from volery.trace.attachments import (
     ChainSetup,
     ComponentSetup,
+    NetworkSetup,
     ProcessorSetup,
     RequirementSetup,
     RunSetup,
@@ -22,17 +26,20 @@ from volery.trace.events import (
     NONE,
     Activation,
     Call,
+    Charge,
     Failure,
     Message,
     Milestone,
     Operation,
     Slice,
+    Transmission,
     VehicleState,
 )
 
 SETUP = RunSetup(
-    components=(ComponentSetup("loop", period=100 * MS), ComponentSetup("server")),
+    components=(ComponentSetup("loop", active=True, period=100 * MS), ComponentSetup("server")),
     processors=(ProcessorSetup("onboard", cores=4),),
+    networks=(NetworkSetup("radio"),),
     vehicles=(VehicleSetup("drone_1", kind="multirotor"),),
     chains=(ChainSetup("chain", ("/a", "/b")),),
     requirements=(RequirementSetup("r", "loop.deadline_misses", "max", 0.0),),
@@ -89,9 +96,155 @@ def test_response_times_are_of_activations():
     assert observed("loop.response_time_p95", events) == pytest.approx(0.030, rel=2e-3)
 
 
-def test_response_times_are_of_calls_where_there_are_no_activations():
-    events = [Call(1 * S, 3 * S, "x", "server", "op", "ok"), Call(0, 9 * S, "server", "x", "op", "ok")]
+def test_response_times_of_a_passive_component_are_those_of_its_calls():
+    events = [
+        Activation(0, 1, "server", NONE),
+        Call(1 * S, 3 * S, "x", "server", "op", "ok"),
+        Call(0, 9 * S, "server", "x", "op", "ok"),
+    ]
     assert observed("server.response_time", events) == 2.0
+    assert observed("server.response_time", events[:1]) == 1e-9
+    assert isnan(observed("server.response_time", []))
+
+
+def test_calls_and_single_operations():
+    events = [
+        Call(0, 1 * S, "x", "loop", "look", "ok"),
+        Call(0, 3 * S, "x", "loop", "/loop/look", "ServiceError"),
+        Call(0, 7 * S, "x", "loop", "outlook", "ok"),
+        Call(0, 9 * S, "x", "server", "look", "ok"),
+    ]
+    assert observed("loop.look.response_time", events) == 3.0
+    assert observed("loop.look.response_time_mean", events) == 2.0
+    assert observed("loop.look.response_time_p95", events) == pytest.approx(3.0, rel=2e-3)
+    assert observed("loop.look.calls", events) == 2.0
+    assert observed("loop.look.failures", events) == 1.0
+    assert observed("loop.call_time", events) == 7.0
+    assert observed("loop.calls", events) == 3.0
+    assert isnan(observed("loop.point.response_time", events))
+
+
+def test_energy_of_components_processors_and_all_computers():
+    onboard = ProcessorSetup("onboard", cores=4, idle_w=2.0, busy_w=6.0)
+    ground = ProcessorSetup("ground", idle_w=10.0, busy_w=30.0)
+    setup = RunSetup(
+        components=(ComponentSetup("loop", processor="onboard"), ComponentSetup("server")),
+        processors=(onboard, ground),
+    )
+    events = [
+        Slice(0, 4 * S, "onboard", 0, "t", "loop"),
+        Charge(0, "loop", "onboard", "operation:look", 2 * S, 0, 5.0),
+        Slice(0, 1 * S, "ground", 0, "load", "ground (load)"),
+    ]
+
+    def energy(expression, setup=setup):
+        watching = make_observer(expression, setup)
+        for event in events:
+            watching(event)
+        return watching.value(10 * S)
+
+    assert energy("loop.energy") == pytest.approx(5.0 + 2 * 1.0)  # stated, and 2 s above idle
+    assert energy("onboard.energy") == pytest.approx(10 * 2.0 + 7.0)
+    assert energy("ground.energy") == pytest.approx(10 * 10.0 + 20.0)
+    assert energy("application.computing_energy") == pytest.approx(27.0 + 120.0)
+    assert isnan(energy("server.energy"))
+    dark = replace(setup, processors=(onboard, ProcessorSetup("ground")))
+    assert isnan(energy("application.computing_energy", dark))
+
+
+def test_utilisation_delay_and_loss_of_a_network():
+    events = [
+        Transmission(0, 30 * MS, 10 * MS, "radio", 100),
+        Transmission(50 * MS, 60 * MS, 10 * MS, "radio", 100),
+        Transmission(80 * MS, NONE, 30 * MS, "radio", 300),
+        Transmission(0, 1 * S, 1 * S, "wire", 100),
+    ]
+    assert observed("radio.utilisation", events, at=100 * MS) == pytest.approx(0.5)
+    assert observed("radio.delay", events) == pytest.approx(0.030)
+    assert observed("radio.delay_mean", events) == pytest.approx(0.020)
+    assert observed("radio.lost", events) == 1.0
+    assert isnan(observed("radio.delay", []))
+
+
+DESK = """\
+volery: 1
+name: desk
+interfaces: {Decode: {decode: {args: {code: str}, returns: str}, reset: {}}}
+components:
+  Decoder:
+    language: python
+    path: code.py
+    provides: {codes: Decode}
+    at: {processor: rpi4-cortex-a72, frequency: 1500 MHz}
+    operations: {decode: {time: 17 ms}, reset: {time: 1 ms}}
+  Asker:
+    language: python
+    path: code.py
+    requires: {codes: Decode}
+    active: {period: 100 ms}
+    at: {processor: rpi4-cortex-a72, frequency: 1500 MHz}
+    activation: {time: 1 ms}
+application:
+  decoder: {is: Decoder}
+  asker: {is: Asker, codes: decoder.codes}
+platform:
+  processors:
+    onboard: {is: rpi4-cortex-a72, frequency: 1500 MHz}
+    ground: {is: rpi4-cortex-a72, frequency: 1500 MHz}
+  networks: {radio: {between: [onboard, ground], bandwidth: 1 Mbit/s, latency: 2 ms}}
+allocations: {all: {decoder: onboard, asker: ground}}
+environment: {origin: {latitude: 43.47, longitude: -3.8}}
+requirements:
+  whole: {observe: decoder.response_time, max: 1 s}
+  one: {observe: decoder.reset.response_time, max: 1 s}
+  calls: {observe: decoder.decode.calls, min: 3}
+  served: {observe: decoder.activations, max: 0}
+  joules: {observe: application.computing_energy, max: 100 J}
+  mine: {observe: decoder.energy, max: 100 J}
+  air: {observe: radio.utilisation, max: 1}
+  delay: {observe: radio.delay, max: 1 s}
+run: {duration: 1 s}
+"""
+CODE = """\
+import volery
+
+
+class Decoder:
+    def decode(self, code):
+        return code
+
+    def reset(self):
+        pass
+
+
+class Asker:
+    def __init__(self, codes):
+        self.codes = codes
+
+    def run(self):
+        self.codes.reset()
+        for _ in range(3):
+            self.codes.decode("code")
+            volery.sleep(0.1)
+"""
+
+
+def test_a_real_run_observes_what_it_names(tmp_path):
+    """Components are constructed in a run: that has been taken for the response of a passive one."""
+    (tmp_path / "model.yaml").write_text(DESK)
+    (tmp_path / "code.py").write_text(CODE)
+    run = simulate(tmp_path, Options(fidelity="times"))
+    found = {name: one.observed for name, one in run.record.requirements.items()}
+    carried = 2 * 2e-3 + 2 * 64 * 8e-6  # latency and headers there and back
+    assert 17e-3 + carried < found["whole"] < 19e-3 + carried
+    assert 1e-3 + carried < found["one"] < 2e-3 + carried
+    assert (found["calls"], found["served"]) == (3.0, 0.0)
+    assert 2e-3 < found["delay"] < 4e-3
+    assert 0.0 < found["air"] < 0.02
+    processors = run.record.processors.values()
+    assert found["joules"] == pytest.approx(sum(one.energy_j for one in processors), rel=1e-3)
+    assert found["mine"] == pytest.approx(run.record.components["decoder"].energy_j)
+    assert run.record.components["decoder"].response_s.of == "calls"
 
 
 def test_deadline_misses_count_activations_that_end_late():
@@ -177,9 +330,14 @@ def test_failures_and_lost_messages():
 
 @pytest.mark.parametrize("published", OBSERVABLES, ids=lambda one: f"{one.subject}.{one.quantity}")
 def test_everything_published_can_be_observed(published):
-    subject = {"component": "loop", "processor": "onboard", "vehicle": "drone_1", "chain": "chain"}.get(
-        published.subject, "application"
-    )
+    subject = {
+        "component": "loop",
+        "operation": "loop.look",
+        "processor": "onboard",
+        "network": "radio",
+        "vehicle": "drone_1",
+        "chain": "chain",
+    }.get(published.subject, published.subject)
     watching = make_observer(f"{subject}.{published.quantity}", SETUP)
     assert isinstance(watching.value(1 * S), float)
     assert published.description
