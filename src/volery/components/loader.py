@@ -15,7 +15,7 @@ from __future__ import annotations
 import ast
 import builtins
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -101,6 +101,53 @@ def parse(path: Path, where: Location | None = None) -> SourceFile:
         raise ModelError(f"not Python: {error}", where=Location(str(path), 1)) from error
     except RecursionError as error:
         raise ModelError(TOO_DEEP, where=Location(str(path), 1)) from error
+
+
+def imported_files(path: Path) -> tuple[Path, ...]:
+    """Return a component's file and the files beside it that it imports, directly or through others.
+
+    All Python files of a package count, and all beside a file that imports by names made while it runs.
+
+    Raises:
+        ModelError: A file is not Python.
+    """
+    found: dict[Path, None] = {}
+    waiting = [path]
+    while waiting:
+        file = waiting.pop()
+        if file not in found:
+            found[file] = None
+            waiting += _imports_of(file)
+    return tuple(found)
+
+
+def _imports_of(file: Path) -> Iterator[Path]:
+    for node in ast.walk(parse(file).tree):
+        if isinstance(node, ast.Import):
+            names = [(file.parent, one.name) for one in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            folder = file.parents[node.level - 1] if node.level else file.parent
+            below = [f"{node.module}.{one.name}" if node.module else one.name for one in node.names]
+            names = [(folder, name) for name in (node.module, *below) if name]
+        elif isinstance(node, ast.Name | ast.Attribute) and ast.unparse(node) in _DYNAMIC_IMPORTS:
+            yield from sorted(file.parent.glob("*.py"))
+            continue
+        else:
+            continue
+        for folder, name in names:
+            yield from _module_files(folder, name)
+
+
+_DYNAMIC_IMPORTS = ("__import__", "importlib.import_module", "import_module")
+
+
+def _module_files(folder: Path, name: str) -> Iterator[Path]:
+    """Yield the files of the module or package *name* (dotted) in *folder*, if it is there."""
+    top = folder / name.partition(".")[0]
+    if top.is_dir():
+        yield from sorted(top.rglob("*.py"))
+    elif (module := top.with_name(f"{top.name}.py")).is_file():
+        yield module
 
 
 @dataclass

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from volery.base.errors import UsageError
+from volery.components.cpp.compiler import find_sources
+from volery.components.loader import imported_files
 from volery.model.instances import Instance
 from volery.model.system import Processor, System
+from volery.run.assembly.cpp import is_cpp
 from volery.run.assembly.vehicle_nodes import graph_access
-from volery.run.distributed.call_types import package_name
+from volery.run.distributed.call_types import call_types, package_name
 from volery.run.distributed.plan import worker_instances
 
 VERIFICATION = "verification"
@@ -95,7 +98,8 @@ def _computer(system: System, processor: Processor) -> Computer:
 def model_files(system: System, instances: tuple[Instance, ...]) -> Iterator[tuple[Path, Path]]:
     """Yield the files that hosts of *instances* read: each, and where it goes below the model's folder.
 
-    The text of the model with all files that it includes, and the Python files beside each component.
+    The text of the model with all files that it includes, the code of each component with what it imports of
+    the files beside it, and the dataclasses that calls carry.
 
     Raises:
         UsageError: A file is outside the model's folder.
@@ -104,8 +108,8 @@ def model_files(system: System, instances: tuple[Instance, ...]) -> Iterator[tup
     wanted |= dict.fromkeys(sorted(system.folder.glob("*.yaml")))  # what other scenarios include
     for one in instances:
         if one.component.path:
-            folder = system.file_of(one.component).parent
-            wanted |= dict.fromkeys(sorted(folder.glob("*.py")))
+            wanted |= dict.fromkeys(_code(system, one))
+    wanted |= {file: None for record in call_types(system).files() for file in imported_files(record)}
     wanted |= dict.fromkeys(system.catalogues)
     root = system.folder.resolve()
     for file in wanted:
@@ -115,3 +119,8 @@ def model_files(system: System, instances: tuple[Instance, ...]) -> Iterator[tup
                 f"{file} is outside the folder of the model and cannot be deployed: move it there"
             )
         yield resolved, Path(MODEL_FOLDER) / resolved.relative_to(root)
+
+
+def _code(system: System, instance: Instance) -> tuple[Path, ...]:
+    path = system.file_of(instance.component)
+    return find_sources(path).own if is_cpp(instance.component) else imported_files(path)

@@ -6,13 +6,17 @@ import shutil
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from volery.base.errors import UsageError, choices
+from volery.base.files import read_text, write_text
 from volery.deploy import ros1, ros2
 from volery.deploy.content import MODEL_FOLDER, VERIFICATION, Computer, computers, model_files
+from volery.deploy.texts import markdown
 from volery.model.instances import Instance
 from volery.model.system import System
-from volery.run.distributed.call_types import INTERFACES, call_types, package_name
+from volery.run.assembly.cpp import is_cpp
+from volery.run.distributed.call_types import call_types, package_name
 
 GRAPHS = {1: ros1, 2: ros2}
 """Generators by the version of ROS."""
@@ -49,44 +53,59 @@ def deploy(system: System, folder: Path, ros: int) -> Deployment:
     found = computers(system)
     verification = package_name(system.name, VERIFICATION)
     types = call_types(system)
-    _prepare(folder)
-    _write(folder / types.package, generator.interface_files(types, system))
+    surroundings = tuple(one for one in system.instances if one.is_environment)
+    contents: dict[str, tuple[Iterable[tuple[Path, str]], tuple[Instance, ...] | None]]
+    contents = {types.package: (generator.interface_files(types, system), None)}
     for one in found:
-        package = folder / one.package
-        _write(package, generator.computer_files(one, system))
-        _copy_model(system, tuple(each.instance for each in one.hosted), package, one.package, ros)
-    _write(folder / verification, generator.verification_files(system, found))
-    _copy_model(system, system.instances, folder / verification, verification, ros)
-    (folder / "README.md").write_text(_readme(system, found, verification, ros), encoding="utf-8")
+        hosted = tuple(each.instance for each in one.hosted)
+        contents[one.package] = (generator.computer_files(one, system), hosted)
+    contents[verification] = (generator.verification_files(system, found), surroundings)
+    try:
+        earlier = _earlier(folder, contents)
+        with TemporaryDirectory(prefix=".volery-", dir=folder) as made:
+            for name, (files, instances) in contents.items():
+                _write(Path(made) / name, files)
+                if instances is not None:
+                    _copy_model(system, instances, Path(made) / name, name, ros)
+            _write(
+                Path(made), [(Path("README.md"), _readme(system, found, verification, types.package, ros))]
+            )
+            _write(Path(made), [(Path(MARK), "".join(f"{name}\n" for name in contents))])
+            _replace(folder, Path(made), earlier, contents)
+    except OSError as error:
+        raise UsageError(f"{folder}: cannot be written: {error.strerror or error}") from error
     packages = {one.processor.name: one.package for one in found}
     return Deployment(folder, packages, verification, types.package)
 
 
-def _prepare(folder: Path) -> None:
-    if folder.exists() and not folder.is_dir():
-        raise UsageError(f"{folder} is not a folder")
-    if folder.is_dir() and any(folder.iterdir()):
-        if not (folder / MARK).is_file():
-            raise UsageError(
-                f"{folder} holds something that no deployment wrote: give an empty or a new folder"
-            )
-        for line in (folder / MARK).read_text(encoding="utf-8").splitlines():
-            if line and "/" not in line and line not in (".", ".."):
-                shutil.rmtree(folder / line, ignore_errors=True)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / MARK).write_text("", encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{folder}: {error.strerror}") from error
+def _earlier(folder: Path, names: Iterable[str]) -> list[str]:
+    """Make *folder* and return the packages of an earlier deployment in it.
+
+    A symbolic link is never followed: another user may have put it there.
+
+    Raises:
+        UsageError: The folder holds something that would be overwritten and that no deployment wrote.
+    """
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise UsageError(f"{folder} is {'a symbolic link' if folder.is_symlink() else 'not a folder'}")
+    folder.mkdir(parents=True, exist_ok=True)
+    if not any(folder.iterdir()):
+        return []
+    mark = folder / MARK
+    if mark.is_symlink() or not mark.is_file():
+        raise UsageError(f"{folder} holds something that no deployment wrote: give an empty or a new folder")
+    listed = [line for line in read_text(mark).splitlines() if Path(line).name == line and line != ".."]
+    for name in names:
+        if name not in listed and (folder / name).is_symlink() | (folder / name).exists():
+            raise UsageError(f"{folder / name} was not written by a deployment: move it away")
+    return listed
 
 
 def _write(package: Path, files: Iterable[tuple[Path, str]]) -> None:
-    with (package.parent / MARK).open("a", encoding="utf-8") as mark:
-        mark.write(f"{package.name}\n")
     for name, text in files:
         path = package / name
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        write_text(path, text)
         if text.startswith("#!"):
             path.chmod(_EXECUTABLE)
 
@@ -106,45 +125,78 @@ def _copy_model(system: System, instances: tuple[Instance, ...], package: Path, 
                 elsewhere.touch()
 
 
-def _readme(system: System, found: tuple[Computer, ...], verification: str, ros: int) -> str:
+def _replace(folder: Path, made: Path, earlier: Iterable[str], contents: Iterable[str]) -> None:
+    """Put what was *made* into *folder* in place of an *earlier* deployment: all is written by now."""
+    old = made / "earlier"
+    old.mkdir()
+    for name in earlier:
+        if (folder / name).is_symlink() or (folder / name).exists():
+            (folder / name).rename(old / name)
+    for name in (*contents, "README.md", MARK):
+        (made / name).replace(folder / name)
+
+
+def _readme(system: System, found: tuple[Computer, ...], verification: str, interfaces: str, ros: int) -> str:
     rows = [
-        f"| {one.processor.name} ({one.processor.kind}, {one.processor.frequency_mhz:g} MHz) | `{one.package}` | "
-        f"{', '.join(each.instance.name for each in one.hosted)} | "
-        f"{', '.join(each.vehicle for each in one.bridged)} |"
+        f"| {markdown(one.processor.name)} ({one.processor.kind}, {one.processor.frequency_mhz:g} MHz) "
+        f"| `{one.package}` "
+        f"| {', '.join(markdown(each.instance.name) for each in one.hosted)} "
+        f"| {', '.join(markdown(each.vehicle) for each in one.bridged)} |"
         for one in found
     ]
-    steps = _ROS1 if ros == 1 else _ROS2
-    chosen = f"allocation `{system.allocation}`" + (
-        f", scenario `{system.scenario}`" if system.scenario else ""
+    name = markdown(system.name)
+    chosen = f"allocation {markdown(system.allocation)}" + (
+        f", scenario {markdown(system.scenario)}" if system.scenario else ""
     )
+    steps = (_ROS1 if ros == 1 else _ROS2).format(
+        first=found[0].package,
+        verification=verification,
+        packages=" ".join((*(one.package for one in found), verification, interfaces)),
+    )
+    cpp = any(is_cpp(each.instance.component) for one in found for each in one.hosted)
     return "\n".join(
         [
-            f"# {system.name} on its computers",
+            f"# {name} on its computers",
             "",
-            f"Generated from the model of {system.name}, {chosen}. Do not edit: generate it again. "
+            f"Generated from the model of {name}, {chosen}. Do not edit: generate it again. "
             "Parameters in `config/` may be edited on a computer.",
             "",
             "| computer | package | components | vehicles |",
             "|---|---|---|---|",
             *rows,
             "",
-            "Every package needs volery in the Python that executes it: `pip install 'volery[simulation]'`.",
-            f"Calls between components are services `/<component>/<operation>` of the types in `{package_name(system.name, INTERFACES)}`, "
+            _VOLERY,
+            *([_COMPILED, ""] if cpp else []),
+            f"Calls between components are services `/<component>/<operation>` of the types in `{interfaces}`, "
             "topics are topics. Components need no built package of types; other nodes that call them do.",
             "",
-            steps.format(
-                first=found[0].package,
-                verification=verification,
-                packages=" ".join(one.package for one in found),
-            ),
+            steps,
         ]
     )
 
 
-_ROS1 = """## Build and start
+_VOLERY = """## Volery on a computer
+
+Every package needs volery in the Python that executes it. It is on no package index: make a wheel where its
+sources are, copy it to the computer and install it there.
 
 ```sh
-mkdir -p ws/src && cp -r * ws/src && cd ws && catkin_make && . devel/setup.bash
+python3 -m pip wheel --no-deps --wheel-dir wheels SOURCES_OF_VOLERY
+scp wheels/volery-*.whl COMPUTER:
+ssh COMPUTER "python3 -m pip install \\$(echo volery-*.whl)[simulation]"
+```
+"""
+
+_COMPILED = """Components in C++ are compiled when they are started for the first time: a computer that hosts them needs
+a C++ compiler (`apt-get install g++`)."""
+
+_ROS1 = """## Build and start
+
+In this folder:
+
+```sh
+mkdir -p ~/ws/src && cp -r {packages} ~/ws/src
+cd ~/ws && catkin_make && . devel/setup.bash
 roslaunch {verification} {verification}.launch      # all on one computer, with simulated vehicles
 roslaunch {first} {first}.launch                    # on the computer itself, with its autopilots
 ```
@@ -155,8 +207,11 @@ in `systemd/` to `/etc/systemd/system`, and the rules in `udev/` to `/etc/udev/r
 
 _ROS2 = """## Build and start
 
+In this folder:
+
 ```sh
-mkdir -p ws/src && cp -r * ws/src && cd ws && colcon build && . install/setup.bash
+mkdir -p ~/ws/src && cp -r {packages} ~/ws/src
+cd ~/ws && colcon build && . install/setup.bash
 ros2 launch {verification} {verification}.launch.py      # all on one computer, with simulated vehicles
 ros2 launch {first} {first}.launch.py                    # on the computer itself, with its autopilots
 ```

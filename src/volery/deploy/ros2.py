@@ -92,7 +92,7 @@ def _frame(
         f"[develop]\nscript_dir=$base/lib/{name}\n[install]\ninstall_scripts=$base/lib/{name}\n",
     )
     yield Path("setup.py"), _setup(name, what, executables)
-    yield Path(name) / "__init__.py", f'"""{what}."""\n'
+    yield Path(name) / "__init__.py", f"{what + '.'!r}\n"
 
 
 def _setup(name: str, what: str, executables: Sequence[str]) -> str:
@@ -121,7 +121,7 @@ setup(
 '''
 
 
-_COMPUTER_HEAD = '''"""What {name} executes."""
+_COMPUTER_HEAD = """{what!r}
 
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
@@ -132,7 +132,7 @@ from launch_ros.substitutions import FindPackageShare
 
 
 def generate_launch_description() -> LaunchDescription:
-'''
+"""
 _WORLD_HEAD = '''"""The simulated vehicles and environment, and all computers on this one."""
 
 from launch import LaunchDescription
@@ -164,14 +164,14 @@ def _launch(computer: Computer) -> str:
         )
     for each in computer.bridged:
         url = f"{each.autopilot}+serial:///dev/{each.device}?baud=57600"
-        lines.append(f'        DeclareLaunchArgument("{each.executable}_url", default_value="{url}"),')
+        lines.append(f'        DeclareLaunchArgument("{each.executable}_url", default_value={url!r}),')
         lines.append(
             f'        Node(package="{computer.package}", executable="{each.executable}", output="screen", '
             f'respawn=True, arguments=[LaunchConfiguration("{each.executable}_url")], '
             "condition=UnlessCondition(simulated)),"
         )
     lines.append("    ])")
-    return _COMPUTER_HEAD.format(name=computer.processor.name) + "\n".join(lines) + "\n"
+    return _COMPUTER_HEAD.format(what=f"What {computer.processor.name} executes.") + "\n".join(lines) + "\n"
 
 
 def _world_launch(name: str, computers: Sequence[Computer]) -> str:

@@ -1,8 +1,13 @@
-"""The parts of a deployment that ROS 1 and ROS 2 share: entry points, parameters, units of systemd, udev."""
+"""The parts of a deployment that ROS 1 and ROS 2 share: entry points, parameters, units of systemd, udev.
+
+A model may come from another person, so none of its texts may become more than text where it is written: one
+function quotes for each format. In Python that is ``repr``, also for docstrings.
+"""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
@@ -24,10 +29,34 @@ AUTOPILOT_USB = (
 """Vendor and product of USB devices that are often an autopilot, as udev lists them."""
 
 
+def comment(text: str) -> str:
+    """Return *text* in one line, for comments of YAML, AADL and the like: controls become spaces."""
+    return "".join(one if one.isprintable() else " " for one in text)
+
+
+def unit_value(text: str) -> str:
+    """Return *text* for a line of a systemd unit: no specifier, and no backslash that joins lines."""
+    return comment(text).replace("%", "%%").replace("\\", "/")
+
+
+def xml_text(text: str) -> str:
+    """Return *text* for the content of an XML element, without the controls that XML forbids."""
+    return escape(comment(text))
+
+
+def markdown(text: str) -> str:
+    """Return *text* for a line or a table of Markdown, without markup of its own."""
+    return re.sub(r"([\\`*_{}\[\]<>()#|~!])", r"\\\1", comment(text))
+
+
 def host_script(hosted: Hosted, system: System, graph: str, model: str) -> str:
     """Return the entry point that hosts a component. *model* is the expression of its model's path."""
     one = hosted.instance
-    return f'''"""Hosts {one.name}, a {one.component.name} in {one.component.language}, from the unmodified {one.component.path or "stub"}."""
+    code = one.component.path or "stub"
+    what = (
+        f"Hosts {one.name}, a {one.component.name} in {one.component.language}, from the unmodified {code}."
+    )
+    return f'''{what!r}
 
 from pathlib import Path
 
@@ -47,7 +76,8 @@ if __name__ == "__main__":
 def bridge_script(bridged: Bridged, graph: str) -> str:
     """Return the entry point of the node that serves a vehicle in reality."""
     url = f"{bridged.autopilot}+serial:///dev/{bridged.device}?baud=57600"
-    return f'''"""Serves {bridged.vehicle} on the graph: the first argument is its address, by default {url}."""
+    what = f"Serves {bridged.vehicle} on the graph: the first argument is its address, by default {url}."
+    return f'''{what!r}
 
 import os
 import sys
@@ -70,7 +100,8 @@ def verification_script(system: System, graph: str, model: str) -> str:
     """Return the entry point that simulates vehicles and environment for deployed components."""
     chosen = [text for name, value in (("--allocation", system.allocation), ("--scenario", system.scenario))
               if value for text in (name, value)]  # fmt: skip
-    return f'''"""Simulates the vehicles and the environment of {system.name} for the components on the graph."""
+    what = f"Simulates the vehicles and the environment of {system.name} for the components on the graph."
+    return f'''{what!r}
 
 import os
 import sys
@@ -93,7 +124,7 @@ if __name__ == "__main__":
 def parameter_files(computer: Computer) -> Iterator[tuple[Path, str]]:
     """Yield the parameters of each hosted component, as YAML that may be edited on the computer."""
     for one in computer.hosted:
-        head = f"# parameters of {one.instance.name}; what is changed here wins over the model\n"
+        head = f"# parameters of {comment(one.instance.name)}; what is changed here wins over the model\n"
         lines = [f"{json.dumps(name)}: {_yaml(value)}\n" for name, value in one.instance.parameters.items()]
         yield Path("config") / f"{one.executable}.yaml", head + ("".join(lines) or "{}\n")
 
@@ -135,7 +166,7 @@ def udev_rules(computer: Computer) -> str:
 
 def systemd_unit(computer: Computer, system: System, launch: str, setup: str) -> str:
     """Return a unit that starts the computer's launch file at boot and restarts it after a failure."""
-    title = f"{system.name} on {computer.processor.name}"
+    title = unit_value(f"{system.name} on {computer.processor.name}")
     return f"""[Unit]
 Description={title}
 Wants=network-online.target
@@ -170,9 +201,9 @@ def package_xml(
 <package format="3">
   <name>{name}</name>
   <version>0.1.0</version>
-  <description>{escape(what)}</description>
+  <description>{xml_text(what)}</description>
   <maintainer email={quoteattr("maintainer@example.org")}>maintainer</maintainer>
-  <license>see {escape(system.name)}</license>
+  <license>see {xml_text(system.name)}</license>
   {inner}
 </package>
 """

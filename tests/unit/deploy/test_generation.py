@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import ast
+import errno
+import json
+import os
+import re
+import subprocess
 from pathlib import Path
 
 import pytest
 from lxml import etree
 
 from volery.base.errors import CapabilityError, UsageError
+from volery.base.files import write_text
+from volery.deploy import generation
 from volery.deploy.generation import MARK, deploy
 from volery.model.system_loader import load
 from volery.run.assembly.model_checks import vocabulary
@@ -86,9 +93,142 @@ def test_a_mark_cannot_point_outside_the_folder(delivery, tmp_path):
     assert outside.is_dir()
 
 
+@pytest.mark.parametrize("link", [MARK, "README.md", "hospital_delivery_ground", "."])
+def test_nothing_is_written_through_a_symbolic_link(delivery, tmp_path, link):
+    victim = tmp_path / "victim"
+    folder = tmp_path / "out"
+    if link in (MARK, "README.md"):
+        victim.write_text("theirs")
+    else:
+        victim.mkdir()
+        (victim / "package.xml").write_text("theirs")
+    if link == ".":
+        folder.symlink_to(victim)
+    else:
+        folder.mkdir()
+        (folder / MARK).write_text("hospital_delivery_ground\n")
+        (folder / link).unlink(missing_ok=True)
+        (folder / link).symlink_to(victim)
+    if link in (MARK, "."):
+        with pytest.raises(UsageError, match=r"symbolic link|no deployment wrote"):
+            deploy(delivery, folder, 2)
+    else:
+        deploy(delivery, folder, 2)
+        assert not (folder / link).is_symlink()
+    theirs = victim if victim.is_file() else victim / "package.xml"
+    assert theirs.read_text() == "theirs"
+    assert victim.is_file() or list(victim.iterdir()) == [theirs]
+
+
+def test_what_a_package_would_overwrite_is_named(delivery, tmp_path):
+    made = deploy(delivery, tmp_path / "out", 2)
+    (made.folder / MARK).write_text("")
+    with pytest.raises(UsageError, match="hospital_delivery_interfaces was not written by a deployment"):
+        deploy(delivery, made.folder, 2)
+
+
+def test_on_a_full_disk_the_earlier_deployment_stays(delivery, tmp_path, monkeypatch):
+    made = deploy(delivery, tmp_path / "out", 1)
+    before = {file: file.read_bytes() for file in made.folder.rglob("*") if file.is_file()}
+    written = []
+
+    def full(path, text):
+        written.append(path)
+        if len(written) > 20:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        write_text(path, text)
+
+    monkeypatch.setattr(generation, "write_text", full)
+    with pytest.raises(UsageError, match="cannot be written: No space left on device"):
+        deploy(delivery, made.folder, 2)
+    assert {file: file.read_bytes() for file in made.folder.rglob("*") if file.is_file()} == before
+    with pytest.raises(UsageError, match="No space left"):
+        deploy(delivery, tmp_path / "new", 2)
+    assert list((tmp_path / "new").iterdir()) == []
+
+
+def test_a_package_holds_only_the_code_that_its_computer_executes(delivery, tmp_path):
+    made = deploy(delivery, tmp_path / "out", 2)
+
+    def code(package):
+        model = made.folder / package / package / "model" / "components"
+        return {file.name for file in model.iterdir() if file.stat().st_size}
+
+    assert code(made.packages["ground"]) == {"delivery_central.py", "delivery_types.py", "route_generator.py"}
+    assert "rover_control.py" not in code(made.packages["onboard_1"])
+    assert "delivery_central.py" not in code(made.verification)
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_the_readme_works_as_it_is_typed(delivery, tmp_path, ros):
+    made = deploy(delivery, tmp_path / "out", ros)
+    typed = (made.folder / "README.md").read_text()
+    [block] = [one for one in re.findall(r"```sh\n(.*?)```", typed, re.DOTALL) if "mkdir" in one]
+    tools = """
+        catkin_make() { mkdir devel; touch devel/setup.bash; }
+        colcon() { mkdir install; touch install/setup.bash; }
+        roslaunch() { echo $1; }
+        ros2() { echo $2; }
+        """
+    done = subprocess.run(
+        ["bash", "-euc", tools + block], cwd=made.folder, env={**os.environ, "HOME": str(tmp_path)},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert done.stdout.split() == [made.verification, next(iter(made.packages.values()))]
+    built = {one.name for one in (tmp_path / "ws" / "src").iterdir()}
+    assert built == {*made.packages.values(), made.verification, made.interfaces}
+
+
+HOSTILE = (
+    'x"""\nMARK = 1\n' + "'''\n[Service]\nExecStartPre=/bin/mark\n%n <mark a=\"1\"/> & -- \u2028\x85 "
+    "`mark` | $(eval mark) \\"
+)
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_texts_of_a_model_stay_texts_wherever_they_are_written(tmp_path, ros):
+    """Each file says the same as with a harmless name: it has no statement, line or element more."""
+    harmless = deploy(pair(tmp_path / "a", name="harmless"), tmp_path / "out_a", ros)
+    path = HOSTILE.replace("/", "") + ".py"
+    hostile = deploy(pair(tmp_path / "b", name=HOSTILE, path=path), tmp_path / "out_b", ros)
+    renamed = dict(zip(names_of(hostile), names_of(harmless), strict=True))
+    compared = 0
+    for file in sorted(one for one in hostile.folder.rglob("*") if one.is_file()):
+        where = file.relative_to(hostile.folder).as_posix()
+        for theirs, ours in renamed.items():
+            where = where.replace(theirs, ours)
+        twin, text = harmless.folder / where, file.read_text()
+        if "/model/" in where or not text:
+            continue
+        compared += 1
+        if text.startswith("#!") or file.suffix == ".py":
+            assert shape(text) == shape(twin.read_text()), where
+        elif file.suffix in (".xml", ".launch"):
+            assert elements(file) == elements(twin), where
+        else:
+            assert len(text.splitlines()) == len(twin.read_text().splitlines()), where
+    assert compared > 8
+    unit = next(hostile.folder.rglob("*.service")).read_text()
+    assert "%n" not in unit.replace("%%", "")
+    assert re.search(r"^Description=.*[^\\]$", unit, re.MULTILINE)
+
+
+def names_of(made):
+    return [*made.packages.values(), made.verification, made.interfaces]
+
+
+def shape(text):
+    """The statements of a Python file, without what its texts say."""
+    return [type(node).__name__ for node in ast.walk(ast.parse(text))]
+
+
+def elements(file):
+    return [(one.tag, sorted(one.attrib)) for one in etree.parse(file).iter()]
+
+
 MODEL = """
 volery: 1
-name: pair
+name: NAME
 components: {Loop: {language: LANGUAGE, path: PATH, active: {period: 1 s}}}
 application: {a: {is: Loop}, b: {is: Loop}}
 platform:
@@ -99,12 +239,15 @@ allocations: {one: {a: pc-1, b: pc-1}, two: {a: pc-1, b: pc_1}}
 """
 
 
-def pair(folder, language="python", path="loop.py", allocation="one"):
+def pair(folder, language="python", path="loop.py", allocation="one", name="pair"):
     folder.mkdir()
     (folder.parent / "outside.py").write_text("class Loop:\n    def run(self): ...\n")
-    (folder / "loop.py").write_text("class Loop:\n    def run(self): ...\n")
+    for file in ("loop.py", path) if path.endswith(".py") else ("loop.py",):
+        (folder / file).write_text("class Loop:\n    def run(self): ...\n")
     (folder / "loop.cpp").write_text("")
-    (folder / "model.yaml").write_text(MODEL.replace("LANGUAGE", language).replace("PATH", path))
+    text = MODEL.replace("LANGUAGE", language).replace("PATH", json.dumps(path))
+    text = text.replace("NAME", json.dumps(name))
+    (folder / "model.yaml").write_text(text)
     return load(folder, vocabulary(), allocation=allocation)
 
 

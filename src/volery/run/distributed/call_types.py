@@ -12,6 +12,7 @@ import ast
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -54,10 +55,14 @@ def package_name(*parts: str) -> str:
 
 @dataclass(frozen=True)
 class _Record:
-    """A dataclass: the module beside the components that defines it, and the types of its fields."""
+    """A dataclass: the file beside the components that defines it, and the types of its fields."""
 
-    module: str
+    file: Path
     fields: Mapping[str, str]
+
+    @property
+    def module(self) -> str:
+        return self.file.stem
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,11 @@ class CallTypes:
     definitions: Mapping[str, str]
     operations: Mapping[tuple[str, str], OperationType]
     records: Mapping[str, _Record] = field(default_factory=dict)
+
+    def files(self) -> tuple[Path, ...]:
+        """Return the files of the dataclasses that messages are made of."""
+        used = {name.rpartition("/")[2] for name in self.definitions}
+        return tuple(dict.fromkeys(one.file for name, one in self.records.items() if name in used))
 
     def request(
         self, kind: OperationType, args: tuple[Any, ...], kwargs: dict[str, Any], what: str
@@ -211,7 +221,7 @@ def _records(system: System) -> dict[str, _Record]:
                     for one in node.body
                     if isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name)
                 }
-                found.setdefault(node.name, _Record(file.stem, fields))
+                found.setdefault(node.name, _Record(file, fields))
     return found
 
 
