@@ -80,7 +80,7 @@ def _profile(folder: Path, component: str, instances: dict[str, TracingCompiler]
         file = folder / name
         trace = trace.then(read_trace(file)) if file.exists() else trace
     trace = trace.until(MAX_BLOCKS)
-    costs, path = traced_costs(program, trace)
+    costs, path, _ = traced_costs(program, trace)
     save_costs(program.key, costs)
     entered = len(trace.blocks)
     return ComponentProfile(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -126,6 +126,43 @@ class MemoryLaw(WithProvenance):
     caches: tuple[Cache, ...] = Field(min_length=1, max_length=4)
     latency_ns: float
     bytes_per_ns: float = Field(gt=0.0)
+
+
+class TimeBand(NamedTuple):
+    """Measured times over estimates: from ``low`` to ``high``, of code of one ``kind``."""
+
+    low: float
+    high: float
+    kind: str
+
+    def __str__(self) -> str:
+        return f"{self.low:g} to {self.high:g} times this for {self.kind}"
+
+
+SHORT_CYCLES, SHORTEST_CYCLES = 20_000.0, 2_000.0
+BRANCHY = 0.3
+"""Share of the cycles lost to mispredicted branches from which on code is of that kind."""
+
+BRANCHES = TimeBand(0.58, 1.3, "code of mispredicted branches")
+SHORTEST = TimeBand(0.5, 9.0, "an activation below 2,000 cycles, whose library calls and branches are cold")
+SHORT = TimeBand(0.5, 2.2, "an activation below 20,000 cycles, whose library calls and branches are cold")
+LONGER = TimeBand(0.7, 1.45, "an activation of its size")
+"""Extremes of single activations that followed other code, on a Zen 4 and a Zen 5 with figures of their own
+(``volery calibrate processor``): eighteen kernels and programs; see docs/native-simulation.md."""
+
+
+def time_band(cycles: float, lost: float) -> TimeBand:
+    """Return how far measured times lie from an estimate of compiled code.
+
+    Args:
+        cycles: Estimated cycles of the activation.
+        lost: Share of them that is lost to mispredicted branches, 0..1.
+    """
+    if cycles < SHORTEST_CYCLES:
+        return SHORTEST
+    if cycles < SHORT_CYCLES:
+        return SHORT
+    return BRANCHES if lost > BRANCHY else LONGER
 
 
 class CoreLaw(WithProvenance):

@@ -15,6 +15,7 @@ from typing import Protocol
 from volery.base.errors import EstimateError, choices
 from volery.base.time import Ns
 from volery.cost.catalogue import ProcessorEntry
+from volery.cost.code_laws import BRANCHES, SHORT, SHORTEST
 from volery.cost.figures import Provenance, WithProvenance, scale_energy, scale_time
 from volery.cost.tariff import Tariff
 
@@ -237,7 +238,8 @@ class ProcessorPrices:
     def compiled_code_basis(self) -> Basis:
         """Return the basis of compiled code."""
         law = self.entry.core_law()
-        validity = f"code whose data stay in the first cache; {law.how_good()}"
+        short = "; ".join(f"measured were {band}" for band in (SHORT, SHORTEST, BRANCHES))
+        validity = f"code whose data stay in the first cache; {law.how_good()}; {short}"
         return Basis(f"counted C++ code on {self.entry.name}", law.source, law.provenance, validity)
 
     def power_basis(self) -> Iterator[Basis]:

@@ -4,6 +4,7 @@ from volery.base.errors import EstimateError, ModelError
 from volery.calibration.host_machine import Machine, put_law
 from volery.cost import load_catalogue
 from volery.cost.catalogue import parse_catalogue
+from volery.cost.code_laws import time_band
 
 MINE = """
 processors:
@@ -44,3 +45,17 @@ def test_a_model_of_a_core_joins_the_entry_that_is_there(tmp_path):
     joined = load_catalogue(file).processor("intel-i5-3470")
     assert joined.core_law().width == 2.0
     assert joined.ros == shipped.ros
+
+
+@pytest.mark.parametrize(
+    ("cycles", "lost", "measured"),
+    [
+        (5_588, 0.0, 11_000),  # a filter of 15 states, once, on a Zen 5
+        (1_115, 0.0, 9_800),  # a projection of sines and roots, once
+        (470_000, 0.05, 480_000),
+        (132_755 * 1.7, 0.5, 132_755),  # polygons: unpredictable branches
+    ],
+)
+def test_the_band_of_an_estimate_holds_what_was_measured(cycles, lost, measured):
+    band = time_band(cycles, lost)
+    assert band.low * cycles <= measured <= band.high * cycles

@@ -108,6 +108,7 @@ def cost(
             "energy_j": joules,
             "provenance": law.provenance,
             "error": law.error,
+            "measured_over_estimate": [found.band.low, found.band.high],
             "lines": [{"source": one.source, "share": one.share} for one in found.places[:50]],
             "library_calls": found.library_calls,
             "left_out": list(found.left_out),
@@ -132,6 +133,7 @@ def _core_law(known: Catalogue, on: str) -> tuple[CoreLaw, float]:
 def _estimate_table(law: CoreLaw, mhz: float, found: ProgramEstimate, joules: float | None) -> Table:
     shown = make_table(show_header=False)
     shown.add_row("time", _si(found.seconds(mhz), "s"))
+    shown.add_row("", f"measured were {found.band}")
     shown.add_row("cycles", f"{found.cycles:,.0f}")
     if law.memory is not None:
         waits = f"{_si(found.memory_ns * 1e-9, 's')} of the time, at any frequency"

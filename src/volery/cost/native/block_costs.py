@@ -159,8 +159,10 @@ def static_costs(program: Program) -> BlockCosts:
     return BlockCosts(cycles, instructions, none, none > 0.0)
 
 
-def traced_costs(program: Program, trace: BlockTrace) -> tuple[BlockCosts, ExecutedPath]:
+def traced_costs(program: Program, trace: BlockTrace) -> tuple[BlockCosts, ExecutedPath, float]:
     """Return costs from a trace: the mean of each block that was entered, the others from the code alone.
+
+    Beside them are the path and the share of the cycles that was lost to mispredicted branches.
 
     The cost of a misprediction belongs to the edge that was taken then: the more often other data take that
     edge, the more mispredictions there are.
@@ -188,12 +190,16 @@ def traced_costs(program: Program, trace: BlockTrace) -> tuple[BlockCosts, Execu
     static = static_costs(program)
     seen = entered > 0
     divisor = np.maximum(entered, 1)
-    return BlockCosts(
-        np.where(seen, block_cycles / divisor, static.cycles),
-        np.where(seen, instructions / divisor, static.instructions),
-        np.maximum(waited, 0.0) / divisor,
-        seen,
-    ), path
+    return (
+        BlockCosts(
+            np.where(seen, block_cycles / divisor, static.cycles),
+            np.where(seen, instructions / divisor, static.instructions),
+            np.maximum(waited, 0.0) / divisor,
+            seen,
+        ),
+        path,
+        float(stalled.sum() / max(cycles.sum(), 1.0)),
+    )
 
 
 @dataclass(frozen=True)

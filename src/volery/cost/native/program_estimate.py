@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from volery.cost.code_laws import TimeBand, time_band
 from volery.cost.native.block_costs import BlockCosts, blocks_of, save_costs, traced_costs
 from volery.cost.native.build_cache import cached_file
 from volery.cost.native.compilation import Program
@@ -52,6 +53,7 @@ class ProgramEstimate:
         places: Cost by source line, the greatest first.
         library_calls: Number of calls by library function.
         left_out: Sentences on what limits the estimate.
+        band: How far measured times lie from such estimates.
     """
 
     cycles: float
@@ -62,6 +64,7 @@ class ProgramEstimate:
     places: tuple[SourceLineCost, ...]
     library_calls: dict[str, int]
     left_out: tuple[str, ...]
+    band: TimeBand
 
     def seconds(self, mhz: float) -> float:
         """Return the execution time at a frequency in MHz, s."""
@@ -82,7 +85,7 @@ def estimate_program(program: Program, invocation: Invocation) -> ProgramEstimat
         code = cached_file(f"{program.key}.traced.o", tracing, program.traced_object)
         traced = build_executable(program, invocation, code, tracing)
         trace = trace_blocks(traced, invocation, tracing, stride, program.law.memory)
-    costs, path = traced_costs(program, trace)
+    costs, path, lost = traced_costs(program, trace)
     save_costs(program.key, costs)
     calls = library_calls(program, counts)
     return ProgramEstimate(
@@ -94,6 +97,7 @@ def estimate_program(program: Program, invocation: Invocation) -> ProgramEstimat
         costs_by_line(program, costs, counts),
         dict(calls),
         _left_out(program, costs, counts, calls, path.lost / max(len(trace.blocks), 1)),
+        time_band(costs.total(counts), lost),
     )
 
 
