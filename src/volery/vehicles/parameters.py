@@ -25,11 +25,15 @@ COUNTERS = frozenset({"_HASH_CHECK"})
 
 
 class Difference(NamedTuple):
-    """One parameter that differs; ``None`` where a side does not have it."""
+    """One parameter that differs; ``None`` where a side does not have it.
+
+    ``stated`` is what a file states under another name, of another version of the firmware; else empty.
+    """
 
     name: str
     here: float | None
     there: float | None
+    stated: str = ""
 
 
 class Parameters:
@@ -53,7 +57,8 @@ class Parameters:
         """Return the value of one parameter.
 
         Raises:
-            NotArrived: the autopilot does not answer, as for a name that it does not have.
+            Refused: the autopilot has no such parameter; the error names the one that took its place.
+            NotArrived: it does not answer.
         """
         return self._services.read_parameter(self._services.parameter_name(name)).value
 
@@ -62,7 +67,8 @@ class Parameters:
 
         Raises:
             UsageError: the value is no finite number.
-            Refused: the autopilot keeps another value, or takes whole numbers only.
+            Refused: the autopilot has no such parameter, keeps another value, or the value does not fit its
+                type.
             NotArrived: it does not answer.
         """
         if not is_number(value):
@@ -93,7 +99,8 @@ class Parameters:
     def load(self, file: str | Path) -> list[Difference]:
         """Set the parameters of a file that differ, and return what was changed (``here`` is the old value).
 
-        A parameter that the autopilot refuses or does not have does not stop the others.
+        A parameter that the autopilot refuses or does not have does not stop the others. A parameter that has
+        another name in this version of the firmware is set under that, converted to its unit.
 
         Raises:
             VehicleError: some were not set; the error names them. The others are set.
@@ -122,10 +129,30 @@ class Parameters:
     def compare(self, file: str | Path | Mapping[str, float]) -> list[Difference]:
         """Return where the vehicle (``here``) and a file or mapping (``there``) differ, by name.
 
-        Parameters that only the vehicle has are left out: a file usually states a part of them.
+        Parameters that only the vehicle has are left out: a file usually states a part of them. What a file
+        states under a name of another version of the firmware is compared under the vehicle's own.
         """
         there = file if isinstance(file, Mapping) else read_parameter_file(file)
-        return [one for one in differences(self.all(), there) if one.there is not None]
+        here = self.all()
+        own, stated = self._under_own_names(there, here)
+        found = [one for one in differences(here, own) if one.there is not None]
+        return [one._replace(stated=stated.get(one.name, "")) for one in found]
+
+    def _under_own_names(
+        self, there: Mapping[str, float], here: Mapping[str, float]
+    ) -> tuple[dict[str, float], dict[str, str]]:
+        """Return values under the names that the vehicle has, and what was stated under others."""
+        own, stated = dict(there), {}
+        for name, value in there.items():
+            renamed = self._services.renamed.get(name)
+            if renamed is None or name in here or renamed.other(name) not in here:
+                continue
+            del own[name]
+            other = renamed.other(name)
+            if other not in there:
+                own[other] = renamed.converted(name, value)
+                stated[other] = f"{name}={value:g}"
+        return own, stated
 
 
 def differences(here: Mapping[str, float], there: Mapping[str, float]) -> list[Difference]:
@@ -141,6 +168,8 @@ def differences(here: Mapping[str, float], there: Mapping[str, float]) -> list[D
 
 def read_parameter_file(file: str | Path) -> dict[str, float]:
     """Return the parameters of a file of QGroundControl, Mission Planner or MAVProxy.
+
+    A file of QGroundControl may list several components, such as a gimbal; only the autopilot's rows count.
 
     Raises:
         UsageError: the file cannot be read; the error names the line.
@@ -158,10 +187,9 @@ def read_parameter_file(file: str | Path) -> dict[str, float]:
         raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
     found: dict[str, float] = {}
     for number, line in enumerate(lines, 1):
-        words = re.split(r"[\s,]+", line.split("#", 1)[0].strip())
-        if words == [""]:
+        name, value = _name_and_value(line)
+        if not name:
             continue
-        name, value = words[2:4] if len(words) == 5 else [*words, ""][:2]
         try:
             found[name] = float(value)
         except ValueError:
@@ -169,8 +197,17 @@ def read_parameter_file(file: str | Path) -> dict[str, float]:
         if not isfinite(found[name]) or not re.fullmatch(r"[A-Za-z_][\w.\[\]>-]*", name):
             raise UsageError(f"{path}:{number}: {line.strip()!r} is no parameter and its value")
     if not found:
-        raise UsageError(f"{path}: there is no parameter in it")
+        raise UsageError(f"{path}: there is no parameter of an autopilot in it (component {COMPONENT})")
     return found
+
+
+def _name_and_value(line: str) -> tuple[str, str]:
+    """Return what a line of a file states; an empty name for a comment or a row of another component."""
+    words = re.split(r"[\s,]+", line.split("#", 1)[0].strip())
+    if len(words) != 5:
+        return words[0], words[1] if len(words) > 1 else ""
+    _, component, name, value, _ = words
+    return ("" if component.isdigit() and int(component) != COMPONENT else name), value
 
 
 def _qgc_text(found: Mapping[str, Parameter], system: int) -> str:

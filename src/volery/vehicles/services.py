@@ -7,10 +7,10 @@ built on it: ``Parameters``, ``OnboardPlan``, ``OnboardLogs`` and ``Payload``. A
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
-from volery.base.errors import CapabilityError, UsageError
+from volery.base.errors import CapabilityError, Refused, UsageError, did_you_mean
 from volery.base.time import Ns
 
 
@@ -39,6 +39,38 @@ class Parameter(NamedTuple):
     type: int
 
 
+class RenamedParameter(NamedTuple):
+    """A parameter that has another name, and perhaps another unit, from one version of a firmware on.
+
+    Args:
+        before: its older name.
+        after: its newer name.
+        since: the version, as in "4.7".
+        factor: the newer value is the older one times this.
+        change: what changed beside the name, in words; empty if nothing.
+        upgrade: returns the newer value of an older one, where that is no multiple.
+        downgrade: the other way.
+    """
+
+    before: str
+    after: str
+    since: str
+    factor: float = 1.0
+    change: str = ""
+    upgrade: Callable[[float], float] | None = None
+    downgrade: Callable[[float], float] | None = None
+
+    def other(self, name: str) -> str:
+        """Return its other name."""
+        return self.after if name == self.before else self.before
+
+    def converted(self, name: str, value: float) -> float:
+        """Return the value under its other name; *name* is the one of *value*."""
+        if name == self.before:
+            return self.upgrade(value) if self.upgrade is not None else value * self.factor
+        return self.downgrade(value) if self.downgrade is not None else value / self.factor
+
+
 class LogEntry(NamedTuple):
     """A log on board: number, size in bytes, and the end of its recording in s since 1970 (0 if unknown)."""
 
@@ -60,6 +92,28 @@ def mavlink_parameter_name(vehicle: str, name: str) -> str:
     if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9_]{1,16}", name):
         raise UsageError(f"{vehicle}: {name!r} is no name of a parameter: {LONGEST_NAME} letters, digits, _")
     return name.upper()
+
+
+def missing_parameter(
+    vehicle: str, name: str, known: Iterable[str], renamed: RenamedParameter | None
+) -> Refused:
+    """Return the error for a parameter that an autopilot does not have, with its other name if it has that.
+
+    Args:
+        vehicle: name of the vehicle.
+        name: the name that was asked for.
+        known: names that the autopilot has, as far as they are known.
+        renamed: the renaming of this parameter, if there is one.
+    """
+    what = f"the autopilot has no parameter {name}"
+    if renamed is not None:
+        other = renamed.other(name)
+        when = f"since {renamed.since}" if name == renamed.before else f"before {renamed.since}"
+        change = f" ({renamed.change})" if renamed.change else ""
+        what += f"; {when} it is {other}{change}"
+    else:
+        what += did_you_mean(name, known)
+    return Refused(vehicle, f"the parameter {name}", what)
 
 
 class FileSystem(Protocol):
@@ -96,11 +150,15 @@ class Services(Protocol):
     def sender(self) -> tuple[int, int] | None:
         """System and component id that the autopilot gets commands from; ``None`` if they are not known."""
 
+    @property
+    def renamed(self) -> Mapping[str, RenamedParameter]:
+        """Parameters with another name in another version of the firmware, by both names."""
+
     def parameter_name(self, name: str) -> str:
         """Return the autopilot's spelling of a name; raise ``UsageError`` if it is none."""
 
     def read_parameter(self, name: str) -> Parameter:
-        """Read one parameter."""
+        """Read one parameter; ``Refused`` if the autopilot does not have it."""
 
     def read_parameters(self) -> dict[str, Parameter]:
         """Read all parameters."""
@@ -154,6 +212,7 @@ class PartialServices:
     files = None
     home_first = False
     sender = None
+    renamed: Mapping[str, RenamedParameter] = {}
 
     def __init__(self, name: str, why: str) -> None:
         self._name, self._why = name, why

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from rigs.airstrip import Airstrip, at
-from volery.base.errors import CapabilityError, NotArrived, OutOfBounds, Refused, UsageError
+from volery.base.errors import CapabilityError, OutOfBounds, Refused, UsageError
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import S
 from volery.kernel.waiting import sleep
@@ -73,7 +73,7 @@ def test_all_parameters_are_saved_compared_and_loaded(
 
     counts, old, found, changed, left = strip().fly(mission)
     assert counts[0] == counts[1] > 800
-    assert found[0] == found[1] == changed == [(known, old + 2.0, old)]
+    assert found[0] == found[1] == changed == [(known, old + 2.0, old, "")]
     assert left == []
 
 
@@ -83,7 +83,7 @@ def test_parameters_that_do_not_fit(strip: type[Airstrip], known: str, tmp_path:
     wrong.write_text("RTL_SPEED 1\nnonsense\n", encoding="utf-8")
 
     def mission(drone: Drone) -> None:
-        with pytest.raises(NotArrived, match="does not answer for a parameter that it does not have"):
+        with pytest.raises(Refused, match="has no parameter NO_SUCH_NAME"):
             drone.parameters.get("NO_SUCH_NAME")
         with pytest.raises(UsageError, match="a parameter is a finite number"):
             drone.parameters.set(known, "5")  # type: ignore[arg-type]  # what a console can pass

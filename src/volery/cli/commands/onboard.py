@@ -116,9 +116,13 @@ def diff(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") ->
 
 def _show(output: Output, found: Sequence[Difference], here: str, there: str) -> None:
     if found:
+        converted = any(one.stated for one in found)
         table = make_table("parameter", number_column(here), number_column(there))
+        if converted:
+            table.add_column("the file states")
         for one in found:
-            table.add_row(one.name, *("-" if one is None else f"{one:.9g}" for one in one[1:]))
+            values = ("-" if value is None else f"{value:.9g}" for value in (one.here, one.there))
+            table.add_row(one.name, *values, *([one.stated] if converted else []))
         output.show(table)
     output.give([one._asdict() for one in found])
 

@@ -32,7 +32,7 @@ def test_parameters_are_saved_compared_and_set(tmp_path: Path) -> None:
 def test_mistakes_are_answered_in_one_line(tmp_path: Path) -> None:
     for words, said in (
         (("params", "get", "sim:dji", "X"), "an ArduPilot or PX4 offers it, over MAVLink or MAVROS"),
-        (("params", "get", "sim:px4", "NO_SUCH"), "does not answer for a parameter that it does not have"),
+        (("params", "get", "sim:px4", "NO_SUCH"), "has no parameter NO_SUCH"),
         (("params", "get", "sim:px4", "--kind", "plane"), "--kind plane: give drone or rover"),
         (("mission", "upload", "sim:px4", tmp_path / "no.plan"), "there is no such file"),
         (("mission", "download", "sim:px4", tmp_path / "a.plan", "--only", "fences"), "no part 'fences'"),

@@ -21,8 +21,9 @@ from volery.vehicles.drivers.ardupilot.modes import (
     LINK_LOSS_PARAMETERS,
     NUMBERS,
     RESTING,
+    STATION_PARAMETERS,
 )
-from volery.vehicles.drivers.ardupilot.versions import COVERAGE
+from volery.vehicles.drivers.ardupilot.versions import COVERAGE, RENAMED
 from volery.vehicles.drivers.mavlink.backend import (
     ATTITUDE_AND_RATES,
     INT_FRAMES,
@@ -52,6 +53,7 @@ ARDUPILOT_FIRMWARE = Firmware(
     estimator="EKF_STATUS_REPORT",
     coverage=COVERAGE,
     turning=ATTITUDE_AND_RATES,
+    renamed=RENAMED,
     home_first=True,
 )
 
@@ -131,6 +133,9 @@ class ArduPilotMavlink(MavlinkClient):
     def _requested_parameters(self) -> Sequence[str]:
         return (*LINK_LOSS_PARAMETERS.get(self.telemetry.kind, ()), *FENCE_PARAMETERS)
 
+    def _absent_beside(self, name: str) -> Sequence[str]:
+        return STATION_PARAMETERS[1:] if name == STATION_PARAMETERS[0] else super()._absent_beside(name)
+
     def lasting_reasons(self, since: Ns) -> Sequence[str]:
         """Return the arming checks that fail since then and that waiting does not mend."""
         return lasting_reasons(self.telemetry, since)
@@ -195,7 +200,9 @@ class ArduPilotMavlink(MavlinkClient):
 class ArduPilotMavros(MavrosBackend):
     """ArduPilot over MAVROS. See ``ArduPilotBackend``."""
 
-    firmware = FirmwareBehind("ArduPilot", RESTING, home_first=True, turning=ATTITUDE_AND_RATES)
+    firmware = FirmwareBehind(
+        "ArduPilot", RESTING, home_first=True, turning=ATTITUDE_AND_RATES, renamed=RENAMED
+    )
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         super().__init__(kernel, node, name, namespace, geoid)

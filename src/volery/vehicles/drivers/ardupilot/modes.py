@@ -73,9 +73,11 @@ def mode_name(kind: str, number: int) -> str:
     return MODES.get(kind, {}).get(number, f"MODE {number}")
 
 
+STATION_PARAMETERS = ("SYSID_MYGCS", "MAV_GCS_SYSID", "MAV_GCS_SYSID_HI")
+"""System ids of ground stations: the first before 4.7, the others, a range, since."""
 LINK_LOSS_PARAMETERS: Mapping[str, Sequence[str]] = {
-    DRONE_KIND: ("FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "FS_OPTIONS", "GUID_TIMEOUT", "SYSID_MYGCS"),
-    ROVER_KIND: ("FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "FS_ACTION", "SYSID_MYGCS"),
+    DRONE_KIND: ("FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "FS_OPTIONS", "GUID_TIMEOUT", *STATION_PARAMETERS),
+    ROVER_KIND: ("FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "FS_ACTION", *STATION_PARAMETERS),
 }
 """Parameters that define the reaction, by kind of vehicle."""
 
@@ -130,6 +132,13 @@ _MISSIONS_GO_ON = 1 << 1
 """Bit of FS_OPTIONS: a mission continues without a ground station."""
 
 
+def listened_for(parameters: Mapping[str, float]) -> range:
+    """Return the system ids that count as ground stations."""
+    first = round(parameters.get("MAV_GCS_SYSID", parameters.get("SYSID_MYGCS", GCS_SYSTEM)))
+    last = round(parameters.get("MAV_GCS_SYSID_HI", 0.0))
+    return range(first, max(first, last) + 1)
+
+
 def on_link_loss(kind: str, parameters: Mapping[str, float]) -> str:
     """Return the reaction in one line; empty for a vehicle that is neither copter nor rover."""
     if kind not in LINK_LOSS_PARAMETERS:
@@ -143,8 +152,9 @@ def on_link_loss(kind: str, parameters: Mapping[str, float]) -> str:
     action = _COPTER.get(enabled) if copter else _ROVER.get(round(parameters.get("FS_ACTION", 0.0)))
     after = parameters.get("FS_GCS_TIMEOUT", 5.0)
     line = f"{after:g} s after the last heartbeat {action or 'it does nothing'}"
-    station = round(parameters.get("SYSID_MYGCS", GCS_SYSTEM))
-    if station != GCS_SYSTEM:
-        line += f" (it listens for system {station}, not for this program)"
+    stations = listened_for(parameters)
+    if GCS_SYSTEM not in stations:
+        which = f"system {stations[0]}" if len(stations) == 1 else f"systems {stations[0]} to {stations[-1]}"
+        line += f" (it listens for {which}, not for this program)"
     goes_on = round(parameters.get("FS_OPTIONS", 0.0)) & _MISSIONS_GO_ON
     return f"{line}; a mission goes on" if copter and goes_on else line

@@ -32,7 +32,7 @@ from volery.vehicles.drivers.mavlink.backend import (
 from volery.vehicles.drivers.mavlink.decoder import TelemetryDecoder
 from volery.vehicles.drivers.mavlink.services import MavlinkServices, item_fields
 from volery.vehicles.firmware_versions import Coverage, MinorVersion, stated_version
-from volery.vehicles.services import Item
+from volery.vehicles.services import Item, RenamedParameter
 from volery.vehicles.telemetry import Answer, Telemetry
 
 GCS_SYSTEM, GCS_COMPONENT = 255, 190
@@ -88,6 +88,7 @@ class Firmware(NamedTuple):
         estimator: message with the state of its estimator.
         home_first: item 0 of its missions is home.
         turning: type mask of SET_ATTITUDE_TARGET beside a yaw rate.
+        renamed: parameters with another name in another version, by both names.
         bytewise: whole parameter values lie in the bytes of the float (see ``from_bytewise``), as in PX4.
     """
 
@@ -98,6 +99,7 @@ class Firmware(NamedTuple):
     coverage: Coverage
     estimator: str
     turning: int
+    renamed: Mapping[str, RenamedParameter] = {}
     bytewise: bool = False
     home_first: bool = False
 
@@ -270,6 +272,7 @@ class MavlinkClient:
             self._send_to,
             bytewise=self.firmware.bytewise,
             home_first=self.firmware.home_first,
+            renamed=self.firmware.renamed,
             sender=(GCS_SYSTEM, GCS_COMPONENT),
         )
         link.receive(self._receive)
@@ -343,8 +346,8 @@ class MavlinkClient:
             return self._handle_command_ack(fields)
         if frame.name == VERSION:
             return self._handle_version(fields["flight_sw_version"])
-        if frame.name == "PARAM_VALUE":
-            return self._handle_parameter(fields)
+        if frame.name in {"PARAM_VALUE", "PARAM_ERROR"}:
+            return self._handle_parameter(frame.name == "PARAM_ERROR", fields)
         if self._upload is None or not _for_us(fields):
             return False
         # PX4 requests its first item by the older MISSION_REQUEST, ArduPilot all of them
@@ -365,15 +368,24 @@ class MavlinkClient:
         self._note_answer(ACK_KEYS[command], result == _ACCEPTED, entry_name("MAV_RESULT", result))
         return True
 
-    def _handle_parameter(self, fields: Mapping[str, Any]) -> bool:
+    def _handle_parameter(self, missing: bool, fields: Mapping[str, Any]) -> bool:
         """Store a requested parameter; another station may list all parameters at the same time."""
         name: str = fields["param_id"]
+        if missing:
+            self._requests.note_answered(name)
+            return False
         value = parameter_value(fields, self.firmware.bytewise)
         if name not in self._requested_parameters() or not isfinite(value):
             return False
         self._parameters[name] = value
-        self._requests.note_answered(name)
+        for settled in (name, *self._absent_beside(name)):
+            self._requests.note_answered(settled)
         return True
+
+    def _absent_beside(self, name: str) -> Sequence[str]:
+        """Return the parameters that a firmware which has *name* does not have."""
+        renamed = self.firmware.renamed.get(name)
+        return () if renamed is None else (renamed.other(name),)
 
     def _handle_version(self, number: int) -> bool:
         """Note the version that the vehicle states, and say if it is too old or not covered by the rules."""

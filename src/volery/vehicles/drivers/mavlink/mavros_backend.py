@@ -48,7 +48,7 @@ from volery.vehicles.drivers.mavlink.backend import (
 )
 from volery.vehicles.drivers.mavlink.mavros_services import MavrosServices, to_waypoint
 from volery.vehicles.drivers.steps import ROVER_KIND
-from volery.vehicles.services import Item
+from volery.vehicles.services import Item, RenamedParameter
 from volery.vehicles.telemetry import Answer, Battery, StatusText, Telemetry, Velocity
 
 PERIOD: Ns = 100 * MS
@@ -73,6 +73,8 @@ class FirmwareBehind(NamedTuple):
     """Whether item 0 of a mission is home."""
     turning: int
     """Type mask of SET_ATTITUDE_TARGET beside a yaw rate."""
+    renamed: Mapping[str, RenamedParameter] = {}
+    """Parameters with another name in another version, by both names."""
 
 
 class MavrosDecoder:
@@ -249,6 +251,7 @@ class MavrosBackend:
             self._namespace,
             self._spin,
             home_first=self.firmware.home_first,
+            renamed=self.firmware.renamed,
         )
 
     def _name(self, name: str) -> str:

@@ -8,17 +8,24 @@ answer for is reported as ``NotArrived``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isclose
 from typing import Any, TypeVar
 
-from volery.base.errors import CapabilityError, NotArrived, Refused, did_you_mean
+from volery.base.errors import CapabilityError, NotArrived, Refused
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.links.mavlink_messages import constant, entry_name
 from volery.ros.graph import Node, QoS, ServiceError
 from volery.ros.messages import new, request
-from volery.vehicles.services import Item, LogEntry, Parameter, mavlink_parameter_name
+from volery.vehicles.services import (
+    Item,
+    LogEntry,
+    Parameter,
+    RenamedParameter,
+    mavlink_parameter_name,
+    missing_parameter,
+)
 from volery.vehicles.telemetry import Telemetry
 
 ANSWERED_WITHIN: Ns = 15 * S
@@ -60,15 +67,25 @@ class MavrosServices:
         namespace: namespace of the vehicle node.
         spin: one round of the node's loop.
         home_first: whether item 0 of a mission is home, as in ArduPilot.
+        renamed: parameters with another name in another version of the firmware, by both names.
     """
 
     files = None
     sender = None
 
     def __init__(
-        self, kernel: Kernel, node: Node, telemetry: Telemetry, namespace: str, spin: Action, home_first: bool
+        self,
+        kernel: Kernel,
+        node: Node,
+        telemetry: Telemetry,
+        namespace: str,
+        spin: Action,
+        *,
+        home_first: bool,
+        renamed: Mapping[str, RenamedParameter] = {},
     ) -> None:
         self.home_first = home_first
+        self.renamed = renamed
         self._kernel = kernel
         self._node = node
         self._telemetry = telemetry
@@ -192,9 +209,7 @@ class MavrosServices:
             self._pull(asked)  # MAVROS answers from what it has pulled
             value = self._read(asked, name)
         if value is None:
-            hint = did_you_mean(name, self._pulled_values(asked))
-            missing = f"an autopilot does not answer for a parameter that it does not have{hint}"
-            raise NotArrived(self._name, asked, missing)
+            raise missing_parameter(self._name, name, self._pulled_values(asked), self.renamed.get(name))
         return self._as_parameter(name, value)
 
     def _read(self, asked: str, name: str) -> float | int | None:
@@ -209,6 +224,8 @@ class MavrosServices:
         whole = self._is_whole(asked, name)
         if whole and value != round(value):
             raise Refused(self._name, asked, "it takes whole numbers only")
+        if whole and not -(2**31) <= value < 2**31:
+            raise Refused(self._name, asked, "it takes whole numbers of 32 bits")
         if self._is_mavros_1():
             given = {"integer": round(value), "real": 0.0} if whole else {"integer": 0, "real": value}
             answer = self._call(asked, "param/set", "ParamSet", param_id=name, value=given)

@@ -6,11 +6,11 @@ calls block the calling task; several tasks may ask at once, because an answer i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from math import isclose
+from collections.abc import Callable, Mapping, Sequence
+from math import isclose, isfinite
 from typing import Any
 
-from volery.base.errors import CapabilityError, Refused, did_you_mean
+from volery.base.errors import CapabilityError, NotArrived, Refused
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Lock
@@ -24,14 +24,26 @@ from volery.links.mavlink_messages import (
     to_bytewise,
 )
 from volery.vehicles.drivers.mavlink.file_transfer import FileTransfer
-from volery.vehicles.drivers.mavlink.pending_requests import PendingRequests
+from volery.vehicles.drivers.mavlink.pending_requests import AGAIN, TRIES, PendingRequests
 from volery.vehicles.rtcm import correction_parts
-from volery.vehicles.services import Item, LogEntry, Parameter, mavlink_parameter_name
+from volery.vehicles.services import (
+    Item,
+    LogEntry,
+    Parameter,
+    RenamedParameter,
+    mavlink_parameter_name,
+    missing_parameter,
+)
 from volery.vehicles.telemetry import Telemetry
 
 ANSWERED_WITHIN: Ns = 10 * S
 MISSING_AT_ONCE = 20
 """Number of missing parameters that are requested together."""
+
+KEPT_TIMES = 2
+"""How often the old value must come in answer to a new one before it counts as the answer."""
+LATE_WITHIN: Ns = 250 * MS
+"""Time after a new value was sent in which the old one is rather the answer to an earlier request."""
 
 LOG_PART = 90
 """Bytes in one LOG_DATA."""
@@ -40,6 +52,16 @@ _ACCEPTED = constant("MAV_RESULT_ACCEPTED")
 _IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
 _UNSUPPORTED = constant("MAV_RESULT_UNSUPPORTED")
 _REQUEST_MESSAGE = constant("MAV_CMD_REQUEST_MESSAGE")
+_DOES_NOT_EXIST = constant("MAV_PARAM_ERROR_DOES_NOT_EXIST")
+LARGEST_FLOAT = 3.4028235e38
+_WHOLE: Mapping[int, tuple[int, int]] = {
+    constant(f"MAV_PARAM_TYPE_{sign}INT{bits}"): (
+        (0, 2**bits - 1) if sign else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    )
+    for sign in ("U", "")
+    for bits in (8, 16, 32, 64)
+}
+"""Smallest and largest value of whole parameters, by MAV_PARAM_TYPE."""
 _REAL32, _REAL64 = constant("MAV_PARAM_TYPE_REAL32"), constant("MAV_PARAM_TYPE_REAL64")
 
 Send = Callable[..., None]
@@ -54,6 +76,7 @@ class MavlinkServices(PendingRequests):
         send: sends a message without a target.
         send_to: sends a message, given its name and its fields without the target.
         bytewise: whether whole parameters lie in the bytes of the float, as in PX4.
+        renamed: parameters with another name in another version of the firmware, by both names.
         home_first: whether item 0 of a mission is home, as in ArduPilot.
         sender: system and component ids that the messages are sent with.
     """
@@ -67,6 +90,7 @@ class MavlinkServices(PendingRequests):
         *,
         bytewise: bool,
         home_first: bool,
+        renamed: Mapping[str, RenamedParameter] = {},
         sender: tuple[int, int] | None = None,
     ) -> None:
         super().__init__(kernel, telemetry.name)
@@ -76,8 +100,10 @@ class MavlinkServices(PendingRequests):
         self._telemetry = telemetry
         self._send, self._send_to = send, send_to
         self._bytewise = bytewise
+        self.renamed = renamed
         self._plan_lock = Lock(kernel, f"plan of {telemetry.name}")
         self._known: dict[str, Parameter] = {}
+        self._whole = False  # all parameters are known, and none was written since
         self._correction = 0
 
     def command(self, asked: str, command: str, *parameters: float, within: Ns = 0) -> None:
@@ -127,37 +153,80 @@ class MavlinkServices(PendingRequests):
 
     def read_parameter(self, name: str) -> Parameter:
         """See ``Services``."""
+        if self._whole and name not in self._known:
+            raise self._missing(name)
+        found = self._ask_parameter(name, AGAIN)
+        if found is None:  # nearly all that do not answer do not exist: all names are read once
+            if name not in self.read_parameters():
+                raise self._missing(name)
+            found = self._ask_parameter(name, AGAIN * TRIES)
+        if found is None:
+            raise NotArrived(
+                self._name, f"read the parameter {name}", f"no answer within {AGAIN * TRIES / S:g} s"
+            )
+        return found
+
+    def _ask_parameter(self, name: str, within: Ns) -> Parameter | None:
+        """Return a parameter; ``None`` if no answer arrives. ``Refused`` if it is answered by an error."""
+        asked = f"read the parameter {name}"
+        try:
+            return self.ask(
+                asked,
+                lambda: self._send_to("PARAM_REQUEST_READ", param_id=name, param_index=-1),
+                self._answer_for(name, asked),
+                within=within,
+            )
+        except NotArrived:
+            return None
+
+    def _answer_for(self, name: str, asked: str) -> Callable[[Frame], Parameter | None]:
+        """Return a function that takes the value of a parameter, or the error that is sent in its place."""
 
         def answer(frame: Frame) -> Parameter | None:
+            if frame.name == "PARAM_ERROR" and frame.fields["param_id"] == name:
+                error = frame.fields["error"]
+                if error == _DOES_NOT_EXIST:
+                    raise self._missing(name)
+                raise Refused(
+                    self._name, asked, f"the autopilot answered {entry_name('MAV_PARAM_ERROR', error)}"
+                )
             found = self._parameter(frame)
             return found if found is not None and found.name == name else None
 
-        hint = did_you_mean(name, self._known) if name not in self._known else ""
-        return self.ask(
-            f"read the parameter {name}",
-            lambda: self._send_to("PARAM_REQUEST_READ", param_id=name, param_index=-1),
-            answer,
-            unanswered=f": an autopilot does not answer for a parameter that it does not have{hint}",
-        )
+        return answer
+
+    def _missing(self, name: str) -> Refused:
+        return missing_parameter(self._name, name, self._known, self.renamed.get(name))
 
     def write_parameter(self, name: str, value: float) -> Parameter:
         """See ``Services``."""
         before = self.read_parameter(name)
         asked = f"set the parameter {name} to {value:g}"
-        if before.type not in (_REAL32, _REAL64) and value != round(value):
-            raise Refused(self._name, asked, "it takes whole numbers only")
+        _check_fits(self._name, asked, before, value)
         sent = to_bytewise(before.type, value) if self._bytewise else value
+        taken = self._answer_for(name, asked)
+        began, kept = self._kernel.now(), 0
+
+        def send() -> None:
+            self._send_to("PARAM_SET", param_id=name, param_value=sent, param_type=before.type)
 
         def answer(frame: Frame) -> Parameter | None:
-            found = self._parameter(frame)
-            return found if found is not None and found.name == name else None
+            nonlocal kept
+            found = taken(frame)
+            if found is None or _same(found.value, value):
+                return found
+            if not _same(found.value, before.value):
+                return found  # it keeps a third value
+            # perhaps a late answer to the request before: only one that comes again is the answer
+            kept += 1
+            if kept <= KEPT_TIMES or self._kernel.now() - began < LATE_WITHIN:
+                send()
+                return None
+            return found
 
-        after = self.ask(
-            asked,
-            lambda: self._send_to("PARAM_SET", param_id=name, param_value=sent, param_type=before.type),
-            answer,
-        )
-        if not isclose(after.value, value, rel_tol=1e-6, abs_tol=1e-6):
+        after = self.ask(asked, send, answer)
+        self._whole = False  # it may have brought others into being
+        if not _same(after.value, value):
             raise Refused(self._name, asked, f"the autopilot keeps {after.value:g}")
         return after
 
@@ -191,7 +260,9 @@ class MavlinkServices(PendingRequests):
             whole=lambda: 0 < counts[0] <= len(by_index),
             so_far=so_far,
         )
-        return {found.name: found for _, found in sorted(by_index.items())}
+        read = {found.name: found for _, found in sorted(by_index.items())}
+        self._known, self._whole = dict(read), True
+        return read
 
     # -- metadata
 
@@ -336,6 +407,24 @@ class MavlinkServices(PendingRequests):
             for fields in correction_parts(message, self._correction):
                 self._send("GPS_RTCM_DATA", **fields)
             self._correction = (self._correction + 1) % 32
+
+
+def _same(one: float, other: float) -> bool:
+    """Return whether two values differ by no more than a 32-bit float does."""
+    return isclose(one, other, rel_tol=1e-6, abs_tol=1e-6)
+
+
+def _check_fits(vehicle: str, asked: str, before: Parameter, value: float) -> None:
+    """Raise ``Refused`` if a value does not fit the type: the autopilot would keep another one."""
+    if before.type in (_REAL32, _REAL64):
+        if before.type == _REAL32 and isfinite(value) and abs(value) > LARGEST_FLOAT:
+            raise Refused(vehicle, asked, f"its numbers go up to {LARGEST_FLOAT:g}")
+        return
+    if value != round(value):
+        raise Refused(vehicle, asked, "it takes whole numbers only")
+    limits = _WHOLE.get(before.type)
+    if limits is not None and not limits[0] <= value <= limits[1]:
+        raise Refused(vehicle, asked, f"it takes whole numbers from {limits[0]} to {limits[1]}")
 
 
 _LISTS = {0: "mission", 1: "geofence", 2: "rally points"}

@@ -61,6 +61,35 @@ def test_parameters_are_asked_for_until_they_come(bench: Make) -> None:
     assert len(at.autopilot.sent("PARAM_REQUEST_READ")) == len(asked)
 
 
+@pytest.mark.parametrize("newer", [False, True])
+def test_the_station_that_counts_is_known_in_a_second_by_either_name(bench: Make, newer: bool) -> None:
+    """Before 4.7 one name, since then two others, and an error for what there is not."""
+    at = bench()
+    driver = at.vehicle._driver
+    common = {"FS_GCS_ENABLE": 1.0, "FS_GCS_TIMEOUT": 5.0, "FS_OPTIONS": 0.0, "GUID_TIMEOUT": 3.0}
+    fence = {"FENCE_ENABLE": 0.0, "FENCE_TYPE": 7.0, "FENCE_RADIUS": 100.0, "FENCE_ALT_MAX": 100.0}
+    own = {"MAV_GCS_SYSID": 240.0, "MAV_GCS_SYSID_HI": 250.0} if newer else {"SYSID_MYGCS": 240.0}
+    at.autopilot.parameters = common | fence | own
+    at.kernel.run(S + 500 * MS)
+    which = "systems 240 to 250" if newer else "system 240"
+    assert f"it listens for {which}, not for this program" in driver.on_link_loss()
+    assert "not for" not in on_link_loss(
+        "drone", common | own | {"MAV_GCS_SYSID_HI": 255.0, "SYSID_MYGCS": 255}
+    )
+
+
+def test_an_error_for_a_parameter_is_its_answer(bench: Make) -> None:
+    at = bench()
+    driver = at.vehicle._driver
+    at.autopilot.parameters = {"FS_GCS_ENABLE": 0.0}
+    names = driver._backend._requested_parameters
+    at.kernel.run(S + 500 * MS)
+    for name in names():
+        at.autopilot.say("PARAM_ERROR", param_id=name, param_index=-1, error=1)
+    at.kernel.run(2 * S)
+    assert driver.on_link_loss().startswith("it does not react (FS_GCS_ENABLE=0)")
+
+
 def test_parameters_that_another_station_reads_are_nothing_to_us(bench: Make) -> None:
     at = bench(Rover)
     at.kernel.run(2 * S)

@@ -12,7 +12,7 @@ import pytest
 
 from rigs.airstrip import Airstrip, at
 from rigs.missions import carried_out
-from volery.base.errors import CapabilityError, NotArrived, Refused
+from volery.base.errors import CapabilityError, Refused
 from volery.base.time import MS, S
 from volery.bridge import serve_vehicle
 from volery.bridge.vehicle_node import VehicleNodeOptions
@@ -83,7 +83,7 @@ def test_parameters(firmware: str, ros2: bool, tmp_path: Path) -> None:
         drone.parameters.set(whole, off)
         with pytest.raises(Refused, match="takes whole numbers only"):
             drone.parameters.set(whole, 0.5)
-        with pytest.raises(NotArrived, match="does not answer for a parameter that it does not have"):
+        with pytest.raises(Refused, match="has no parameter NO_SUCH_NAME"):
             drone.parameters.get("NO_SUCH_NAME")
         assert [one.name for one in drone.parameters.load(file)] == [real]
 
