@@ -32,7 +32,8 @@ from volery.cli.options import Debug, Json, Quiet
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
 
-OK, FAILED, BAD_INPUT = 0, 1, 2
+OK, FAILED, BAD_INPUT, LEFT_OUT = 0, 1, 2, 3
+"""Exit statuses. ``LEFT_OUT``: done, but for what the output names; ``--allow-loss`` makes it ``OK``."""
 
 BAD_INPUT_ERRORS = (ModelError, UsageError, EstimateError, CapabilityError)
 """Errors that the user corrects in a file or in the call."""

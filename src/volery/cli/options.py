@@ -47,6 +47,9 @@ Topics = Annotated[
     list[str] | None, typer.Option("--topic", metavar="NAME", help="Only this topic; may be repeated.")
 ]
 Recording = Annotated[Path, typer.Argument(help=".bag or .mcap file, or the folder of a rosbag 2.")]
+AllowLoss = Annotated[
+    bool, typer.Option("--allow-loss", help="Exit with status 0 although something is left out, not 3.")
+]
 NewRecording = Annotated[
     Path, typer.Argument(help="NAME.bag for a rosbag 1; any other name for the folder of a rosbag 2.")
 ]

@@ -7,6 +7,7 @@ states that the vehicle is armed and in the air. ``read_signals`` returns all th
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -437,10 +438,12 @@ def _bag_tables(path: Path) -> Tables:
 
     bag = open_bag(path)
     rows: dict[str, list[dict[str, float]]] = {}
+    several = [name for name, count in Counter(topic.name for topic in bag.topics).items() if count > 1]
     for at, topic, message in bag.messages(bag.usual):
         numbers = {TIME: to_seconds(at - bag.start)}
         _numbers_of(message, "", numbers)
-        rows.setdefault(topic, []).append(numbers)
+        name = f"{topic}[{message.__msgtype__}]" if topic in several else topic
+        rows.setdefault(name, []).append(numbers)
     return {
         topic: {column: np.array([row[column] for row in found]) for column in found[0]}
         for topic, found in rows.items()

@@ -18,13 +18,17 @@ from volery.base.errors import UsageError
 from volery.base.time import S
 from volery.kernel.wall import WallKernel
 from volery.ros.graph import LATCHED, QoS
+from volery.ros.graph.interface import BEST_EFFORT, TRANSIENT_LOCAL
+from volery.ros.graph.rosbag import Recorder
 from volery.ros.messages import new, request, service
+from volery.ros.messages.bags import create_bag, open_bag
 from volery.ros.transports.ros2 import carried, ros2_graph
 from volery.testing.checks import demand, raising
 from volery.testing.transport_conformance import ROS2, Site, no_fault, run_checks
 from volery.trace.events import Text
 
 STRING = "std_msgs/msg/String"
+RANGE = "sensor_msgs/msg/Range"
 STATE, SET_MODE = "mavros_msgs/msg/State", "mavros_msgs/srv/SetMode"
 
 
@@ -64,9 +68,47 @@ def a_type_without_support(site: Site, texts: list[str]) -> None:
 
 
 def a_type_with_other_fields(site: Site, texts: list[str]) -> None:
-    with raising(UsageError, naming="sensor_msgs/msg/Range") as caught:
-        site.node("node").advertise("range", "sensor_msgs/msg/Range")
-    demand("variance" in caught.text, caught.text)
+    """A class of rclpy that is not that of the distribution, as of a workspace with a changed package."""
+    from geometry_msgs.msg import Pose2D
+
+    cls: Any = Pose2D
+    given = cls.get_fields_and_field_types
+    cls.get_fields_and_field_types = classmethod(lambda cls: {**given(), "height": "double"})
+    try:
+        with raising(UsageError, naming="geometry_msgs/msg/Pose2D") as caught:
+            site.node("node").advertise("pose", "geometry_msgs/msg/Pose2D")
+    finally:
+        cls.get_fields_and_field_types = given
+    demand("height" in caught.text and "definitions of" in caught.text, caught.text)
+
+
+def fields_of_this_distribution(site: Site, texts: list[str]) -> None:
+    """A range finder's message has a variance since Iron; it is exchanged and recorded with it."""
+    node, other = site.node("node"), site.spinning(site.node("other"))
+    heard: list[Any] = []
+    other.subscribe("range", RANGE, heard.append)
+    publisher = node.advertise("range", RANGE, QoS(1, BEST_EFFORT, TRANSIENT_LOCAL))
+    site.until(node, publisher.subscribers, "they connect")
+    kernel = site.graph.kernel
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "bag"
+        with create_bag(path) as writer:
+            recorder = Recorder(site.graph, site.node("recorder"), writer, topics=[publisher.topic])
+            kernel.call_at(kernel.now() + 2 * S, lambda: publish(publisher))
+            kernel.call_at(kernel.now() + 4 * S, recorder.stop)
+            recorder.run()
+        demand(not recorder.problems, str(recorder.problems))
+        bag = open_bag(path)
+        (read,) = bag.messages()
+        (profile,) = bag.connections[0].source.offer.qos
+    demand(read.message.variance == 0.25, str(read))
+    offered = profile.reliability.name, profile.durability.name, bag.connections[0].source.offer.latched
+    demand(offered == ("BEST_EFFORT", "TRANSIENT_LOCAL", True), str(offered))
+    demand([one.variance for one in heard] == [0.25], str(heard))
+
+
+def publish(publisher: Any) -> None:
+    publisher.publish(new(RANGE, range=1.5, variance=0.25))
 
 
 def a_flood(site: Site, texts: list[str]) -> None:
@@ -158,6 +200,7 @@ def a_thousand_topics(site: Site, texts: list[str]) -> None:
 FAULTS = (
     a_type_without_support,
     a_type_with_other_fields,
+    fields_of_this_distribution,
     a_flood,
     a_message_that_is_none,
     a_subscriber_that_never_reads,

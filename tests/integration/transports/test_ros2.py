@@ -22,6 +22,7 @@ DISTRIBUTIONS = ("jazzy", "kilted")
 FAULTS = (
     "fault-a-type-without-support",
     "fault-a-type-with-other-fields",
+    "fault-fields-of-this-distribution",
     "fault-a-flood",
     "fault-a-message-that-is-none",
     "fault-a-subscriber-that-never-reads",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,13 +14,13 @@ from rich.text import Text
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, S, clock, from_seconds, to_seconds
-from volery.cli.command import OK, Commands
+from volery.cli.command import LEFT_OUT, OK, Commands
 from volery.cli.console import Output, make_table, number_column
-from volery.cli.options import NewRecording, OnGraph, Recording, Seed, Topics
+from volery.cli.options import AllowLoss, NewRecording, OnGraph, Recording, Seed, Topics
 
 if TYPE_CHECKING:
     from volery.ros.graph.snapshot import GraphSnapshot
-    from volery.ros.messages.bags import Bag
+    from volery.ros.messages.bags import Bag, BagConnection
     from volery.trace.events import Event
 
 bag_commands = Commands("ROS", group="bag", summary="Read, play and write rosbag 1, rosbag 2 and MCAP.")
@@ -41,6 +41,7 @@ def info(output: Output, recording: Recording) -> int:
             "start_ns": bag.start,
             "end_ns": bag.end,
             "topics": [topic._asdict() for topic in bag.topics],
+            "connections": [_described(one) for one in bag.connections],
             "unreadable": bag.unreadable,
         }
     )
@@ -51,8 +52,42 @@ def info(output: Output, recording: Recording) -> int:
         rate = f"{topic.messages / duration:.3g}" if duration else ""
         listed.add_row(Text(topic.name), Text(topic.type), str(topic.messages), rate)
     output.show(listed)
+    for connection in bag.connections:
+        words = _offered(connection)
+        if words:
+            output.show(Text(f"{connection.source.topic}: {words}"))
     _note_defects(output, bag)
     return OK
+
+
+def _described(connection: BagConnection) -> dict[str, object]:
+    source = connection.source
+    return {
+        "topic": source.topic,
+        "type": source.type,
+        "messages": connection.messages,
+        "encoding": source.encoding,
+        "latched": source.offer.latched,
+        "sender": source.offer.sender,
+        "qos": [
+            {
+                "reliability": one.reliability.name.lower(),
+                "durability": one.durability.name.lower(),
+                "history": one.history.name.lower(),
+                "depth": one.depth,
+            }
+            for one in source.offer.qos
+        ],
+    }
+
+
+def _offered(connection: BagConnection) -> str:
+    """Return what is special about a connection's QoS: latched, best effort; empty if nothing is."""
+    offer = connection.source.offer
+    words = ["latched"] if offer.latched else []
+    if any(one.reliability.name == "BEST_EFFORT" for one in offer.qos):
+        words.append("best effort")
+    return ", ".join(words) + (f", by {offer.sender}" if words and offer.sender else "")
 
 
 @bag_commands.add("quiet", "json", "debug")
@@ -68,11 +103,12 @@ def play(
         float,
         typer.Option(help="Seconds to wait before the first and after the last message."),
     ] = 0.5,
+    allow_loss: AllowLoss = False,
 ) -> int:
     """Play a recording into a real ROS graph."""
     from volery.ros.graph.rosbag import PlayOptions
     from volery.ros.graph.rosbag import play as play_bag
-    from volery.ros.messages.bags import open_bag
+    from volery.ros.messages.bags import OF_THE_RUN, open_bag
     from volery.run.assembly.ros_graphs import on_graph
 
     bag = open_bag(recording)
@@ -94,7 +130,8 @@ def play(
     _note_damage(output, bag)
     output.give({"played": played})
     output.show(f"played {played} messages")
-    return OK
+    lost = bag.damage or (not topics and any(not one.startswith(OF_THE_RUN) for one in bag.unreadable))
+    return LEFT_OUT if lost and not allow_loss else OK
 
 
 @bag_commands.add("quiet", "json", "debug")
@@ -104,6 +141,7 @@ def record(
     on: OnGraph = "ros1",
     topics: Topics = None,
     seconds: Annotated[float | None, typer.Option(help="Duration; by default until Ctrl-C.")] = None,
+    allow_loss: AllowLoss = False,
 ) -> int:
     """Record a real ROS graph: all topics as they appear, or only the named ones."""
     from volery.ros.graph.rosbag import Recorder
@@ -131,54 +169,75 @@ def record(
             drawing.cancel()
     output.give({"recorded": recorder.counts, "problems": recorder.problems})
     for topic, why in recorder.problems.items():
-        output.note(f"{topic} was not recorded: {why}")
+        output.note(f"{topic} was not recorded completely: {why}")
     total, number = sum(recorder.counts.values()), len(recorder.counts)
     output.show(f"recorded {total} messages of {number} topics in {out}")
-    return OK
+    return LEFT_OUT if recorder.problems and not allow_loss else OK
 
 
 @bag_commands.add("quiet", "json", "debug")
-def convert(output: Output, recording: Recording, out: NewRecording, topics: Topics = None) -> int:
-    """Write a recording, or the trace of a run, in another format."""
-    from volery.ros.messages.bags import create_bag, open_bag
+def convert(
+    output: Output,
+    recording: Recording,
+    out: NewRecording,
+    topics: Topics = None,
+    allow_loss: AllowLoss = False,
+) -> int:
+    """Write a recording, or the trace of a run, in another format; exit with 3 if something is left out.
+
+    Within ROS 1 and within ROS 2 the definitions of the recording are kept.
+    """
+    from volery.ros.messages.bags import OF_THE_RUN, create_bag, open_bag
 
     bag = open_bag(recording)
-    _note_defects(output, bag)
     if out.resolve() == recording.resolve():
         raise UsageError(f"{out} is the recording itself; give another name")
-    left_out: dict[str, str] = {}
+    chosen = set(topics or bag.usual)
+    unknown = chosen - {topic.name for topic in bag.topics}
+    if unknown:
+        raise UsageError(f"{recording} has no topic {', '.join(sorted(unknown))}")
+    of_the_run = {one for one in bag.unreadable if one.startswith(OF_THE_RUN)}
+    left_out = {
+        topic: why
+        for topic, why in bag.unreadable.items()
+        if (topic in chosen or not topics) and topic not in of_the_run
+    }
+    _note_defects(output, bag, but=of_the_run | left_out.keys())
     written = 0
     duration = to_seconds(bag.end - bag.start)
     with create_bag(out) as writer, _progress_bar(output, duration, f"writing {out.name}") as show:
-        for recorded in bag.messages(tuple(topics or ()) or bag.usual):
-            if recorded.topic in left_out:
-                continue
+        for connection, raw in bag.raw(chosen):
             try:
-                writer.write(recorded.topic, recorded.at, recorded.message)
+                writer.copy(connection, raw.at, raw.data)
             except UsageError as error:
-                left_out[recorded.topic] = str(error)
+                left_out.setdefault(raw.source.topic, f"messages that cannot be written: {error}")
                 continue
             written += 1
-            show(to_seconds(recorded.at - bag.start))
+            show(to_seconds(raw.at - bag.start))
+    fields = bag.left_out
     for topic, why in left_out.items():
-        output.note(f"{topic} is left out: {why}")
+        output.note(f"{topic}: left out: {why}")
+    for topic, why in fields.items():
+        output.note(f"{topic}: fields are left out: {why}")
     _note_damage(output, bag)
-    output.give({"written": written, "left_out": left_out})
+    output.give({"written": written, "left_out": left_out, "fields_left_out": fields})
     output.show(f"wrote {written} messages to {out}")
-    return OK
+    lost = left_out or fields or bag.damage or not bag.complete
+    return LEFT_OUT if lost and not allow_loss else OK
 
 
-def _note_defects(output: Output, bag: Bag) -> None:
+def _note_defects(output: Output, bag: Bag, but: Collection[str] = ()) -> None:
     if not bag.complete:
         output.note(f"{bag.path} is truncated; only its complete part is read")
     for topic, why in bag.unreadable.items():
-        output.note(f"{topic} is left out: {why}")
+        if topic not in but:
+            output.note(f"{topic} is left out: {why}")
     _note_damage(output, bag)
 
 
 def _note_damage(output: Output, bag: Bag) -> None:
-    """Report what reading the messages has found to be damaged."""
-    for what in bag.damage:
+    """Report what reading the messages has found: damage, and definitions that differ from ours."""
+    for what in (*bag.damage, *bag.differences):
         output.note(what)
 
 

@@ -425,6 +425,11 @@ class EmbeddedGraph:
                 states.append(TopicState(name, topic.type, publishers, subscribers))
         return states
 
+    def offered(self, topic: str) -> tuple[QoS, ...]:
+        """Return what the publishers of a topic offer."""
+        found = self._graph.topics.get(topic)
+        return tuple(one.qos for one in found.publishers) if found is not None else ()
+
     def has_subscribers(self, topic_name: str) -> bool:
         """Return whether a node subscribes to the topic, without being an interaction point."""
         topic = self._graph.topics.get(topic_name)

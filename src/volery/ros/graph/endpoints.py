@@ -248,6 +248,10 @@ class EmbeddedSubscription:
         if self._queue:
             self._callback(self._queue.popleft())
 
+    def latest_sender(self) -> tuple[str, bool]:
+        """Return nothing: what publishers offer is known of the topic."""
+        return "", False
+
     def publishers(self) -> int:
         """Return the number of publishers it is connected to."""
         with self.node.kernel:

@@ -152,6 +152,11 @@ class Subscription(Protocol):
 
     topic: str
     type: str
+    dropped: int
+    """Number of messages that a full queue has dropped."""
+
+    def latest_sender(self) -> tuple[str, bool]:
+        """Return who sent the message whose callback runs and whether it latches, where ROS 1 states it."""
 
     def publishers(self) -> int:
         """Return the number of publishers it is connected to."""
@@ -395,6 +400,9 @@ class RosGraph(Protocol):
 
     def topics(self) -> list[TopicState]:
         """Return the topics that have a publisher or a subscription, by name."""
+
+    def offered(self, topic: str) -> tuple[QoS, ...]:
+        """Return what the publishers of a topic offer; nothing in ROS 1. An unknown depth is None."""
 
     def services(self) -> list[ServiceState]:
         """Return the services that have a server, by name."""

@@ -8,9 +8,22 @@ from functools import partial
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns, S, from_seconds
-from volery.ros.graph.interface import AS_OFFERED, CLOCK, LATCHED, Node, Publisher, QoS, RosGraph
+from volery.ros.graph.interface import (
+    AS_OFFERED,
+    BEST_EFFORT,
+    CLOCK,
+    RELIABLE,
+    TRANSIENT_LOCAL,
+    VOLATILE,
+    Node,
+    Publisher,
+    QoS,
+    RosGraph,
+    Subscription,
+)
 from volery.ros.messages import Message, new
-from volery.ros.messages.bags import Bag, BagWriter
+from volery.ros.messages.bags import Bag, BagConnection, BagWriter, qos_profile
+from volery.ros.messages.containers import Offer
 
 _DISCOVERY_PERIOD: Ns = 500 * MS
 _QUEUED: QoS = QoS(1000, AS_OFFERED.reliability, AS_OFFERED.durability)
@@ -44,6 +57,8 @@ class Recorder:
         self._topics = None if topics is None else frozenset(node.resolve(topic) for topic in topics)
         self._on_message = on_message
         self._seen: set[str] = set()
+        self._subscriptions: dict[str, Subscription] = {}
+        self._offers: dict[str, Offer] = {}
         self._stopped = False
         self.counts: dict[str, int] = {}
         self.problems: dict[str, str] = {}
@@ -57,6 +72,9 @@ class Recorder:
                 looked = now
                 self._discover()
             self._node.spin_once(_DISCOVERY_PERIOD)
+        for topic, subscription in self._subscriptions.items():
+            if subscription.dropped:
+                self.problems.setdefault(topic, f"{subscription.dropped} messages came too fast")
 
     def stop(self) -> None:
         """Stop recording; ``run`` returns within half a second."""
@@ -65,19 +83,28 @@ class Recorder:
     def _discover(self) -> None:
         for topic in self._graph.topics():
             wanted = topic.publishers and (self._topics is None or topic.name in self._topics)
+            if wanted:
+                self._offers[topic.name] = _offer(self._graph.offered(topic.name))
             if not wanted or topic.name in self._seen:
                 continue
             self._seen.add(topic.name)
             try:
-                self._node.subscribe(topic.name, topic.type, partial(self._write, topic.name), _QUEUED)
+                self._subscriptions[topic.name] = self._node.subscribe(
+                    topic.name, topic.type, partial(self._write, topic.name), _QUEUED
+                )
             except UsageError as error:
                 self.problems[topic.name] = str(error)
 
     def _write(self, topic: str, message: Message) -> None:
         if topic in self.problems:
             return
+        offer = self._offers[topic]
+        subscription = self._subscriptions.get(topic)
+        sender, latched = subscription.latest_sender() if subscription is not None else ("", False)
+        if sender:
+            offer = Offer(latched, sender)
         try:
-            self._writer.write(topic, self._node.now(), message)
+            self._writer.write(topic, self._node.now(), message, offer)
         except UsageError as error:
             self.problems[topic] = str(error)
             return
@@ -85,10 +112,20 @@ class Recorder:
         self._on_message(topic)
 
 
+def _offer(offered: Collection[QoS]) -> Offer:
+    """Return what the publishers of a topic offer, as recordings state it."""
+    profiles = [
+        qos_profile(one.reliability != BEST_EFFORT, one.durability == TRANSIENT_LOCAL, one.depth or 0)
+        for one in offered
+    ]
+    latched = any(one.durability == TRANSIENT_LOCAL for one in offered)
+    return Offer(latched, "", tuple(dict.fromkeys(profiles)))
+
+
 _DEPTH = 100
 _CLOCK_PERIOD: Ns = 10 * MS
 _LATCHED = frozenset({"/tf_static", "/robot_description", "/map"})
-"""Topics that are latched by ROS's conventions."""
+"""Topics that are latched by ROS's conventions, for recordings that do not state it."""
 
 
 @dataclass(frozen=True)
@@ -122,6 +159,9 @@ class PlayOptions:
 def play(node: Node, bag: Bag, how: PlayOptions = PlayOptions()) -> int:
     """Publish a recording in time and block until its end; return the number of published messages.
 
+    Topics are offered as they were recorded: latched or transient local, best effort. Of a topic with several
+    types the one with most messages is played, as nodes of a graph are connected by one type.
+
     Raises:
         UsageError: a requested topic was not recorded or cannot be decoded.
     """
@@ -133,14 +173,15 @@ def play(node: Node, bag: Bag, how: PlayOptions = PlayOptions()) -> int:
     ticked: Ns = begin - _CLOCK_PERIOD
     played = 0
     for recorded in bag.messages(list(publishers)):
-        if recorded.at < begin:
+        publisher = publishers[recorded.topic]
+        if recorded.at < begin or recorded.message.__msgtype__ != publisher.type:
             continue
         while clock is not None and ticked + _CLOCK_PERIOD <= recorded.at:
             ticked += _CLOCK_PERIOD
             _wait(node, started, ticked - begin, how.rate)
             clock.publish(_clock(ticked))
         _wait(node, started, recorded.at - begin, how.rate)
-        publishers[recorded.topic].publish(recorded.message)
+        publisher.publish(recorded.message)
         played += 1
         how.on_message(played, recorded.at)
     node.sleep(from_seconds(how.delay))
@@ -148,20 +189,41 @@ def play(node: Node, bag: Bag, how: PlayOptions = PlayOptions()) -> int:
 
 
 def _advertise(node: Node, bag: Bag, how: PlayOptions) -> dict[str, Publisher]:
-    there = {topic.name: topic.type for topic in bag.topics}
+    there = [topic.name for topic in bag.topics]
     for name in how.topics or ():
         if name not in there:
             hint = did_you_mean(name, there)
             raise UsageError(f"{bag.path} has no topic {name!r}{hint}; it has {choices(there)}")
-        if name in bag.unreadable:
+        if name in bag.unreadable and name not in bag.usual:
             raise UsageError(f"{bag.path}: {name} cannot be played: {bag.unreadable[name]}")
     wanted = set(bag.usual if how.topics is None else how.topics)
     if how.clock:
         wanted -= {CLOCK}
-    return {
-        name: node.advertise(name, there[name], LATCHED if name in _LATCHED else QoS(_DEPTH))
-        for name in sorted(wanted)
-    }
+    made = {}
+    for name in sorted(wanted):
+        connections = [one for one in bag.connections if one.source.topic == name and not one.problem]
+        counts: dict[str, int] = {}
+        for one in connections:
+            counts[one.source.type] = counts.get(one.source.type, 0) + one.messages
+        kind = max(counts, key=lambda one: counts[one])
+        others = [one for one in counts if one != kind]
+        if others:
+            bag.note(f"{name} has several types; {kind} is played, {', '.join(others)} is not")
+        played = [one for one in connections if one.source.type == kind]
+        made[name] = node.advertise(name, kind, _offered(name, played))
+    return made
+
+
+def _offered(name: str, connections: Collection[BagConnection]) -> QoS:
+    """Return the QoS of a topic as it was recorded."""
+    profiles = [profile for one in connections for profile in one.source.offer.qos]
+    unreliable = bool(profiles) and all(one.reliability.name == "BEST_EFFORT" for one in profiles)
+    reliability = BEST_EFFORT if unreliable else RELIABLE
+    latched = [one for one in connections if one.source.offer.latched]
+    if latched or (name in _LATCHED and not profiles):
+        depth = max(len(latched), 1, *(one.depth for one in profiles))
+        return QoS(depth, reliability, TRANSIENT_LOCAL)
+    return QoS(_DEPTH, reliability, VOLATILE)
 
 
 def _wait(node: Node, started: Ns, elapsed: Ns, rate: float) -> None:

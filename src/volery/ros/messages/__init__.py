@@ -1,7 +1,8 @@
 """ROS message types: definitions, values and their encodings. The only package that imports rosbags.
 
 Within one process a message is a value of the class that this package makes for its type, after the
-definitions of ROS 2 Humble; packages that rosbags lacks are in ``definitions/``. Depends on ``base`` only.
+definitions of the installed ROS 2 distribution (Jazzy without one); packages that rosbags lacks are in
+``definitions/``. Messages of other definitions are converted. Depends on ``base`` only.
 """
 
 from volery.ros.messages.encodings import (

@@ -1,234 +1,55 @@
 """Readers and writers of recordings: rosbag 1, rosbag 2 and MCAP.
 
-Times are ns as in the recording: since the Unix epoch, or since the start of a simulated run. A rosbag 1 or
-MCAP file whose writer was killed has no index; it is recovered record by record from the start.
+Times are ns as in the recording: since the Unix epoch, or since the start of a simulated run. Messages belong
+to a connection: a topic may carry several types, and types have the recording's own definitions.
 """
 
 from __future__ import annotations
 
-import bz2
 import shutil
-import struct
 from collections import Counter
-from collections.abc import Collection, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field, replace
-from io import BytesIO
-from itertools import chain
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Literal, NamedTuple, Protocol, Self
+from typing import Any, Literal, NamedTuple, Protocol, Self
 
-import lz4.frame
-import zstandard
-from mcap.exceptions import McapError
-from mcap.records import Channel, Chunk, Schema
-from mcap.records import Message as McapMessage
-from mcap.stream_reader import StreamReader, breakup_chunk
-from rosbags.interfaces import Connection, MessageDefinitionFormat
+from rosbags.interfaces import (
+    Connection,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 from rosbags.rosbag1 import Reader as Reader1
-from rosbags.rosbag1 import ReaderError as Reader1Error
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag1 import WriterError as Writer1Error
-from rosbags.rosbag1 import reader as rosbag1_reader
-from rosbags.rosbag2 import Reader as Reader2
-from rosbags.rosbag2 import ReaderError as Reader2Error
-from rosbags.rosbag2 import StoragePlugin, storage_mcap
+from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.rosbag2 import WriterError as Writer2Error
-from rosbags.typesys import get_types_from_idl
-from rosbags.typesys.base import TypesysError
 
 from volery.base.errors import UsageError
-from volery.base.time import Ns, S
-from volery.ros.messages.encodings import from_cdr, from_ros1, our_name, ros1_type, to_cdr, to_ros1
+from volery.base.time import Ns
+from volery.ros.messages.containers import (
+    DAMAGE,
+    NO_OFFER,
+    Offer,
+    RawMessage,
+    Rosbag2Reader,
+    Source,
+    recover_mcap,
+    recover_rosbag1,
+    source_of,
+)
+from volery.ros.messages.encodings import ros1_name, ros1_type, to_cdr, to_ros1
 from volery.ros.messages.message import Message
-from volery.ros.messages.store import message_class, message_name, parse_messages, store
+from volery.ros.messages.recorded_types import RecordedType, Written
+from volery.ros.messages.store import message_class, message_name, store
 
-_LENGTH = struct.Struct("<I")
-_STAMP = struct.Struct("<II")
-_MESSAGE, _CHUNK, _CONNECTION = 2, 5, 7
-_LARGEST = 1 << 30
-"""Length, bytes, above which a record is taken as damaged."""
-MAX_CHUNK = 256 << 20
-"""Decompressed size, bytes, above which a chunk is taken as damaged: 46 kB can hold 1.5 GB."""
 MAX_SALVAGED = 2 << 30
 """Bytes of messages, decompressed, that are salvaged of a damaged recording: they are sorted in memory."""
-DAMAGE = (
-    Reader1Error,
-    Reader2Error,
-    McapError,
-    TypesysError,
-    zstandard.ZstdError,
-    struct.error,
-    EOFError,
-    OSError,
-    RuntimeError,
-    ArithmeticError,
-    AssertionError,
-    LookupError,
-    MemoryError,
-    TypeError,
-    ValueError,
-)
-"""What the readers of rosbags and mcap raise at damaged bytes."""
-
-
-def decompressed(compression: str, data: bytes) -> bytes:
-    """Return the content of a chunk.
-
-    Raises:
-        ValueError: The data is damaged, larger than ``MAX_CHUNK`` or compressed in an unknown way.
-    """
-    limit = MAX_CHUNK + 1
-    try:
-        match compression:
-            case "" | "none":
-                content = data
-            case "bz2":
-                content = bz2.BZ2Decompressor().decompress(data, limit)
-            case "lz4":
-                content = bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, limit))
-            case "zstd":
-                with zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK).stream_reader(data) as reader:
-                    content = reader.read(limit)
-            case _:
-                raise ValueError(f"compression {compression!r} is unknown")
-    except (OSError, RuntimeError, EOFError, zstandard.ZstdError) as error:
-        raise ValueError(f"{compression} data is damaged: {error}") from None
-    if len(content) > MAX_CHUNK:
-        raise ValueError(f"a chunk holds more than {MAX_CHUNK} bytes")
-    return content
-
-
-# rosbags decompresses without a limit; its tables of decompressors are replaced.
-storage_mcap.DECOMPRESSORS.update(
-    lz4=lambda data, size: decompressed("lz4", data), zstd=lambda data, size: decompressed("zstd", data)
-)
-rosbag1_reader.decompressors.update(
-    bz2=lambda data: decompressed("bz2", data), lz4=lambda data: decompressed("lz4", data)
-)
-
-
-class RawMessage(NamedTuple):
-    """An encoded message of a recording, with type and definition of its connection."""
-
-    at: Ns
-    topic: str
-    type: str
-    definition: str
-    data: bytes
-
-
-def recover_rosbag1(path: Path) -> Iterator[RawMessage]:
-    """Yield the complete messages of a rosbag of format 2.0, in the order of the file."""
-    connections: dict[bytes, dict[str, bytes]] = {}
-    with path.open("rb") as file:
-        file.readline()
-        for header, data in _records(file):
-            kind = _kind(header)
-            inner = _records(BytesIO(_unpacked(header, data))) if kind == _CHUNK else iter([(header, data)])
-            for head, body in inner:
-                found = _rosbag1_message(head, body, connections)
-                if found is not None:
-                    yield found
-
-
-def _kind(header: dict[str, bytes]) -> int:
-    return (header.get("op") or b"\0")[0]
-
-
-def _rosbag1_message(
-    header: dict[str, bytes], data: bytes, connections: dict[bytes, dict[str, bytes]]
-) -> RawMessage | None:
-    kind = _kind(header)
-    number, stamp = header.get("conn", b""), header.get("time", b"")
-    if kind == _CONNECTION and number:
-        connections[number] = {"topic": header.get("topic", b""), **_fields(data)}
-    connection = connections.get(number)
-    if kind != _MESSAGE or connection is None or len(stamp) != _STAMP.size:
-        return None
-    seconds, rest = _STAMP.unpack(stamp)
-    topic, name, text = (
-        connection.get(key, b"").decode(errors="replace") for key in ("topic", "type", "message_definition")
-    )
-    return RawMessage(seconds * S + rest, topic, name, text, data)
-
-
-def _records(file: BinaryIO) -> Iterator[tuple[dict[str, bytes], bytes]]:
-    """Yield header and data of each complete record, and the part of a chunk at the end."""
-    while True:
-        header, whole = _block(file)
-        if not whole:
-            return
-        fields = _fields(header)
-        data, whole = _block(file)
-        if whole or fields.get("op") == bytes([_CHUNK]):  # the last chunk may be incomplete
-            yield fields, data
-
-
-def _block(file: BinaryIO) -> tuple[bytes, bool]:
-    """Return a block's data, and whether it is complete."""
-    head = file.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
-        return b"", False
-    (length,) = _LENGTH.unpack(head)
-    data = file.read(length) if length <= _LARGEST else b""
-    return data, len(data) == length
-
-
-def _fields(header: bytes) -> dict[str, bytes]:
-    found: dict[str, bytes] = {}
-    place = 0
-    while place + _LENGTH.size <= len(header):
-        (length,) = _LENGTH.unpack_from(header, place)
-        place += _LENGTH.size
-        name, _, value = header[place : place + length].partition(b"=")
-        found[name.decode(errors="replace")] = value
-        place += length
-    return found
-
-
-def _unpacked(header: dict[str, bytes], data: bytes) -> bytes:
-    """Return a chunk's content, decompressed; empty if it is damaged."""
-    try:
-        return decompressed(header.get("compression", b"none").decode(errors="replace"), data)
-    except ValueError:
-        return b""
-
-
-def recover_mcap(path: Path) -> Iterator[RawMessage]:
-    """Yield the complete messages of an MCAP file, in the order of the file. Damaged chunks are skipped."""
-    schemas: dict[int, Schema] = {}
-    channels: dict[int, Channel] = {}
-    with path.open("rb") as file:
-        try:
-            for record in _mcap_records(file):
-                if isinstance(record, Schema):
-                    schemas[record.id] = record
-                elif isinstance(record, Channel):
-                    channels[record.id] = record
-                elif isinstance(record, McapMessage) and record.channel_id in channels:
-                    channel = channels[record.channel_id]
-                    schema = schemas.get(channel.schema_id)
-                    name = schema.name if schema else ""
-                    text = schema.data.decode(errors="replace") if schema else ""
-                    yield RawMessage(record.log_time, channel.topic, name, text, record.data)
-        except DAMAGE:
-            return  # the file ends here or is damaged
-
-
-def _mcap_records(file: BinaryIO) -> Iterator[object]:
-    """Yield the records of an MCAP file, those of its chunks among them."""
-    for record in StreamReader(file, emit_chunks=True, record_size_limit=_LARGEST).records:
-        if not isinstance(record, Chunk):
-            yield record
-            continue
-        with suppress(*DAMAGE):
-            content = decompressed(record.compression, record.data)
-            whole = replace(record, compression="", data=content)
-            yield from breakup_chunk(whole, validate_crc=True)
-
 
 OF_THE_RUN = "/volery/"
 """Prefix of the topics of a run's trace that carry no ROS messages."""
@@ -238,7 +59,7 @@ _SUFFIXES = {".bag": ROSBAG1, ".mcap": MCAP, ".db3": ROSBAG2}
 
 
 class BagTopic(NamedTuple):
-    """A recorded topic, its type (``package/msg/Name``) and its number of messages."""
+    """A recorded topic, one of its types (``package/msg/Name``) and its number of messages of that type."""
 
     name: str
     type: str
@@ -253,6 +74,26 @@ class BagMessage(NamedTuple):
     message: Message
 
 
+class BagConnection:
+    """A connection of a recording.
+
+    Attributes:
+        source: What the recording states of it.
+        messages: Number of its messages.
+        recorded: Its type; None if its messages cannot be decoded.
+        problem: Why they cannot be decoded; empty if they can.
+    """
+
+    def __init__(self, source: Source, messages: int, distribution: str) -> None:
+        self.source, self.messages = source, messages
+        self.recorded: RecordedType | None = None
+        self.problem = ""
+        try:
+            self.recorded = RecordedType(source, distribution)
+        except UsageError as error:
+            self.problem = str(error)
+
+
 @dataclass(frozen=True)
 class Bag:
     """A recording.
@@ -260,65 +101,102 @@ class Bag:
     Attributes:
         path: The file or folder.
         format: ``ROSBAG1``, ``ROSBAG2`` or ``MCAP``.
-        topics: All recorded topics, by name.
+        connections: All connections, by topic and type.
         start: Time of the first message, ns.
         end: Time of the last message, ns.
-        complete: False if the recording was cut short; its complete messages are read.
-        unreadable: Reasons why messages of a topic cannot be decoded, by topic.
+        complete: False if the recording was cut short or is damaged; its complete messages are read.
+        indexed: Whether it can be read in order of time without being read as a whole.
         damage: What was found to be damaged while messages were read; their reader appends to it.
     """
 
     path: Path
     format: str
-    topics: tuple[BagTopic, ...]
+    connections: tuple[BagConnection, ...]
     start: Ns
     end: Ns
     complete: bool
-    unreadable: dict[str, str]
+    indexed: bool = True
     damage: list[str] = field(default_factory=list, compare=False)
+
+    @property
+    def topics(self) -> tuple[BagTopic, ...]:
+        """Topics with their types, by name."""
+        counts: Counter[tuple[str, str]] = Counter()
+        for one in self.connections:
+            counts[one.source.topic, one.source.type] += one.messages
+        return tuple(BagTopic(*key, counts[key]) for key in sorted(counts))
+
+    @property
+    def unreadable(self) -> dict[str, str]:
+        """Reasons why messages of a topic cannot be decoded, by topic."""
+        return {one.source.topic: one.problem for one in self.connections if one.problem}
 
     @property
     def usual(self) -> list[str]:
         """Topics that are read by default: all that can be decoded, without those of a run's trace."""
-        names = (topic.name for topic in self.topics if not topic.name.startswith(OF_THE_RUN))
-        return [name for name in names if name not in self.unreadable]
+        names = {one.source.topic for one in self.connections if not one.problem}
+        return sorted(name for name in names if not name.startswith(OF_THE_RUN))
+
+    @property
+    def differences(self) -> list[str]:
+        """How definitions of messages read so far differ from ours, in sentences."""
+        found = (one.recorded.differences() for one in self.connections if one.recorded is not None)
+        return sorted({one for one in found if one})
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Fields of messages read so far that another definition lacks, by topic."""
+        return {
+            one.source.topic: f"{one.source.type} has no {', '.join(one.recorded.left_out)} there"
+            for one in self.connections
+            if one.recorded is not None and one.recorded.left_out
+        }
 
     def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
         """Yield the messages of `topics` (by default of all that can be decoded), in order of time."""
-        readable = {topic.name: topic.type for topic in self.topics if topic.name not in self.unreadable}
-        wanted = readable if topics is None else {name: readable[name] for name in topics if name in readable}
-        decode = from_ros1 if self.format == ROSBAG1 else from_cdr
-        for raw in self._raw():
-            if raw.topic in wanted:
-                try:
-                    message = decode(wanted[raw.topic], raw.data)
-                except (UsageError, RecursionError, *DAMAGE):
-                    self._note(f"messages of {raw.topic} that do not fit their type are left out")
-                    continue
-                yield BagMessage(raw.at, raw.topic, message)
+        for connection, raw in self.raw(topics):
+            assert connection.recorded is not None
+            try:
+                message = connection.recorded.message(raw.data)
+            except (UsageError, RecursionError, *DAMAGE):
+                self.note(f"messages of {raw.source.topic} that do not fit their type are left out")
+                continue
+            yield BagMessage(raw.at, raw.source.topic, message)
 
-    def _note(self, what: str) -> None:
+    def raw(self, topics: Collection[str] | None = None) -> Iterator[tuple[BagConnection, RawMessage]]:
+        """Yield the undecoded messages of `topics` and their connections, in order of time."""
+        known = {one.source: one for one in self.connections}
+        for raw in self._raw():
+            connection = known.get(raw.source)
+            if connection is None:  # only its undamaged part is known
+                connection = known[raw.source] = BagConnection(raw.source, 0, "")
+            if not connection.problem and (topics is None or raw.source.topic in topics):
+                yield connection, raw
+
+    def note(self, what: str) -> None:
+        """Add to ``damage`` once."""
         if what not in self.damage:
             self.damage.append(what)
 
     def _raw(self) -> Iterator[RawMessage]:
-        if not self.complete:
+        if not self.indexed:
             yield from self._salvaged()
             return
         last, given = -1, Counter[tuple[str, bytes]]()  # of the messages at time `last`
         try:
             with _reader(self.path, self.format) as reader:
+                sources = _sources(reader)
                 for connection, at, data in reader.messages():
-                    raw = RawMessage(at, connection.topic, connection.msgtype, "", bytes(data))
+                    raw = RawMessage(at, sources[connection.id], bytes(data))
                     if at != last:
                         last, given = at, Counter()
-                    given[raw.topic, raw.data] += 1
+                    given[raw.source.topic, raw.data] += 1
                     yield raw
         except DAMAGE as error:
-            self._note(f"a part of {self.path} is damaged and left out: {error}")
+            self.note(f"a part of {self.path} is damaged and left out: {error}")
             for raw in self._salvaged():
-                if raw.at == last and given[raw.topic, raw.data]:
-                    given[raw.topic, raw.data] -= 1
+                if raw.at == last and given[raw.source.topic, raw.data]:
+                    given[raw.source.topic, raw.data] -= 1
                 elif raw.at >= last:
                     yield raw
 
@@ -328,15 +206,21 @@ class Bag:
             files = sorted(self.path.glob("*.mcap"))
         else:
             files = [self.path]
-        recover = recover_rosbag1 if self.format == ROSBAG1 else recover_mcap
         found, size = [], 0
-        for raw in chain.from_iterable(recover(file) for file in files):
+        for raw in (raw for file in files for raw in _recover(file, self.format, [])):
             size += len(raw.data)
             if size > MAX_SALVAGED:
-                self._note(f"{self.path} is damaged; only its first {MAX_SALVAGED >> 20} MB are salvaged")
+                self.note(f"{self.path} is damaged; only its first {MAX_SALVAGED >> 20} MB are salvaged")
                 break
             found.append(raw)
         return sorted(found, key=lambda raw: raw.at)
+
+
+def _recover(path: Path, kind: str, damage: list[str]) -> Iterator[RawMessage]:
+    if kind == ROSBAG1:
+        damage.append("it has no index")
+        return recover_rosbag1(path)
+    return recover_mcap(path, damage)
 
 
 def open_bag(path: Path) -> Bag:
@@ -361,70 +245,92 @@ def open_bag(path: Path) -> Bag:
         inside = sorted(path.glob("*.mcap")) if path.is_dir() else []
         if not inside:
             raise UsageError(f"{path} is no rosbag 2 that can be read: {error}") from error
-        return _salvaged(inside[0], MCAP, str(error))
+        return replace(_salvaged(inside[0], MCAP, str(error)), complete=False)
 
 
 def _reader(path: Path, kind: str) -> Any:
-    return Reader1(path) if kind == ROSBAG1 else Reader2(path)
+    return Reader1(path) if kind == ROSBAG1 else Rosbag2Reader(path)
+
+
+def _sources(reader: Any) -> dict[int, Source]:
+    """Return the connections of a reader by their numbers; ROS 1's senders are in a folder's own data."""
+    senders = {}
+    if isinstance(reader, Rosbag2Reader):
+        senders = reader.storage.metadata.custom or {}
+    found = {}
+    for one in reader.connections:
+        source = source_of(one)
+        sender = senders.get(f"{SENDER}{source.topic}", source.offer.sender)
+        found[one.id] = source._replace(offer=source.offer._replace(sender=sender))
+    return found
 
 
 def _indexed(path: Path, kind: str) -> Bag:
+    counts: Counter[Source] = Counter()
     with _reader(path, kind) as reader:
-        topics: dict[str, BagTopic] = {}
-        unreadable: dict[str, str] = {}
+        sources = _sources(reader)
         for connection in reader.connections:
-            known = topics.get(connection.topic)
-            count = (connection.msgcount or 0) + (known.messages if known else 0)
-            topics[connection.topic] = BagTopic(connection.topic, connection.msgtype, count)
-            text = connection.msgdef.data if connection.msgdef is not None else ""
-            idl = connection.msgdef is not None and connection.msgdef.format == MessageDefinitionFormat.IDL
-            _learn(connection.topic, connection.msgtype, text, unreadable, idl=idl)
+            counts[sources[connection.id]] += connection.msgcount or 0
         start, end = (reader.start_time, reader.end_time - 1) if reader.message_count else (0, 0)
-    listed = tuple(topics[name] for name in sorted(topics))
-    return Bag(path, kind, listed, start, end, True, unreadable)
+        distribution = "" if kind == ROSBAG1 else reader.ros_distro or ""
+    return Bag(path, kind, _connections(counts, distribution), start, end, True)
+
+
+def _connections(counts: Counter[Source], distribution: str = "") -> tuple[BagConnection, ...]:
+    ordered = sorted(counts, key=lambda one: (one.topic, one.type, one.offer.sender))
+    return tuple(BagConnection(one, counts[one], distribution) for one in ordered)
 
 
 def _salvaged(path: Path, kind: str, problem: str) -> Bag:
-    found: dict[str, BagTopic] = {}
-    unreadable: dict[str, str] = {}
+    counts: Counter[Source] = Counter()
     times: list[Ns] = []
-    for raw in recover_rosbag1(path) if kind == ROSBAG1 else recover_mcap(path):
-        name = raw.type if raw.type.count("/") == 2 else our_name(raw.type)
-        if raw.topic not in found:
-            _learn(raw.topic, name, raw.definition, unreadable)
-        count = found[raw.topic].messages if raw.topic in found else 0
-        found[raw.topic] = BagTopic(raw.topic, name, count + 1)
+    damage: list[str] = []
+    for raw in _recover(path, kind, damage):
+        counts[raw.source] += 1
         times.append(raw.at)
     if not times:
         raise UsageError(f"{path}: nothing of it can be read: {problem}")
-    listed = tuple(found[name] for name in sorted(found))
-    return Bag(path, kind, listed, min(times), max(times), False, unreadable)
-
-
-def _learn(topic: str, name: str, text: str, unreadable: dict[str, str], *, idl: bool = False) -> None:
-    """Define unknown types from the recording's definitions."""
-    if name in store().fielddefs:
-        return
-    try:
-        parsed = get_types_from_idl(text) if idl else parse_messages(name, text)
-        store().register({key: what for key, what in parsed.items() if key not in store().fielddefs})
-    except (RecursionError, SyntaxError, *DAMAGE) as error:  # classes are made of source code
-        problem = str(error)
-    else:
-        problem = "" if name in store().fielddefs else "the name cannot be that of a type"
-    if problem:
-        unreadable[topic] = f"its type {name} is not known and not defined in the recording: {problem}"
+    return Bag(path, kind, _connections(counts), min(times), max(times), not damage, indexed=False)
 
 
 _METADATA_VERSION: Literal[9] = 9
 """Version of rosbag2's metadata.yaml; Jazzy and later write it, Iron and later read it."""
 
 
+SENDER = "sender of "
+"""Key, before a topic's name, of the custom data of a rosbag 2 that hold the node which ROS 1 recorded."""
+_FOREVER = QosTime(2147483647, 4294967295)
+
+
+def qos_profile(reliable: bool, latched: bool, depth: int = 0) -> Qos:
+    """Return a profile as rosbag 2 records it; a depth of 0 stands for one that is not known."""
+    return Qos(
+        QosHistory.KEEP_LAST if depth else QosHistory.UNKNOWN,
+        depth,
+        QosReliability.RELIABLE if reliable else QosReliability.BEST_EFFORT,
+        QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE,
+        _FOREVER,
+        _FOREVER,
+        QosLiveliness.AUTOMATIC,
+        _FOREVER,
+        avoid_ros_namespace_conventions=False,
+    )
+
+
 class BagWriter(Protocol):
     """A recording in progress; a context manager. It must be closed to be complete."""
 
-    def write(self, topic: str, at: Ns, message: Message) -> None:
-        """Add a message at time `at`, ns; raise ``UsageError`` if this format does not support its type."""
+    def write(self, topic: str, at: Ns, message: Message, offer: Offer = NO_OFFER) -> None:
+        """Add a message at time `at`, ns, of a connection with this offer.
+
+        Raises ``UsageError`` if this format does not support its type.
+        """
+
+    def copy(self, connection: BagConnection, at: Ns, data: bytes) -> None:
+        """Add an undecoded message of another recording; its type keeps its definition within one ROS.
+
+        Raises ``UsageError`` if this format does not support its type, or the bytes are none of it.
+        """
 
     def close(self) -> None:
         """Complete the recording."""
@@ -440,21 +346,49 @@ class _Writer:
     def __init__(self, path: Path, writer: Any) -> None:
         self._path = path
         self._writer = writer
-        self._connections: dict[str, tuple[str, Connection]] = {}
+        self._types: dict[str, str] = {}
+        self._own: dict[tuple[str, str, Offer], Connection] = {}
+        self._copied: dict[Source, tuple[Connection, Callable[[bytes], bytes]]] = {}
         try:
             writer.open()
         except (Writer1Error, Writer2Error, OSError) as error:
             raise UsageError(f"{path} cannot be written: {error}") from error
 
-    def _connection(self, topic: str, name: str) -> Connection:
-        known = self._connections.get(topic)
-        if known is None:
-            known = self._connections[topic] = name, self._connect(topic, name)
-        if known[0] != name:
-            raise UsageError(f"{self._path}: topic {topic} carries {known[0]}, not {name}")
-        return known[1]
+    def write(self, topic: str, at: Ns, message: Message, offer: Offer = NO_OFFER) -> None:
+        """Add a message."""
+        name = message.__msgtype__
+        if self._types.setdefault(topic, name) != name:
+            raise UsageError(f"{self._path}: topic {topic} carries {self._types[topic]}, not {name}")
+        key = topic, name, offer
+        if key not in self._own:
+            self._own[key] = self._connect(topic, name, self._written(name), offer)
+        self._writer.write(self._own[key], at, self._encoded(message))
 
-    def _connect(self, topic: str, name: str) -> Connection:
+    def copy(self, connection: BagConnection, at: Ns, data: bytes) -> None:
+        """Add an undecoded message of another recording."""
+        source, recorded = connection.source, connection.recorded
+        if recorded is None:
+            raise UsageError(connection.problem)
+        known = self._copied.get(source)
+        if known is None:
+            recorded.resolve(data)
+            written = self._copy_of(recorded)
+            made = self._connect(source.topic, source.type, written, source.offer)
+            known = self._copied[source] = made, written.convert
+        self._writer.write(known[0], at, known[1](data))
+
+    def _written(self, name: str) -> Written:
+        """Return definition and checksum of one of our types."""
+        raise NotImplementedError
+
+    def _copy_of(self, recorded: RecordedType) -> Written:
+        """Return how a recorded type is written."""
+        raise NotImplementedError
+
+    def _encoded(self, message: Message) -> bytes:
+        raise NotImplementedError
+
+    def _connect(self, topic: str, name: str, written: Written, offer: Offer) -> Connection:
         raise NotImplementedError
 
     def close(self) -> None:
@@ -477,16 +411,26 @@ class Rosbag1Writer(_Writer):
         path.unlink(missing_ok=True)
         super().__init__(path, Writer1(path))
 
-    def _connect(self, topic: str, name: str) -> Connection:
+    def _written(self, name: str) -> Written:
         kind = ros1_type(name)
+        return Written(kind.text, kind.md5, bytes)
+
+    def _copy_of(self, recorded: RecordedType) -> Written:
+        return recorded.for_ros1()
+
+    def _encoded(self, message: Message) -> bytes:
+        return to_ros1(message)
+
+    def _connect(self, topic: str, name: str, written: Written, offer: Offer) -> Connection:
         made: Connection = self._writer.add_connection(
-            topic, message_name(name), msgdef=kind.text, md5sum=kind.md5
+            topic,
+            ros1_name(name).replace("/", "/msg/"),
+            msgdef=written.definition,
+            md5sum=written.digest,
+            callerid=offer.sender or None,
+            latching=int(offer.latched),
         )
         return made
-
-    def write(self, topic: str, at: Ns, message: Message) -> None:
-        """Add a message."""
-        self._writer.write(self._connection(topic, message.__msgtype__), at, to_ros1(message))
 
 
 class Rosbag2Writer(_Writer):
@@ -495,16 +439,37 @@ class Rosbag2Writer(_Writer):
     def __init__(self, path: Path) -> None:
         if path.is_dir() and (path / "metadata.yaml").exists():
             shutil.rmtree(path)
+        self._defined: dict[str, RecordedType] = {}
+        self._connected: dict[tuple[str, str, tuple[Qos, ...]], Connection] = {}
         super().__init__(path, Writer2(path, version=_METADATA_VERSION, storage_plugin=StoragePlugin.MCAP))
 
-    def _connect(self, topic: str, name: str) -> Connection:
+    def _written(self, name: str) -> Written:
         message_class(name)
-        made: Connection = self._writer.add_connection(topic, message_name(name), typestore=store())
-        return made
+        types, full = store(), message_name(name)
+        return Written(types.generate_msgdef(full, ros_version=2)[0], types.hash_rihs01(full), bytes)
 
-    def write(self, topic: str, at: Ns, message: Message) -> None:
-        """Add a message."""
-        self._writer.write(self._connection(topic, message.__msgtype__), at, to_cdr(message))
+    def _copy_of(self, recorded: RecordedType) -> Written:
+        """Return how a type is written: of one name by one definition, as readers take the first."""
+        first = self._defined.setdefault(recorded.name, recorded)
+        if first is recorded or "ros1" in (first.encoding, recorded.encoding):
+            return recorded.for_ros2()
+        return recorded.as_other(first)
+
+    def _encoded(self, message: Message) -> bytes:
+        return to_cdr(message)
+
+    def _connect(self, topic: str, name: str, written: Written, offer: Offer) -> Connection:
+        profiles = offer.qos
+        if offer.latched and not profiles:
+            profiles = (qos_profile(reliable=True, latched=True, depth=1),)
+        key = topic, name, profiles
+        if key not in self._connected:
+            self._connected[key] = self._writer.add_connection(
+                topic, name, msgdef=written.definition, rihs01=written.digest, offered_qos_profiles=profiles
+            )
+        if offer.sender:
+            self._writer.set_custom_data(f"{SENDER}{topic}", offer.sender)
+        return self._connected[key]
 
 
 def create_bag(path: Path) -> BagWriter:

@@ -2,8 +2,8 @@
 
 CDR is little endian with its four-byte header. Values are those of ROS 2 in both encodings. ROS 1's
 ``Header`` has a ``seq`` that ROS 2 dropped: it is encoded as 0 (publishers of ROS 1 count it) and dropped
-when decoded. A type whose definitions differ in more than the spelling of a field cannot be carried, and an
-error says so. The field layouts are for code generators.
+when decoded. A type whose definitions differ (``visualization_msgs/Marker``) is converted field by field;
+what ROS 1's definition lacks is left out. The layouts are for code generators.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 from volery.base.errors import UsageError
 from volery.ros.messages import lazy_rosbags as rosbags
 from volery.ros.messages.cdr_encoder import CDR_HEADER, FORMATS, encode
+from volery.ros.messages.conversion import FILLER, HEADER, Conversion
 from volery.ros.messages.message import Message
 from volery.ros.messages.packages import ROS1_SPELLING
 from volery.ros.messages.store import message_class, message_name, service, service_name, store
@@ -155,11 +156,14 @@ def _types_for(name: str, size: int) -> rosbags.Typestore:
     rosbags repeats a nested type as often as the bytes say, 2^32 times if they are damaged; no list can have
     more elements than the message has bytes.
     """
-    if not _has_lists(name):
-        return store()
-    bounded = copy(store())
-    bounded.max_sequence_length = max(size, 1)
-    return bounded
+    return bounded(store(), size) if _has_lists(name) else store()
+
+
+def bounded(types: rosbags.Typestore, size: int) -> rosbags.Typestore:
+    """Return a store that decodes no list of more than `size` elements."""
+    made = copy(types)
+    made.max_sequence_length = max(size, 1)
+    return made
 
 
 def from_cdr(name: str, data: bytes | memoryview, *, surplus: bool = False) -> Any:
@@ -182,7 +186,6 @@ def from_cdr(name: str, data: bytes | memoryview, *, surplus: bool = False) -> A
         raise UsageError(f"these {len(data)} bytes are no {full}: {error}") from error
 
 
-_HEADER = "std_msgs/msg/Header"
 _TIMES = {"builtin_interfaces/msg/Time": "time", "builtin_interfaces/msg/Duration": "duration"}
 
 
@@ -211,17 +214,26 @@ def _noetic() -> rosbags.Typestore:
 
 
 def definition_store(full: str) -> rosbags.Typestore:
-    """Return Noetic's store with type `full`; ``UsageError`` if its layout differs in ROS 1 and ROS 2."""
+    """Return Noetic's store with type `full`; a type that Noetic lacks has the fields of ROS 2 there."""
     ours, noetic = store(), _noetic()
-    for _, what in ours.fielddefs[full][1]:
-        inner = _nested(what)
-        if inner and inner not in _TIMES:
-            definition_store(inner)
     if full not in noetic.fielddefs:
+        for _, what in ours.fielddefs[full][1]:
+            inner = _nested(what)
+            if inner and inner not in _TIMES:
+                definition_store(inner)
         noetic.register({full: ours.fielddefs[full]})
-    elif _layout(ours, full) != _layout(noetic, full):
-        raise UsageError(f"{full} has other fields in ROS 1 than in ROS 2; it cannot be carried on ROS 1")
     return noetic
+
+
+@cache
+def _to_noetic(full: str) -> Conversion:
+    noetic = definition_store(full)
+    return Conversion(store(), noetic, full, noetic.types.__getitem__)
+
+
+@cache
+def _from_noetic(full: str) -> Conversion:
+    return Conversion(definition_store(full), store(), full, message_class)
 
 
 def _nested(what: Any) -> str:
@@ -229,18 +241,6 @@ def _nested(what: Any) -> str:
     if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
         return _nested(detail[0])
     return str(detail) if kind == rosbags.Nodetype.NAME else ""
-
-
-def _layout(of: rosbags.Typestore, full: str) -> list[Any]:
-    """Return the types of the fields without a header's ``seq``; names do not matter to the bytes."""
-    return [_plain(what) for name, what in of.fielddefs[full][1] if not (full == _HEADER and name == "seq")]
-
-
-def _plain(what: Any) -> Any:
-    kind, detail = what
-    if kind in (rosbags.Nodetype.ARRAY, rosbags.Nodetype.SEQUENCE):
-        return kind, _plain(detail[0]), detail[1] if kind == rosbags.Nodetype.ARRAY else 0
-    return detail[0] if kind == rosbags.Nodetype.BASE else detail
 
 
 def ros1_name(name: str) -> str:
@@ -260,16 +260,16 @@ def our_name(name: str) -> str:
 
 @cache
 def ros1_type(name: str) -> Ros1Type:
-    """Return a message type in ROS 1; ``UsageError`` if it is unknown or has other fields there."""
+    """Return a message type in ROS 1; ``UsageError`` if it is unknown."""
     full = message_name(name)
     text, checksum = definition_store(full).generate_msgdef(full, ros_version=1)
     fields = store().fielddefs[full][1]
-    return Ros1Type(ros1_name(full), checksum, text, bool(fields) and fields[0][1][1] == _HEADER)
+    return Ros1Type(ros1_name(full), checksum, text, bool(fields) and fields[0][1][1] == HEADER)
 
 
 @cache
 def ros1_service(name: str) -> Ros1Service:
-    """Return a service type in ROS 1; ``UsageError`` if it is unknown or has other fields there."""
+    """Return a service type in ROS 1; ``UsageError`` if it is unknown."""
     kind = service(service_name(name))
     label = ros1_name(kind.name)
     halves = []
@@ -304,28 +304,33 @@ def _hashed_type(what: Any) -> str:
 
 def to_ros1(message: Message) -> bytes:
     """Encode a message for ROS 1; raise ``UsageError`` if a value does not fit its field."""
-    name = message.__msgtype__
-    ros1_type(name)
-    return cdr_to_ros1(name, to_cdr(message))
+    return cdr_to_ros1(message.__msgtype__, to_cdr(message))
 
 
 def cdr_to_ros1(name: str, data: bytes) -> bytes:
     """Convert CDR bytes of type `name` to ROS 1's."""
-    return bytes(store().cdr_to_ros1(data, name))
+    convert = _to_noetic(name)
+    if convert.same_bytes:
+        return bytes(store().cdr_to_ros1(data, name))
+    return bytes(definition_store(name).serialize_ros1(convert(from_cdr(name, data)), name))
+
+
+def ros1_to_cdr(full: str, data: bytes | memoryview) -> bytes:
+    """Convert ROS 1 bytes with the fields of our type `full` to CDR's; ``SerdeError`` if they are none."""
+    return bytes(_types_for(full, len(data)).ros1_to_cdr(data, full))
 
 
 def from_ros1(name: str, data: bytes | memoryview) -> Any:
     """Decode ROS 1 bytes as a message of type `name`; raise ``UsageError`` if they are no such message."""
     full = message_name(name)
     message_class(full)
+    convert = _from_noetic(full)
     try:
-        return from_cdr(full, _types_for(full, len(data)).ros1_to_cdr(data, full))
+        if convert.same_bytes:
+            return from_cdr(full, ros1_to_cdr(full, data))
+        return convert(bounded(definition_store(full), len(data)).deserialize_ros1(data, full))
     except (rosbags.SerdeError, IndexError) as error:
         raise UsageError(f"these {len(data)} bytes are no {full} of ROS 1: {error}") from error
-
-
-FILLER = "structure_needs_at_least_one_member"
-"""Field of one byte in the encoding of a type without fields."""
 
 
 class FieldLayout(NamedTuple):
@@ -360,10 +365,11 @@ class Layout(NamedTuple):
 
 
 def ros1_layout(name: str) -> Layout:
-    """Return a message type's layout in ROS 1; ``UsageError`` if it is unknown or differs there."""
+    """Return a message type's layout in ROS 1, or ours where it differs; ``UsageError`` if it is unknown."""
     full = message_name(name)
     message_class(full)
-    constants, fields = definition_store(full).fielddefs[full]
+    of = definition_store(full) if _to_noetic(full).same_bytes else store()
+    constants, fields = of.fielddefs[full]
     return Layout(
         full,
         ros1_name(full),
@@ -379,4 +385,4 @@ def _field(owner: str, name: str, what: Any) -> FieldLayout:
         return _field(owner, name, inner)._replace(length=count if kind == rosbags.Nodetype.ARRAY else 0)
     if kind == rosbags.Nodetype.NAME:
         return FieldLayout(name, nested=str(detail))
-    return FieldLayout(name, base=str(detail[0]), carried=(owner, name) != ("std_msgs/msg/Header", "seq"))
+    return FieldLayout(name, base=str(detail[0]), carried=(owner, name) != (HEADER, "seq"))

@@ -14,7 +14,7 @@ from volery.base.installed import require_extra
 if TYPE_CHECKING:
     from rosbags.interfaces import Msgdef, Nodetype
     from rosbags.serde import SerdeError
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
     from rosbags.typesys.base import TypesysError, normalize_fieldname
     from rosbags.typesys.store import Typestore
 
@@ -25,6 +25,7 @@ __all__ = [
     "Stores",
     "Typestore",
     "TypesysError",
+    "get_types_from_idl",
     "get_types_from_msg",
     "get_typestore",
     "normalize_fieldname",
@@ -35,6 +36,7 @@ _MODULES = {
     "SerdeError": "rosbags.serde",
     "Stores": "rosbags.typesys",
     "TypesysError": "rosbags.typesys.base",
+    "get_types_from_idl": "rosbags.typesys",
     "get_types_from_msg": "rosbags.typesys",
     "get_typestore": "rosbags.typesys",
     "normalize_fieldname": "rosbags.typesys.base",

@@ -1,14 +1,18 @@
 """Message, service and action types: known definitions, new ones, and one class of each on demand.
 
+A type's fields are those of the installed ROS 2 distribution, so that its bytes are those of the other nodes.
+
 Interface files are parsed into the messages that they define, as ROS 2 names them. IDL spellings of field
 types serve the comparison with rclpy's classes.
 """
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from typing import Any, NamedTuple
 
@@ -74,10 +78,39 @@ class ServiceType(NamedTuple):
     response: type[Message]
 
 
+DISTRIBUTIONS = {3: "humble", 4: "iron", 7: "jazzy", 9: "kilted", 10: "lyrical"}
+"""ROS 2 distributions by the major version of their rclpy; those between them were no releases."""
+NOT_INSTALLED = "jazzy"
+"""Distribution whose definitions are used where no ROS 2 is installed: the one that volery installs."""
+
+
+@cache
+def distribution() -> str:
+    """Return the ROS 2 distribution whose definitions are used: that of the installed rclpy.
+
+    Without one it is what ``ROS_DISTRO`` names, or else ``NOT_INSTALLED``.
+    """
+    try:
+        major = int(version("rclpy").partition(".")[0])
+    except (PackageNotFoundError, ValueError):
+        named = os.environ.get("ROS_DISTRO", "")
+        return named if named in DISTRIBUTIONS.values() else NOT_INSTALLED
+    known = [one for one in DISTRIBUTIONS if one <= major]
+    return DISTRIBUTIONS[max(known, default=min(DISTRIBUTIONS))]
+
+
+def types_of(named: str) -> rosbags.Typestore:
+    """Return the types of a ROS 2 distribution, as rosbags knows them; ``ValueError`` if it does not."""
+    return rosbags.get_typestore(rosbags.Stores(f"ros2_{named}"))
+
+
 @cache
 def store() -> rosbags.Typestore:
-    """Return the types of ROS 2 Humble and of ``definitions/``. Private to this package."""
-    humble = rosbags.get_typestore(rosbags.Stores.ROS2_HUMBLE)
+    """Return the types of the distribution in use and of ``definitions/``. Private to this package."""
+    known = types_of(distribution())
+    gone = {name: what for name, what in types_of("humble").fielddefs.items() if name not in known.fielddefs}
+    if gone:
+        known.register(gone)
     texts: dict[str, str] = {}
     written_out = files("volery.ros.messages").joinpath("definitions").iterdir()
     for file in sorted(written_out, key=lambda file: file.name):
@@ -85,8 +118,8 @@ def store() -> rosbags.Typestore:
         for section in text.split("\n=== ")[1:]:
             heading, body = section.split("\n", 1)
             texts.update(interface_messages(f"{package}/{heading.strip()}", body))
-    _register(humble, texts)
-    return humble
+    _register(known, texts)
+    return known
 
 
 def parse_messages(name: str, text: str) -> dict[str, Any]:
@@ -116,6 +149,33 @@ def parse_messages(name: str, text: str) -> dict[str, Any]:
         full: ([(names.get(one, one), *rest) for one, *rest in constants], fields)
         for full, (constants, fields) in parsed.items()
     }
+
+
+_SECTION = re.compile(r"^={80}\r?\n(MSG|IDL): (\S+)\r?\n", re.MULTILINE)
+
+
+def parse_definition(name: str, text: str, *, idl: bool = False) -> dict[str, Any]:
+    """Return the types that a recording's definition has, by name: of messages, IDL, or both.
+
+    Args:
+        name: Name of the message.
+        text: Its definition; those of its parts may follow, each under a line ``MSG: name`` or ``IDL: name``.
+        idl: Whether it begins with IDL.
+
+    Raises:
+        TypesysError: The definition is none. The error is of rosbags.
+    """
+    head, *rest = _SECTION.split(text)
+    sections = [("IDL" if idl else "MSG", name, head), *zip(*[iter(rest)] * 3, strict=True)]
+    parsed: dict[str, Any] = {}
+    for kind, label, body in sections:
+        if kind == "IDL" and body.strip():
+            parsed.update(rosbags.get_types_from_idl(body))
+        elif kind == "MSG" and (label == name or body.strip()):
+            package, _, rest_of_name = label.partition("/")
+            full = label if "/" in rest_of_name else f"{package}/msg/{rest_of_name}"
+            parsed.setdefault(full, parse_messages(full, body)[full])
+    return parsed
 
 
 def _register(into: rosbags.Typestore, texts: dict[str, str]) -> None:

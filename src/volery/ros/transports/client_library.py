@@ -21,7 +21,7 @@ from volery.ros.messages import Message, ServiceType
 
 
 class ReceivedMessage(NamedTuple):
-    """A message as it arrived: its bytes, what decodes them, and the sending node ('' if unknown).
+    """A message as it arrived: its bytes, what decodes them, the sending node ('' if unknown), if it latches.
 
     ``read`` raises ``UsageError`` if the bytes are no message of the topic's type.
     """
@@ -29,6 +29,7 @@ class ReceivedMessage(NamedTuple):
     data: bytes
     read: Callable[[bytes], Any]
     publisher: str
+    latched: bool = False
 
 
 OnMessage = Callable[[ReceivedMessage], None]
@@ -138,6 +139,9 @@ class ClientLibrary(Protocol):
 
     def topics(self) -> list[TopicState]:
         """Return the topics, by name."""
+
+    def offered(self, topic: str) -> tuple[QoS, ...]:
+        """Return what the publishers of a topic offer; nothing in ROS 1. An unknown depth is None."""
 
     def services(self) -> list[ServiceState]:
         """Return the services, by name."""

@@ -230,6 +230,10 @@ class TransportGraph:
         """Return the topics that have a publisher or a subscription, by name."""
         return run_in_thread(self.kernel, "the topics of the graph", self._library.topics)
 
+    def offered(self, topic: str) -> tuple[QoS, ...]:
+        """Return what the publishers of a topic offer."""
+        return run_in_thread(self.kernel, f"what {topic} offers", partial(self._library.offered, topic))
+
     def services(self) -> list[ServiceState]:
         """Return the services that have a server, by name."""
         return run_in_thread(self.kernel, "the services of the graph", self._library.services)

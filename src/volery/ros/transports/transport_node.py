@@ -120,6 +120,7 @@ class TransportSubscription:
         self._depth: int | None = None
         self._guard = threading.Lock()
         self._announced = False  # `_admit` has been posted to the kernel
+        self._sender = "", False
         self._works = 0  # callbacks in the group, one for each queued message that `_admit` has seen
         self._open = True
 
@@ -160,6 +161,7 @@ class TransportSubscription:
             if not self._queue:
                 return
             received = self._queue.popleft()
+        self._sender = received.publisher, received.latched
         try:
             message = received.read(received.data)
         except UsageError as error:
@@ -170,6 +172,10 @@ class TransportSubscription:
                 kernel.record(Text(kernel.now(), self.node.name, WARNING, text))
             return
         self._callback(message)
+
+    def latest_sender(self) -> tuple[str, bool]:
+        """Return who sent the message whose callback runs, and whether it latches."""
+        return self._sender
 
     def publishers(self) -> int:
         """Return the number of publishers it is connected to."""

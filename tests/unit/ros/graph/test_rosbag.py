@@ -10,8 +10,10 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.ros import messages
+from volery.ros.graph.interface import BEST_EFFORT, LATCHED, RELIABLE, TRANSIENT_LOCAL, VOLATILE, QoS
 from volery.ros.graph.rosbag import PlayOptions, Recorder, play
-from volery.ros.messages.bags import Bag, create_bag, open_bag
+from volery.ros.messages.bags import Bag, create_bag, open_bag, qos_profile
+from volery.ros.messages.containers import Offer
 
 from .conftest import Rig
 
@@ -127,3 +129,92 @@ def test_a_graph_is_recorded(rig: Rig, bag: Bag, tmp_path: Path) -> None:
     assert [one.message.data for one in again.messages(["/words"])] == [
         f"step {number}" for number in range(5)
     ]
+
+
+def test_what_was_latched_is_served_to_a_subscriber_that_comes_late(rig: Rig, tmp_path: Path) -> None:
+    with create_bag(tmp_path / "a.bag") as made:
+        made.write("/plan", 0, messages.new("std_msgs/String", data="once"), Offer(True, "/planner"))
+        made.write("/tick", 9 * S, messages.new("std_msgs/String", data="on"), Offer(False, "/planner"))
+    heard: list[str] = []
+
+    def late() -> None:
+        node = rig.graph.node("late")
+        node.sleep(3 * S)
+        node.subscribe("/plan", "std_msgs/String", lambda message: heard.append(message.data))
+        node.spin()
+
+    rig.task(late)
+    rig.kernel.call_at(101 * S, lambda: None)
+    rig.run(lambda: play(rig.graph.node("player"), open_bag(tmp_path / "a.bag")))
+    assert heard == ["once"]
+
+
+def test_topics_are_offered_as_they_were_recorded(rig: Rig, tmp_path: Path) -> None:
+    offers = {
+        "/map": Offer(False, "", (qos_profile(reliable=True, latched=False),)),  # stated, so not by its name
+        "/plans": Offer(True, "", (qos_profile(reliable=True, latched=True, depth=5),)),
+        "/scan": Offer(False, "", (qos_profile(reliable=False, latched=False, depth=5),)),
+        "/tf_static": Offer(),
+    }
+    with create_bag(tmp_path / "a") as made:
+        for topic, offer in offers.items():
+            made.write(topic, 0, messages.new("std_msgs/String"), offer)
+    offered = {}
+
+    def player() -> None:
+        node = rig.graph.node("player")
+        play(node, open_bag(tmp_path / "a"))
+        offered.update({topic: rig.graph.offered(topic) for topic in offers})
+
+    rig.run(player)
+    assert offered == {
+        "/map": (QoS(100, RELIABLE, VOLATILE),),
+        "/plans": (QoS(5, RELIABLE, TRANSIENT_LOCAL),),
+        "/scan": (QoS(100, BEST_EFFORT, VOLATILE),),
+        "/tf_static": (QoS(1, RELIABLE, TRANSIENT_LOCAL),),
+    }
+
+
+def test_the_commoner_of_two_types_of_a_topic_is_played_and_the_other_named(rig: Rig, tmp_path: Path) -> None:
+    types = {1: "std_msgs/Int32", 2: "std_msgs/Float32"}
+    for count, kind in types.items():
+        with create_bag(tmp_path / f"{count}.bag") as made:
+            for number in range(count):
+                made.write("/n", number, messages.new(kind, data=number))
+    with create_bag(tmp_path / "both.bag") as made:
+        for count in types:
+            for connection, raw in open_bag(tmp_path / f"{count}.bag").raw():
+                made.copy(connection, raw.at, raw.data)
+    bag = open_bag(tmp_path / "both.bag")
+    played: list[int] = []
+    rig.run(lambda: played.append(play(rig.graph.node("player"), bag)))
+    assert played == [2]
+    assert bag.damage == ["/n has several types; std_msgs/msg/Float32 is played, std_msgs/msg/Int32 is not"]
+
+
+def test_what_is_offered_is_recorded(rig: Rig, tmp_path: Path) -> None:
+    writer = create_bag(tmp_path / "again")
+    made: list[Recorder] = []
+
+    def recorder() -> None:
+        made.append(Recorder(rig.graph, rig.graph.node("recorder"), writer))
+        made[0].run()
+
+    def talker() -> None:
+        node = rig.graph.node("talker")
+        plan = node.advertise("/plan", "std_msgs/String", LATCHED)
+        scan = node.advertise("/scan", "std_msgs/String", QoS(5, BEST_EFFORT))
+        node.sleep(2 * S)
+        for publisher in (plan, scan):
+            publisher.publish(messages.new("std_msgs/String"))
+        node.sleep(1 * S)
+
+    rig.task(recorder)
+    rig.task(talker)
+    rig.kernel.run(5 * S)
+    made[0].stop()
+    rig.kernel.run(6 * S)
+    writer.close()
+    plan, scan = open_bag(tmp_path / "again").connections
+    assert plan.source.offer == Offer(True, "", (qos_profile(reliable=True, latched=True, depth=1),))
+    assert scan.source.offer == Offer(False, "", (qos_profile(reliable=False, latched=False, depth=5),))

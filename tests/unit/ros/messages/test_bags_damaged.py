@@ -13,9 +13,10 @@ import zstandard
 from mcap.writer import CompressionType, Writer
 
 from volery.base.errors import UsageError
-from volery.ros.messages import bags
+from volery.ros.messages import bags, containers
 from volery.ros.messages import new as message_of
-from volery.ros.messages.bags import create_bag, decompressed, open_bag
+from volery.ros.messages.bags import create_bag, open_bag
+from volery.ros.messages.containers import decompressed
 from volery.ros.messages.store import define
 
 CHUNK = 700
@@ -97,7 +98,7 @@ def test_a_chunk_is_decompressed_up_to_a_limit(
 ) -> None:
     data = bytes(100_000)
     assert decompressed(kind, compress(data)) == data
-    monkeypatch.setattr(bags, "MAX_CHUNK", 99_999)
+    monkeypatch.setattr(containers, "MAX_CHUNK", 99_999)
     with pytest.raises(ValueError, match="more than 99999 bytes"):
         decompressed(kind, compress(data))
     with pytest.raises(ValueError, match="damaged"):
@@ -107,7 +108,7 @@ def test_a_chunk_is_decompressed_up_to_a_limit(
 def test_a_recording_whose_chunks_exceed_the_limit_is_not_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bags, "MAX_CHUNK", 100)
+    monkeypatch.setattr(containers, "MAX_CHUNK", 100)
     file = tmp_path / "bomb.mcap"
     recorded(file, CompressionType.ZSTD)
     bag = open_bag(file)

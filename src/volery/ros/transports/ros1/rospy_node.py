@@ -95,8 +95,9 @@ class Ros1Subscription:
         read = partial(from_ros1, message_type)
 
         def take(raw: Any) -> None:
-            sender = raw._connection_header.get("callerid", "")
-            arrived(ReceivedMessage(raw.data, read, sender))
+            about = raw._connection_header
+            latched = about.get("latching") == "1"
+            arrived(ReceivedMessage(raw.data, read, about.get("callerid", ""), latched))
 
         self._subscriber = rospy.Subscriber(topic, raw_message_class(message_type), take, tcp_nodelay=True)
 
@@ -418,6 +419,10 @@ class Ros1Library:
         """Return the nodes that are registered for anything, sorted."""
         _, state = self._state()
         return sorted({node for part in state for _, nodes in part for node in nodes})
+
+    def offered(self, topic: str) -> tuple[QoS, ...]:
+        """Return nothing: the master does not know what is latched, only its receivers do."""
+        return ()
 
     def topics(self) -> list[TopicState]:
         """Return the registered topics, by name."""

@@ -28,6 +28,7 @@ from volery.ros.transports.ros2.rclpy_endpoints import (
     Ros2ServiceServer,
     Ros2Subscription,
     check_type,
+    offered_qos,
     owner,
 )
 from volery.ros.transports.transport_graph import TransportGraph
@@ -249,6 +250,10 @@ class Ros2Library:
             if publishers or subscribers:
                 found.append(TopicState(name, kinds[0], publishers, subscribers))
         return found
+
+    def offered(self, topic: str) -> tuple[QoS, ...]:
+        """Return what the discovered publishers of a topic offer."""
+        return tuple(offered_qos(one.qos_profile) for one in self._own.get_publishers_info_by_topic(topic))
 
     def services(self) -> list[ServiceState]:
         """Return what has been discovered, by name."""

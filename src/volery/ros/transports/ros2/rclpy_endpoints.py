@@ -32,6 +32,13 @@ def profile(qos: QoS) -> Any:
     )
 
 
+def offered_qos(offered: Any) -> QoS:
+    """Return the QoS of a discovered publisher; DDS does not tell its depth."""
+    reliable = offered.reliability.name != BEST_EFFORT.upper()
+    kept = offered.durability.name == TRANSIENT_LOCAL.upper()
+    return QoS(None, RELIABLE if reliable else BEST_EFFORT, TRANSIENT_LOCAL if kept else VOLATILE)
+
+
 class Ros2Publisher:
     """An rclpy publisher of bytes."""
 

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
 from volery.ros.messages import Message, ServiceType, from_cdr, message_name, to_cdr, type_hash
-from volery.ros.messages.store import idl_fields, nested_types
+from volery.ros.messages.store import distribution, idl_fields, nested_types
 
 HEADERS = (
     "fastcdr",
@@ -163,11 +163,6 @@ def _compile(source: bytes, prefixes: Sequence[Path], made: Path) -> None:
     fresh.rename(made)
 
 
-def distribution() -> str:
-    """Return the name of the ROS distribution, such as ``jazzy``; ``<distribution>`` if it is unknown."""
-    return os.environ.get("ROS_DISTRO") or "<distribution>"
-
-
 @cache
 def rclpy_class(name: str) -> Any:
     """Return rclpy's class of a message type, or a raw class if its package is not installed.
@@ -209,8 +204,8 @@ def _compare(full: str, found: Any) -> None:
     theirs, ours = found.get_fields_and_field_types(), idl_fields(full)
     if list(theirs.items()) != list(ours.items()):
         raise UsageError(
-            f"{full} has other fields in this ROS 2 ({', '.join(theirs)}) than in the definitions of Humble "
-            f"({', '.join(ours)}); it cannot be carried"
+            f"{full} has other fields in this ROS 2 ({', '.join(theirs)}) than in the definitions of "
+            f"{distribution().capitalize()} ({', '.join(ours)}); it cannot be carried"
         )
     for inner in nested_types(full):
         rclpy_class(inner)
