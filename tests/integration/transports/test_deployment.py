@@ -24,7 +24,7 @@ from rigs.requirements import lacking
 from volery.deploy.generation import Deployment, deploy
 from volery.model.system_loader import load
 from volery.ros.messages import define_all, ros1_service
-from volery.ros.transports.ros1 import available
+from volery.ros.transports.ros1 import Roscore, available
 from volery.run.assembly.model_checks import vocabulary
 from volery.run.distributed.call_types import call_types
 
@@ -102,6 +102,72 @@ def assert_types_are_those_of_the_build(workspace: Path, package: str) -> None:
         found[file.stem[1:]] = checksum[-1]
     assert len(found) == 10
     assert found == {name: ros1_service(f"{package}/srv/{name}").md5 for name in found}
+
+
+CPP_MODEL = """
+volery: 1
+name: pair
+interfaces: {Echo: {say: {args: {words: str, times: int}, returns: str}}}
+components:
+  Asker: {language: c++, path: asker.cpp, requires: {other: Echo}, active: true}
+  Echoer: {language: c++, path: echoer.cpp, provides: {voice: Echo}}
+application: {asker: {is: Asker, other: echoer.voice}, echoer: {is: Echoer}}
+platform: {processors: {pc: {is: intel-i5-3470, frequency: 3000 MHz}}}
+allocations: {all: {asker: pc, echoer: pc}}
+"""
+CPP_ASKER = """
+#include <iostream>
+#include "volery/interfaces.h"
+
+class Asker {
+public:
+    explicit Asker(Echo& other) : other_(other) {}
+    void run() { std::cout << "the answer is " << other_.say("ab", 3) << std::endl; }
+
+private:
+    Echo& other_;
+};
+"""
+CPP_ECHOER = """
+#include "volery/interfaces.h"
+
+class Echoer : public Echo {
+public:
+    std::string say(const std::string& words, std::int64_t times) override {
+        std::string all;
+        for (std::int64_t one = 0; one < times; ++one) all += words;
+        return all;
+    }
+};
+"""
+
+
+def test_hosts_compile_components_in_cpp_and_they_call_each_other(tmp_path: Path, roscore: Roscore) -> None:
+    (tmp_path / "model").mkdir()
+    for name, text in (("model.yaml", CPP_MODEL), ("asker.cpp", CPP_ASKER), ("echoer.cpp", CPP_ECHOER)):
+        (tmp_path / "model" / name).write_text(text)
+    made = deploy(load(tmp_path / "model", vocabulary()), tmp_path / "out", 1)
+    scripts = made.folder / made.packages["pc"] / "scripts"
+    env = {**os.environ, "ROS_MASTER_URI": roscore.uri, "ROS_IP": "127.0.0.1"}
+    reading, writing = os.pipe()
+    started = [
+        subprocess.Popen([sys.executable, scripts / name], env=env, stderr=writing)
+        for name in ("echoer", "asker")
+    ]
+    os.close(writing)
+    try:
+        with os.fdopen(reading, encoding="utf-8") as said:
+            for line in said:
+                assert "volery:" not in line, line
+                if "the answer is ababab" in line:
+                    break
+        for process in started:
+            process.terminate()
+        assert [process.wait(LEAVE_S) for process in started] == [0, 0]
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
 
 
 def test_pip_installs_it_and_the_entry_points_deliver_the_parcel_on_ros_2(tmp_path: Path) -> None:

@@ -159,6 +159,15 @@ def test_a_package_holds_only_the_code_that_its_computer_executes(delivery, tmp_
     assert "delivery_central.py" not in code(made.verification)
 
 
+def test_a_component_in_cpp_has_its_sources_and_headers(tmp_path):
+    system = pair(tmp_path / "model", "c++", "loop.cpp")
+    (tmp_path / "model" / "loop.hpp").write_text("struct Loop { void run() {} };")
+    made = deploy(system, tmp_path / "out", 1)
+    model = made.folder / made.packages["pc-1"] / "model"
+    assert {file.name for file in model.iterdir()} == {"loop.cpp", "loop.hpp", "model.yaml"}
+    assert "apt-get install g++" in (made.folder / "README.md").read_text()
+
+
 @pytest.mark.parametrize("ros", [1, 2])
 def test_the_readme_works_as_it_is_typed(delivery, tmp_path, ros):
     made = deploy(delivery, tmp_path / "out", ros)
@@ -254,8 +263,8 @@ def pair(folder, language="python", path="loop.py", allocation="one", name="pair
 def test_what_cannot_be_deployed(tmp_path):
     with pytest.raises(UsageError, match="pc-1 and pc_1 would both be the package pair_pc_1"):
         deploy(pair(tmp_path / "names", allocation="two"), tmp_path / "out", 1)
-    with pytest.raises(CapabilityError, match="a component in c\\+\\+ cannot be a process"):
-        deploy(pair(tmp_path / "cpp", "c++", "loop.cpp"), tmp_path / "out", 1)
+    with pytest.raises(CapabilityError, match="a component in rclcpp cannot be a process"):
+        deploy(pair(tmp_path / "cpp", "rclcpp", "loop.cpp"), tmp_path / "out", 1)
     with pytest.raises(UsageError, match="--ros 3: there is 1 or 2"):
         deploy(pair(tmp_path / "ros"), tmp_path / "out", 3)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
@@ -21,21 +22,29 @@ if TYPE_CHECKING:
 NODE = "volery"
 """Node of the run's own process, which publishes the clock and serves the components of the environment."""
 
-LANGUAGES = ("python", "rospy", "rclpy")
+LANGUAGES = ("python", "rospy", "rclpy", "c++", "roscpp")
 
 COMPUTING = frozenset(
     (
         "response_time",
         "response_time_mean",
         "response_time_p95",
+        "call_time",
+        "call_time_mean",
+        "call_time_p95",
         "deadline_misses",
         "period_violations",
         "activations",
         "cpu_time",
         "utilisation",
+        "computing_energy",
+        "delay",
+        "delay_mean",
+        "delay_p95",
+        "lost",
     )
 )
-"""Observables of the model's processors, which are not used here."""
+"""Observables of the model's processors and networks, which are not used here."""
 
 BY_TRUTH = frozenset(("landing_offset",))
 """Observables of operations by the true state."""
@@ -60,7 +69,8 @@ def worker_instances(system: System) -> tuple[Instance, ...]:
 
 def without_computers(system: System) -> tuple[System, tuple[str, ...]]:
     """Return *system* without processors, and the names of the requirements that need them."""
-    left_out = tuple(one.name for one in system.requirements if _is_about_computing(one))
+    vehicles = {one.name for one in system.vehicles}
+    left_out = tuple(one.name for one in system.requirements if _is_about_computing(one, vehicles))
     made = replace(
         system,
         processors=(),
@@ -111,8 +121,9 @@ class HostPlatform(Platform):
         """In no time."""
 
 
-def _is_about_computing(bound: Bound) -> bool:
-    return bound.observe.rpartition(".")[2] in COMPUTING
+def _is_about_computing(bound: Bound, vehicles: Collection[str]) -> bool:
+    subject, _, quantity = bound.observe.rpartition(".")
+    return quantity in COMPUTING or (quantity == "energy" and subject not in vehicles)
 
 
 def node_label(instance: Instance) -> str:
