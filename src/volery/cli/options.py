@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -31,6 +31,14 @@ Allocation = Annotated[str | None, typer.Option(help="Allocation of the model; b
 Model = Annotated[Path, typer.Argument(help="Model file, or folder with a model.yaml.")]
 Speed = Annotated[
     str, typer.Option(metavar="max|FACTOR", help="Simulated seconds per second, for simulated vehicles.")
+]
+
+IfKilled = Annotated[
+    Literal["return", "land", "hover"] | None,
+    typer.Option(
+        help="Let the autopilot do this by itself if this program is killed: its failsafe for a lost link is "
+        "set, and restored at the end.",
+    ),
 ]
 
 LogFile = Annotated[

@@ -16,8 +16,11 @@ from volery.base.errors import UsageError, VoleryError
 from volery.base.process import interrupted_by_signals, without_hang_ups
 from volery.kernel.wall import WallKernel
 from volery.run.assembly.vehicles import OpenedVehicles, VehicleSettings, open_vehicles
+from volery.run.ending import Landable
+from volery.run.last_defence import LastDefence
 from volery.vehicles import Drone, Fence, Fleet, Limits, Vehicle
 from volery.vehicles.address import parse
+from volery.vehicles.driver import LinkLossAction
 
 V = TypeVar("V", bound=Vehicle)
 
@@ -35,6 +38,7 @@ def connect(
     limits: Limits | None = None,
     fence: Fence | None = None,
     within: float = LOCATED_WITHIN_S,
+    if_killed: LinkLossAction | None = None,
 ) -> V:
     """Connect to the vehicle at *url* and return it as soon as it knows where it is.
 
@@ -57,13 +61,15 @@ def connect(
         limits: Limits that every operation must keep.
         fence: Geofence that every operation must keep.
         within: Longest time to wait for position and home, s; 0 does not wait, as indoors.
+        if_killed: What the autopilot does by itself if this program is killed: ``return``, ``land`` or
+            ``hover``. Its parameters are set, and restored at the end.
 
     Raises:
         UsageError: The address is wrong, or the fence excludes home.
         NotArrived: Position or home are not known in time.
         LinkSilent: No autopilot answers at the address.
         LinkGarbled: Something else than the expected protocol arrives.
-        CapabilityError: The autopilot that answers is of another kind.
+        CapabilityError: The autopilot that answers is of another kind, or cannot be asked for *if_killed*.
     """
     name = parse(url).driver
     with ExitStack() as opening:
@@ -73,7 +79,7 @@ def connect(
         assert isinstance(vehicle, kind)
         vehicle.wait_connected()
         vehicle.wait_located(within, _teller(opened))
-        opening.enter_context(_ending(vehicle.come_to_rest))
+        opening.enter_context(_ending(_defended(vehicle, if_killed).come_to_rest))
         vehicle.at_end = _until_exit(opening, opened)
     return vehicle
 
@@ -109,6 +115,7 @@ def connect_fleet(
     limits: Limits | None = None,
     fence: Fence | None = None,
     within: float = LOCATED_WITHIN_S,
+    if_killed: LinkLossAction | None = None,
 ) -> Fleet:
     """Connect to several vehicles, as ``connect`` does to one, and return them as a fleet.
 
@@ -128,6 +135,7 @@ def connect_fleet(
         limits: Limits of each vehicle.
         fence: Geofence of each vehicle.
         within: Longest time to wait for positions and homes, s; 0 does not wait.
+        if_killed: What each autopilot does by itself if this program is killed, as of ``connect``.
 
     Raises:
         FleetError: Some of the vehicles do not answer, or do not know where they are in time.
@@ -142,11 +150,21 @@ def connect_fleet(
         fleet = Fleet({vehicle.name: vehicle for vehicle in opened.vehicles})
         fleet.each(lambda vehicle: vehicle.wait_connected(), "connect")
         fleet.each(lambda vehicle: vehicle.wait_located(within, _teller(opened)), "know where they are")
+        defended = {one.name: _defended(one, if_killed) for one in opened.vehicles}
         opening.enter_context(
-            _ending(lambda: fleet.each(lambda vehicle: vehicle.come_to_rest(), "come to rest"))
+            _ending(lambda: fleet.each(lambda one: defended[one.name].come_to_rest(), "come to rest"))
         )
         fleet.at_end = _until_exit(opening, opened)
     return fleet
+
+
+def _defended(vehicle: Vehicle, if_killed: LinkLossAction | None) -> Landable:
+    """Ask the autopilot for its last line of defence, if one is wanted, and return what brings it to rest."""
+    if if_killed is None:
+        return vehicle
+    defence = LastDefence(vehicle, if_killed)
+    defence.ask()
+    return defence
 
 
 def _teller(opened: OpenedVehicles) -> Callable[[str], object] | None:

@@ -21,6 +21,7 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.run.assembly.vehicles import ObservedVehicles, OpenedVehicles, VehicleSettings, open_vehicles
 from volery.run.ending import Ending
+from volery.run.last_defence import LastDefence
 from volery.run.recording import Recording
 from volery.run.result import DEFAULT_OPTIONS, LostLinkReporter, Options, ProgressReporter, Run, Tell
 from volery.trace.attachments import (
@@ -123,7 +124,10 @@ class _Flight:
         self._kernel = kernel = self._opened.kernel
         self._mission = self._load(mission, options.seed)
         self._ending = Ending(kernel)
-        self._ending.vehicles = self._opened.vehicles
+        self._defences: dict[str, LastDefence] = {}
+        if options.if_killed is not None:
+            self._defences = {one.name: LastDefence(one, options.if_killed) for one in self._opened.vehicles}
+        self._ending.vehicles = [self._defences.get(one.name, one) for one in self._opened.vehicles]
         setup, attachments = self._setup(urls, options.seed)
         self._recording = Recording(setup, options.folder, attachments, traced=options.traced)
         kernel.record = self._recording.stream
@@ -212,6 +216,8 @@ class _Flight:
     def _fly(self, vehicle: Vehicle) -> None:
         try:
             vehicle.wait_connected()
+            if vehicle.name in self._defences:
+                self._defences[vehicle.name].ask()
             self._mission(vehicle)
         except VoleryError as error:
             self._fail(error)

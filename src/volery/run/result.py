@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from volery.base.data_frames import to_frame
-from volery.base.errors import UsageError, VoleryError, choices
+from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.run.event_log import LogOptions
 from volery.run.vehicle_arrays import INDEX, vehicle_arrays
 from volery.trace.events import Event, Milestone, Text
+from volery.vehicles.driver import LINK_LOSS_ACTIONS, LinkLossAction
 from volery.vehicles.observed_vehicle import ON_LINK_LOSS
 
 if TYPE_CHECKING:
@@ -168,6 +169,8 @@ class Options:
             ``pace`` is given; empty for the embedded graph.
         deployed: The components on ``graph`` are started by others, from the packages of ``volery deploy``.
         log: File into which the run writes what happens, line by line, or None.
+        if_killed: What the autopilot of a flight does by itself if this program is killed: ``return``,
+            ``land`` or ``hover``; None leaves its parameters as they are.
         traces: Folder in which C++ components record the basic blocks that they enter, without being charged.
     """
 
@@ -182,10 +185,14 @@ class Options:
     deployed: bool = False
     traces: Path | None = None
     log: LogOptions | None = None
+    if_killed: LinkLossAction | None = None
 
     def __post_init__(self) -> None:
         if self.record not in (FULL, SUMMARY):
             raise UsageError(f"no record {self.record!r}; there is {choices((FULL, SUMMARY))}, or no folder")
+        if self.if_killed is not None and self.if_killed not in LINK_LOSS_ACTIONS:
+            hint = did_you_mean(self.if_killed, LINK_LOSS_ACTIONS)
+            raise UsageError(f"no action {self.if_killed!r}{hint}; there is {choices(LINK_LOSS_ACTIONS)}")
 
     @property
     def folder(self) -> Path | None:

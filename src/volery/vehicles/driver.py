@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from math import isfinite, nan
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol, get_args
 
 from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent, NotArrived, VehicleError
 from volery.base.installed import Registry
@@ -191,6 +191,14 @@ class Acceleration(NamedTuple):
     up: float
 
 
+LinkLossAction = Literal["return", "land", "hover"]
+"""What an autopilot does by itself when this program is gone."""
+LINK_LOSS_ACTIONS: tuple[LinkLossAction, ...] = get_args(LinkLossAction)
+
+Settings = Mapping[str, Callable[[float], float]]
+"""New values of parameters from the present ones, by name; a function raises if this value rules it out."""
+
+
 class Driver(Protocol):
     """Commands one autopilot. Each operation returns the steps to execute, in order.
 
@@ -295,6 +303,12 @@ class Driver(Protocol):
 
     def on_link_loss(self) -> str:
         """Return the reaction to a lost link in one line; empty until the parameters are known."""
+
+    def link_loss_settings(self, action: LinkLossAction) -> Settings:
+        """Return the parameters with which the autopilot does *action* when the link is lost.
+
+        None where it does so anyway. Raises ``CapabilityError`` where it cannot be asked for that.
+        """
 
     def problem(self) -> LinkError | CapabilityError | None:
         """Return what is wrong with the link, or why the vehicle is not supported, as an error to raise."""

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from volery.base.errors import CapabilityError, Refused, UsageError
+from volery.base.errors import CapabilityError, Refused, UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns, S, from_seconds
 from volery.kernel.api import Handle
 from volery.kernel.waiting import sleep
 from volery.vehicles.bounded_vehicle import BoundedVehicle
+from volery.vehicles.driver import LINK_LOSS_ACTIONS, LinkLossAction
 from volery.vehicles.onboard_files import OnboardFiles
 from volery.vehicles.onboard_logs import OnboardLogs
 from volery.vehicles.onboard_plan import OnboardPlan
@@ -25,6 +26,7 @@ from volery.vehicles.telemetry_feed import Quantity, TelemetryHistory, read_quan
 REBOOT_WITHIN_S = 60.0
 SILENT_WITHIN: Ns = 5 * S
 """Time for which the old firmware may still send after it has accepted a restart."""
+KNOWN_WITHIN: Ns = 15 * S
 DOWN_AFTER: Ns = 1500 * MS
 """Silence that shows the restart: heartbeats arrive each second."""
 
@@ -78,6 +80,39 @@ class ServicedVehicle(BoundedVehicle):
         return Payload(self.name, self._services("a payload"))
 
     # -- single requests
+
+    def set_link_loss_action(self, action: LinkLossAction) -> dict[str, tuple[float, float]]:
+        """Let the autopilot return, land or hover by itself when it hears nothing of this program any more.
+
+        Its parameters are set, and read back; they stay so until they are set again.
+
+        Args:
+            action: ``return``, ``land`` or ``hover``.
+
+        Returns:
+            The parameters that were changed, with their values before and now.
+
+        Raises:
+            UsageError: there is no such action.
+            CapabilityError: this autopilot cannot be asked for it, or does not listen to this program.
+            Refused: the autopilot keeps another value.
+        """
+        if action not in LINK_LOSS_ACTIONS:
+            hint = did_you_mean(action, LINK_LOSS_ACTIONS)
+            raise UsageError(f"no action {action!r}{hint}; there is {choices(LINK_LOSS_ACTIONS)}")
+        self._connect()
+        self._driver.link_loss_settings(action)  # refuses at once what it cannot
+        # what was requested at the connection is known first: names depend on the version, and a late answer
+        # would be taken for one to a request of here
+        self._executor.wait(lambda: bool(self._driver.on_link_loss()), KNOWN_WITHIN)
+        changed: dict[str, tuple[float, float]] = {}
+        for name, change in self._driver.link_loss_settings(action).items():
+            before = self.parameters.get(name)
+            now = change(before)
+            if now != before:
+                self.parameters.set(name, now)
+                changed[name] = (before, now)
+        return changed
 
     def reboot(self, within: float = REBOOT_WITHIN_S) -> None:
         """Restart the autopilot and return when it sends again. ``Refused`` while it is armed.

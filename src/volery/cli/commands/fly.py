@@ -12,7 +12,7 @@ from volery.base.errors import UsageError
 from volery.base.installed import require_extra
 from volery.cli.command import OK, Commands
 from volery.cli.console import Output
-from volery.cli.options import LogFile, LogLevel, Out, Record, Seed, Speed, parse_speed
+from volery.cli.options import IfKilled, LogFile, LogLevel, Out, Record, Seed, Speed, parse_speed
 
 if TYPE_CHECKING:
     from volery.run.serve import VehicleNodeServer, VehicleServer
@@ -49,6 +49,7 @@ def fly(
             metavar="SHARE", help="Battery reserve, such as 20%; below it the vehicle only returns or lands."
         ),
     ] = None,
+    if_killed: IfKilled = None,
     out: Out = None,
     record: Record = "full",
     log_file: LogFile = None,
@@ -83,6 +84,7 @@ def fly(
             show=show,
             tell=output.note,
             log=read_log_options(log_file, log_level),
+            if_killed=if_killed,
         )
         run = run_flight(mission, on, options, restrictions)
     return show_outcome(output, run)

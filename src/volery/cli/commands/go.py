@@ -11,7 +11,7 @@ import typer
 from volery.base.errors import UsageError
 from volery.cli.command import OK, Commands
 from volery.cli.console import Output, make_table, number_column
-from volery.cli.options import Out, Seed, Speed, parse_speed
+from volery.cli.options import IfKilled, Out, Seed, Speed, parse_speed
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -96,6 +96,7 @@ class FlightOptions(SwitchOptions):
             help="Gains are parameters of the node volery_go on real ROS, such as ~yaw/kp, also in flight.",
         ),
     ] = None
+    if_killed: IfKilled = None
     seed: Seed = 1
     speed: Speed = "max"
     out: Out = None
@@ -248,7 +249,13 @@ def _go(
         run_progress(output, f"{name} on {options.on}") as show,
     ):
         how = Options(
-            fidelity="hardware", seed=options.seed, pace=pace, out=folder, show=show, tell=output.note
+            fidelity="hardware",
+            seed=options.seed,
+            pace=pace,
+            out=folder,
+            show=show,
+            tell=output.note,
+            if_killed=options.if_killed,
         )
         run = go(make, options.on, settings, how)
     status = show_outcome(output, run)

@@ -12,7 +12,7 @@ from volery.base.errors import UsageError
 from volery.cli.command import FAILED, Commands
 from volery.cli.commands.go import By, Height
 from volery.cli.console import Output, make_table, number_column
-from volery.cli.options import Out, Seed
+from volery.cli.options import IfKilled, Out, Seed
 
 if TYPE_CHECKING:
     from volery.control.teleoperation import Input
@@ -33,6 +33,7 @@ def teleop(
     speed_limit: Annotated[float, typer.Option("--max-speed", help="Greatest speed over ground, m/s.")] = 2.0,
     turn_limit: Annotated[float, typer.Option("--max-turn", help="Greatest turn rate, degrees/s.")] = 45.0,
     height: Height = 3.0,
+    if_killed: IfKilled = None,
     out: Out = None,
 ) -> int:
     """Fly by keyboard or joystick: take off, hold a key or the dead-man button, let go to hover."""
@@ -64,7 +65,7 @@ def teleop(
             actuation = ACTUATIONS[settings.by](drone)
             ended = teleoperation.teleoperate(drone, source, actuation, limits, settings.height)
 
-        options = Options(fidelity="hardware", pace=pace, out=folder, tell=output.note)
+        options = Options(fidelity="hardware", pace=pace, out=folder, tell=output.note, if_killed=if_killed)
         run = fly(mission, with_rates(url, None), options)
     status = show_outcome(output, run)
     if ended not in {"", teleoperation.LAND, teleoperation.QUIT}:

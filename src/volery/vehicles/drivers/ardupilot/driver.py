@@ -21,15 +21,23 @@ from volery.vehicles.driver import (
     AttitudeTarget,
     ChangeSpeed,
     Land,
+    LinkLossAction,
     ManualControl,
     MissionItem,
     ReturnHome,
+    Settings,
     Step,
     TakeOff,
     Waypoint,
 )
 from volery.vehicles.drivers.ardupilot.backend import RELEASED, ArduPilotBackend
-from volery.vehicles.drivers.ardupilot.modes import GUIDED, RESTING, beyond_own_fence, on_link_loss
+from volery.vehicles.drivers.ardupilot.modes import (
+    GUIDED,
+    RESTING,
+    beyond_own_fence,
+    link_loss_settings,
+    on_link_loss,
+)
 from volery.vehicles.drivers.mavlink.backend import GROUND_SPEED, UNCHANGED, Ack, mission_item
 from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
 from volery.vehicles.drivers.steps import (
@@ -163,6 +171,9 @@ class ArduPilot(MavlinkDriver):
         """Return the reaction to a lost link, from the failsafe for ground stations."""
         parameters = self._backend.parameters
         return on_link_loss(self.telemetry.kind, parameters) if parameters is not None else ""
+
+    def _link_loss_settings(self, action: LinkLossAction) -> Settings:
+        return link_loss_settings(self.name, self.telemetry.kind, action, self._backend.parameters or {})
 
     def _check_own_fence(self, goal: Position) -> None:
         """Refuse a goal outside the aircraft's own fence: ArduPilot ignores such a target without a word."""

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf
 
+from volery.base.errors import CapabilityError
+from volery.vehicles.driver import LinkLossAction, Settings
 from volery.vehicles.drivers.mavlink.client import GCS_SYSTEM
 from volery.vehicles.drivers.steps import DRONE_KIND, ROVER_KIND
 
@@ -158,3 +160,42 @@ def on_link_loss(kind: str, parameters: Mapping[str, float]) -> str:
         line += f" (it listens for {which}, not for this program)"
     goes_on = round(parameters.get("FS_OPTIONS", 0.0)) & _MISSIONS_GO_ON
     return f"{line}; a mission goes on" if copter and goes_on else line
+
+
+_COPTER_ACTIONS: Mapping[LinkLossAction, float] = {"return": 1.0, "land": 5.0, "hover": 7.0}
+"""Values of FS_GCS_ENABLE: RTL, LAND, BRAKE."""
+_ROVER_ACTIONS: Mapping[LinkLossAction, float] = {"return": 1.0, "hover": 2.0}
+"""Values of FS_ACTION: RTL, HOLD."""
+_PILOT_GOES_ON = 1 << 4
+"""Bit of FS_OPTIONS: a mode that sticks fly continues without a ground station."""
+
+
+def link_loss_settings(
+    name: str, kind: str, action: LinkLossAction, parameters: Mapping[str, float]
+) -> Settings:
+    """Return the parameters with which the vehicle *name* does *action* when the link is lost.
+
+    Args:
+        name: Name of the vehicle, for errors.
+        kind: Kind of the vehicle.
+        action: What it is to do.
+        parameters: The parameters as read so far.
+    """
+    stations = listened_for(parameters)
+    if GCS_SYSTEM not in stations:
+        found = next(one for one in STATION_PARAMETERS if one in parameters)
+        raise CapabilityError(
+            f"{name}: it reacts when the ground station with system id {stations[0]} is lost, not for this "
+            f"program, which has {GCS_SYSTEM}: leave it to that station, or set {found} to {GCS_SYSTEM}"
+        )
+    if kind == DRONE_KIND:
+        return {
+            "FS_GCS_ENABLE": lambda _: _COPTER_ACTIONS[action],
+            "FS_OPTIONS": lambda value: float(round(value) & ~(_MISSIONS_GO_ON | _PILOT_GOES_ON)),
+        }
+    if action not in _ROVER_ACTIONS:
+        raise CapabilityError(f"{name}: a rover does not land; hover stops it, return drives it home")
+    return {
+        "FS_GCS_ENABLE": lambda _: 1.0,
+        "FS_ACTION": lambda _: _ROVER_ACTIONS[action],
+    }

@@ -16,7 +16,15 @@ from volery.base.position import Position
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import Action, Kernel
 from volery.ros.messages.dji_constants import GUIDES, HEADERS, HEALTHY_GPS, DisplayMode, Source
-from volery.vehicles.driver import Acceleration, AttitudeTarget, Capability, ManualControl, Step
+from volery.vehicles.driver import (
+    Acceleration,
+    AttitudeTarget,
+    Capability,
+    LinkLossAction,
+    ManualControl,
+    Settings,
+    Step,
+)
 from volery.vehicles.drivers.dji.backend import QUIET, DjiBackend
 from volery.vehicles.drivers.dji.decoder import MOST_VOLTS, SETTLED, STALE, TAKEN_OVER_FOR
 from volery.vehicles.drivers.dji.missions import MissionRunner, above_home, check_amsl
@@ -105,6 +113,15 @@ class Dji:
             "it brakes and hovers where it is (assumed: within 0.5 s), until its battery is low, the pilot "
             "takes it or its transmitter is lost; landing, going home and missions go on"
         )
+
+    def link_loss_settings(self, action: LinkLossAction) -> Settings:
+        """Return nothing for ``hover``, which it does by itself; raise for the others."""
+        if action != "hover":
+            raise CapabilityError(
+                f"{self.name}: the nodes of DJI's SDK cannot make it {action} when this program is killed: "
+                "it brakes and hovers; what follows a lost transmitter is set in DJI's own application"
+            )
+        return {}
 
     # -- operations by set-points
 

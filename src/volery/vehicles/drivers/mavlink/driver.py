@@ -14,8 +14,18 @@ from volery.kernel.api import Action, Kernel
 from volery.links.link import Link
 from volery.ros.graph import Node
 from volery.vehicles.address import MAVLINK_OPTIONS, check_options
-from volery.vehicles.driver import Capability, Land, MissionItem, Repeat, ReturnHome, Step
+from volery.vehicles.driver import (
+    Capability,
+    Land,
+    LinkLossAction,
+    MissionItem,
+    Repeat,
+    ReturnHome,
+    Settings,
+    Step,
+)
 from volery.vehicles.drivers.mavlink.backend import Ack, Backend
+from volery.vehicles.drivers.mavlink.client import MavlinkClient
 from volery.vehicles.drivers.mavlink.mavros_backend import namespace_and_geoid
 from volery.vehicles.drivers.steps import (
     ANSWERED_WITHIN,
@@ -142,6 +152,19 @@ class MavlinkDriver:
         self.stop()
         self._takeover.end()
         self._backend.close()
+
+    def link_loss_settings(self, action: LinkLossAction) -> Settings:
+        """Return the parameters for a lost link; over a graph the link is that of another program."""
+        if not isinstance(self._backend, MavlinkClient):
+            raise CapabilityError(
+                f"{self.name}: over a ROS graph its link is MAVROS's, which goes on when this program is "
+                "killed: what it then does cannot be asked for; connect to it by MAVLink"
+            )
+        return self._link_loss_settings(action)
+
+    @abstractmethod
+    def _link_loss_settings(self, action: LinkLossAction) -> Settings:
+        """Return the parameters for a lost link to this program."""
 
     # -- on the ground
 

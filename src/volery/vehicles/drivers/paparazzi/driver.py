@@ -20,7 +20,15 @@ from volery.base.errors import CapabilityError, NotArrived, Refused
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.vehicles.driver import Acceleration, AttitudeTarget, Capability, MissionItem, Step
+from volery.vehicles.driver import (
+    Acceleration,
+    AttitudeTarget,
+    Capability,
+    LinkLossAction,
+    MissionItem,
+    Settings,
+    Step,
+)
 from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
 from volery.vehicles.drivers.paparazzi.decoder import ATTITUDE_MODE, FAILSAFE, GUIDED, HEIGHT_MODE
 from volery.vehicles.drivers.paparazzi.sequences import PaparazziSteps
@@ -103,6 +111,14 @@ class Paparazzi:
             "in GUIDED it does not react: it flies to its last set-point and stays there, and a velocity "
             f"goes on without end; in NAV (taking off, landing) it goes on with its plan{far}; flown by "
             "sticks it descends (FAILSAFE)"
+        )
+
+    def link_loss_settings(self, action: LinkLossAction) -> Settings:
+        """Raise: what a Paparazzi does is compiled into it, and nothing of it acts in GUIDED."""
+        raise CapabilityError(
+            f"{self.name}: a Paparazzi cannot be made to {action} when this program is killed: what it does "
+            "without a datalink is an exception of its flight plan or GEOFENCE_DATALINK_LOST_TIME of its "
+            "airframe file; both are compiled in, and neither acts in GUIDED"
         )
 
     def close(self) -> None:

@@ -34,10 +34,12 @@ from volery.vehicles.driver import (
     AttitudeTarget,
     ChangeSpeed,
     Land,
+    LinkLossAction,
     ManualControl,
     MissionItem,
     Repeat,
     ReturnHome,
+    Settings,
     Step,
     TakeOff,
     Waypoint,
@@ -52,7 +54,7 @@ from volery.vehicles.drivers.mavlink.backend import (
 from volery.vehicles.drivers.mavlink.driver import MavlinkDriver
 from volery.vehicles.drivers.px4 import modes
 from volery.vehicles.drivers.px4.backend import PX4Backend, Setpoint
-from volery.vehicles.drivers.px4.modes import HOLD, OFFBOARD, on_link_loss
+from volery.vehicles.drivers.px4.modes import HOLD, OFFBOARD, link_loss_settings, on_link_loss
 from volery.vehicles.drivers.px4.setpoints import SETPOINT_PERIOD, STILL, ManualControlStream, OffboardStream
 from volery.vehicles.drivers.steps import (
     DRONE_KIND,
@@ -114,6 +116,9 @@ class PX4(MavlinkDriver):
         """Return the reaction to a lost link, from the failsafes for ground station, OFFBOARD and RC."""
         parameters = self._backend.parameters
         return on_link_loss(parameters) if parameters is not None else ""
+
+    def _link_loss_settings(self, action: LinkLossAction) -> Settings:
+        return link_loss_settings(self.name, self.telemetry.kind, action)
 
     # -- from the ground
 

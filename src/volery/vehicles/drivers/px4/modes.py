@@ -9,6 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from volery.base.errors import CapabilityError
+from volery.vehicles.driver import LinkLossAction, Settings
+from volery.vehicles.drivers.steps import DRONE_KIND
+
 MANUAL, STABILIZED, ALTCTL, POSCTL, ACRO = "MANUAL", "STABILIZED", "ALTCTL", "POSCTL", "ACRO"
 OFFBOARD = "OFFBOARD"
 HOLD, TAKEOFF, LAND, RTL, MISSION = "AUTO.LOITER", "AUTO.TAKEOFF", "AUTO.LAND", "AUTO.RTL", "AUTO.MISSION"
@@ -115,3 +119,19 @@ def on_link_loss(parameters: Mapping[str, float]) -> str:
         reaction = _LINK_LOST.get(round(parameters["NAV_RCL_ACT"]), "it does nothing")
         parts.append(f"{parameters.get('COM_RC_LOSS_T', 0.5):g} s after the last sticks {reaction}")
     return "; ".join(parts)
+
+
+_ACTIONS: Mapping[LinkLossAction, tuple[float, float]] = {
+    "return": (2.0, 3.0),
+    "land": (3.0, 4.0),
+    "hover": (1.0, 5.0),
+}
+"""Values of NAV_DLL_ACT and of COM_OBL_RC_ACT."""
+
+
+def link_loss_settings(name: str, kind: str, action: LinkLossAction) -> Settings:
+    """Return the parameters with which the vehicle *name* does *action* when the link is lost."""
+    if kind != DRONE_KIND and action == "land":
+        raise CapabilityError(f"{name}: a rover does not land; hover stops it, return drives it home")
+    station, offboard = _ACTIONS[action]
+    return {"NAV_DLL_ACT": lambda _: station, "COM_OBL_RC_ACT": lambda _: offboard}
