@@ -38,6 +38,9 @@ SENSORS = {"px4": "sih", "paparazzi": "rtk"}
 """The sensors nearest to those of the simulator that was recorded: SIH's noise is larger than that of the
 default ones, the receiver of NPS has none."""
 
+VERSIONS = {"ardupilot": "4.5"}
+"""The version that was recorded, of an autopilot that is simulated in several."""
+
 FLIGHTS = {"px4": 360, "paparazzi": 8}
 """Number of simulated flights whose mean is compared, with seeds from 1 on; else one. Noise of SIH's sensors
 makes times of single flights differ by some seconds. Four for each that was recorded of PX4 add an eighth to
@@ -110,6 +113,7 @@ class Flight:
         sensors = SENSORS.get(autopilot, "consumer")
         armed_after = ARMED_AFTER_S.get(autopilot, 0.0)
         url = f"sim:{autopilot}?start={'cold' if armed_after else 'warm'}&sensors={sensors}"
+        url += f"&version={VERSIONS[autopilot]}" if autopilot in VERSIONS else ""
         observed, origin = autopilot in OBSERVED, [HOME]
         events: list[Event] = []
 

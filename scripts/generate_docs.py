@@ -11,6 +11,7 @@ import ast
 import json
 import re
 import sys
+from collections.abc import Mapping
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -33,6 +34,7 @@ from volery.requirements.observables import NOTED, OBSERVABLES
 from volery.run.assembly.model_checks import vocabulary
 from volery.simulation.autopilots.ardupilot import FIRMWARE as ARDUPILOT
 from volery.simulation.autopilots.autopilot import FirmwareFamily
+from volery.simulation.autopilots.autopilot_parameters import Renamed
 from volery.simulation.autopilots.px4 import FIRMWARE as PX4
 from volery.simulation.world.body_specs import Multirotor
 from volery.testing.driver_checks import GROUPS
@@ -151,7 +153,9 @@ FIRMWARES = {
         ARDUPILOT,
         "All parameters of ArduCopter and ArduRover 4.5.6 are there: listed, read, set, kept. The copter's\n"
         "names, types and values are the recorded ones. Of the rover's, few were recorded: those that it\n"
-        "shares with the copter have the copter's values, the rest the documented defaults.",
+        "shares with the copter have the copter's values, the rest the documented defaults.\n"
+        "Where 4.8, the default, has another name, it follows; values in cm are metres there, 1/100 degrees\n"
+        "degrees, and ARMING_SKIPCHK and SIM_GPS1_ENABLE the opposite.",
     ),
     "px4": Firmware(
         "PX4",
@@ -161,6 +165,11 @@ FIRMWARES = {
         "The rover's are the multirotor's and documented defaults of a few of its own.",
     ),
 }
+
+
+def _all_names(name: str, renamed: Mapping[str, Renamed]) -> str:
+    """Return the name of a parameter, and the one that the newest version has for it."""
+    return f"`{name}`, now `{renamed[name].name}`" if name in renamed else f"`{name}`"
 
 
 def supported_parameters(firmware: Firmware) -> str:
@@ -173,12 +182,13 @@ def supported_parameters(firmware: Firmware) -> str:
     for kind, one in firmware.family.kinds.items():
         table = one.rules.parameters
         every = [parameter.name for parameter in table.defaults()]
-        kept = [name for name in every if name not in table.supported]
+        names = {name: _all_names(name, table.renamed) for name in every}
+        kept = [names[name] for name in every if name not in table.supported]
         lines += [f"\n## {one.name}, {kind}\n", "| parameter | what it changes |", "|---|---|"]
-        lines += [f"| `{name}` | {what} |" for name, what in sorted(table.supported.items())]
+        lines += [f"| {names[name]} | {what} |" for name, what in sorted(table.supported.items())]
         lines += [
             f"\nStored without effect, {len(kept)} of {len(every)}:\n",
-            ", ".join(f"`{one}`" for one in kept),
+            ", ".join(kept),
         ]
     return "\n".join(lines) + "\n"
 

@@ -102,7 +102,7 @@ def test_every_requested_message_is_sent_or_refused(rig: Bench) -> None:
 
 
 def test_every_message_that_wants_an_answer_has_one(rig: Bench) -> None:
-    name = "SYSID_THISMAV" if rig.firmware is ardupilot.FIRMWARE else "MAV_SYS_ID"
+    name = "MAV_SYSID" if rig.firmware is ardupilot.FIRMWARE else "MAV_SYS_ID"
     silent = []
     for message, fields, answer in MESSAGES:
         asked = {key: name if value == "{parameter}" else value for key, value in fields.items()}

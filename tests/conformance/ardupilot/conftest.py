@@ -16,7 +16,7 @@ from volery.simulation.autopilots.ardupilot import FIRMWARE
 class Bench(Station):
     """One vehicle, one ground station on one link."""
 
-    firmware = FIRMWARE
+    firmware = FIRMWARE.of_version("4.5")
     home = LocalFrame(-35.363261, 149.165230, 584.0)
     heading = 353.0
 

@@ -197,9 +197,9 @@ async def asks(address: str, port: int) -> None:
 
     async with connected(address, port) as drone:
         assert await soon(drone.param.get_param_int("FRAME_CLASS")) == 1
-        assert await soon(drone.param.get_param_float("WPNAV_SPEED")) == 1000.0
-        await soon(drone.param.set_param_float("WPNAV_SPEED", 700.0))
-        assert await soon(drone.param.get_param_float("WPNAV_SPEED")) == 700.0
+        assert await soon(drone.param.get_param_float("WP_SPD")) == 10.0
+        await soon(drone.param.set_param_float("WP_SPD", 7.0))
+        assert await soon(drone.param.get_param_float("WP_SPD")) == 7.0
         await refused(drone.param.get_param_float("NO_SUCH_NAME"), ParamError)
         version = await soon(drone.info.get_version())
         assert (version.flight_sw_major, version.flight_sw_minor, version.flight_sw_patch) == (4, 5, 6)

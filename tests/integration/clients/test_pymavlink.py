@@ -74,14 +74,14 @@ def test_parameters_are_listed_read_and_set(tower: Any) -> None:
     assert tower.connection.params["FRAME_CLASS"] == 1
 
     def is_speed(message: Any) -> bool:
-        return bool(message.param_id == "WPNAV_SPEED")
+        return bool(message.param_id == "WP_SPD")
 
-    tower.connection.param_fetch_one("WPNAV_SPEED")
-    assert tower.wait("PARAM_VALUE", is_speed).param_value == 1000
-    tower.connection.param_set_send("WPNAV_SPEED", 650.0)
-    assert tower.wait("PARAM_VALUE", is_speed).param_value == 650
-    tower.connection.param_fetch_one("WPNAV_SPEED")
-    assert tower.wait("PARAM_VALUE", is_speed).param_value == 650
+    tower.connection.param_fetch_one("WP_SPD")
+    assert tower.wait("PARAM_VALUE", is_speed).param_value == 10
+    tower.connection.param_set_send("WP_SPD", 6.5)
+    assert tower.wait("PARAM_VALUE", is_speed).param_value == 6.5
+    tower.connection.param_fetch_one("WP_SPD")
+    assert tower.wait("PARAM_VALUE", is_speed).param_value == 6.5
 
 
 def item(station: Any, place: int, frame: int, command: int, north: float, height: float) -> Any:
@@ -203,4 +203,4 @@ def test_all_parameters_are_read_as_one_file(tower: Any, tmp_path: Path) -> None
     lines = file.read_text(encoding="utf-8").splitlines()
     assert len(lines) == COUNT_OF_PARAMETERS
     values = dict(line.replace(",", " ").split()[:2] for line in lines)
-    assert float(values["WPNAV_SPEED"]) == 1000.0
+    assert float(values["WP_SPD"]) == 10.0

@@ -16,14 +16,14 @@ def main(url: str) -> None:
         drone.takeoff(4.0)
         drone.goto(Position(home.latitude + 0.00008, home.longitude, AboveHome(5.0)))
         went = drone.position.latitude - home.latitude
-        speed = drone.parameters.get("WPNAV_SPEED")
-        drone.parameters.set("WPNAV_SPEED", speed + 0.5)
+        speed = drone.parameters.get("WP_SPD")
+        drone.parameters.set("WP_SPD", speed + 0.5)
         plan = volery.Plan(rally=(Position(home.latitude, home.longitude, AboveHome(20)),))
         drone.plan.upload(plan, only=["rally"])
         found = {
             "home": home.altitude.metres,
             "went": went,
-            "changed": drone.parameters.get("WPNAV_SPEED") - speed,
+            "changed": drone.parameters.get("WP_SPD") - speed,
             "parameters": len(drone.parameters.all()),
             "rally": len(drone.plan.download().rally),
             "roll": drone.attitude.roll,

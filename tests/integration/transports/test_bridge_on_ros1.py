@@ -122,7 +122,7 @@ def test_a_vehicle_behind_mavros(
         drone.takeoff(3.0)
         assert drone.altitude.metres == pytest.approx(3.0, abs=0.5)
         assert abs(drone.attitude.roll) < 10.0  # of imu/data
-        name = "WPNAV_SPEED" if autopilot == "ardupilot" else "MPC_XY_CRUISE"
+        name = "WP_SPD" if autopilot == "ardupilot" else "MPC_XY_CRUISE"
         value = drone.parameters.get(name)
         drone.parameters.set(name, value + 0.5)
         found = drone.parameters.all()

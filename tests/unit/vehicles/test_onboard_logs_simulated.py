@@ -84,7 +84,7 @@ def test_pymavlink_reads_the_log_of_an_ardupilot(dataflash: tuple[list[LogEntry]
     fixes = [(one.TimeUS / 1e6, one.Lat * 111_200.0, one.Spd) for one in found["GPS"]]
     gone = sum(speed * (b - a) for (a, _, speed), (b, _, _) in pairwise(fixes))
     assert gone == pytest.approx(north, abs=4.0)  # speed and position agree
-    assert {one.Name: one.Value for one in found["PARM"]}["RTL_ALT"] == 1500.0
+    assert {one.Name: one.Value for one in found["PARM"]}["RTL_ALT_M"] == 15.0
     used = [one.CurrTot for one in found["BAT"]]
     assert used == sorted(used)
     assert used[-1] > used[0]

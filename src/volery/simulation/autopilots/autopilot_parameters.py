@@ -7,7 +7,7 @@ rounds, a real type is single precision). Each firmware derives its ``Tuning`` f
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 from math import isfinite, radians
@@ -40,6 +40,25 @@ class Parameter(NamedTuple):
     """The parameter that must not be 0 for this one to be listed; empty: it is always listed."""
 
 
+def _same(value: float) -> float:
+    return value
+
+
+class Renamed(NamedTuple):
+    """A parameter that a version of a firmware shows by another name, and perhaps as another number."""
+
+    name: str
+    type: int | None
+    """MAV_PARAM_TYPE; ``None``: that of the firmware's own table."""
+    shown: Callable[[float], float] = _same
+    """Return the value as it is shown."""
+    own: Callable[[float], float] = _same
+    """Return the value that the firmware's own table has."""
+
+
+NOT_RENAMED: Mapping[str, Renamed] = {}
+
+
 def quantised(kind: int, value: float) -> float:
     """Return *value* as a parameter of type *kind* stores it; integers are limited to their range."""
     if kind not in _BOUNDS:
@@ -64,19 +83,33 @@ class Parameters:
     Those of a subsystem that is switched off are read and set by name, but have no index: length, iteration
     and indices count the listed ones only.
 
+    All names and values here are those that are shown, but for the value of ``[]`` and ``in``, which take the
+    name and give the value of the firmware's own table: what a parameter does is stated for one version only.
+
     Args:
-        defaults: All parameters with their default values.
+        defaults: All parameters with their default values, by the firmware's own names.
         overrides: Values that replace defaults.
+        renamed: Parameters that the version shows otherwise, by the firmware's own names.
 
     Raises:
         UsageError: A name in *overrides* does not exist, or its value is not finite.
     """
 
-    def __init__(self, defaults: Iterable[Parameter], overrides: Mapping[str, float] | None = None) -> None:
-        self._order = tuple(defaults)
+    def __init__(
+        self,
+        defaults: Iterable[Parameter],
+        overrides: Mapping[str, float] | None = None,
+        renamed: Mapping[str, Renamed] = NOT_RENAMED,
+    ) -> None:
+        own = tuple(defaults)
+        self._values = {parameter.name: parameter.value for parameter in own}
+        self._renamed = renamed
+        self._own = {one.name: name for name, one in renamed.items() if name in self._values}
+        self._order = tuple(self._shown(parameter) for parameter in own)
         self._index = {parameter.name: index for index, parameter in enumerate(self._order)}
-        self._values = {parameter.name: parameter.value for parameter in self._order}
-        self._gates = {parameter.listed_by for parameter in self._order}
+        self._shown_values = {name: self._order[self._index[name]].value for name in self._own}
+        """Values as they are shown, where that is not what ``[]`` gives."""
+        self._gates = {parameter.listed_by for parameter in own}
         self._listed: tuple[str, ...] = ()
         self._places: dict[str, int] = {}
         self._list()
@@ -84,9 +117,24 @@ class Parameters:
         """Number of values that were set so far."""
         for name, value in (overrides or {}).items():
             if name not in self._index:
-                raise UsageError(f"the autopilot has no parameter {name!r}{did_you_mean(name, self._index)}")
+                now = renamed.get(name)
+                hint = f"; it is {now.name} now" if now is not None else did_you_mean(name, self._index)
+                raise UsageError(f"the autopilot has no parameter {name!r}{hint}")
             if self.set(name, value) is None:
                 raise UsageError(f"parameter {name} cannot be {value}: it takes finite numbers")
+
+    def _shown(self, parameter: Parameter) -> Parameter:
+        """Return a parameter of the firmware's own table as it is shown."""
+        one = self._renamed.get(parameter.name)
+        if one is None:
+            return parameter
+        kind = parameter.type if one.type is None else one.type
+        return Parameter(one.name, kind, quantised(kind, one.shown(parameter.value)), parameter.listed_by)
+
+    def name(self, own: str) -> str:
+        """Return the name that is shown of a parameter of the firmware's own table."""
+        one = self._renamed.get(own)
+        return own if one is None else one.name
 
     def _list(self) -> None:
         """List the parameters whose subsystems are switched on."""
@@ -99,7 +147,7 @@ class Parameters:
         return len(self._listed)
 
     def __contains__(self, name: str) -> bool:
-        return name in self._index
+        return name in self._values
 
     def __iter__(self) -> Iterator[Parameter]:
         return (self.at(index) for index in range(len(self._listed)))
@@ -120,7 +168,8 @@ class Parameters:
         return self._now(name) if name in self._index else None
 
     def _now(self, name: str) -> Parameter:
-        parameter, value = self._order[self._index[name]], self._values[name]
+        parameter = self._order[self._index[name]]
+        value = self._shown_values[name] if name in self._own else self._values[name]
         return parameter if parameter.value == value else parameter._replace(value=value)
 
     def set(self, name: str, value: float) -> Parameter | None:
@@ -132,9 +181,14 @@ class Parameters:
         index = self._index.get(name)
         if index is None or not isfinite(value):
             return None
-        self._values[name] = quantised(self._order[index].type, value)
+        kept = quantised(self._order[index].type, value)
+        own = self._own.get(name, name)
+        if own is not name:
+            self._shown_values[name] = kept
+            kept = self._renamed[own].own(kept)
+        self._values[own] = kept
         self.changes += 1
-        if name in self._gates:
+        if own in self._gates:
             self._list()
         return self._now(name)
 

@@ -18,7 +18,13 @@ from mypy_extensions import mypyc_attr
 from volery.base.frames import Vector
 from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Action, Kernel
-from volery.simulation.autopilots.autopilot_parameters import Parameter, Parameters, Tuning
+from volery.simulation.autopilots.autopilot_parameters import (
+    NOT_RENAMED,
+    Parameter,
+    Parameters,
+    Renamed,
+    Tuning,
+)
 from volery.simulation.autopilots.flight_stack.flight import Control, Estimate, Flight, Setpoint
 from volery.simulation.autopilots.manual_control import RcChannels
 from volery.simulation.autopilots.onboard_log import FlightLog, LogRow
@@ -205,6 +211,8 @@ class ParameterTable(NamedTuple):
     """Return the values that follow from the system id and the body."""
     supported: Mapping[str, str]
     """The parameters that change the behaviour, and what each changes. All others are only stored."""
+    renamed: Mapping[str, Renamed] = NOT_RENAMED
+    """Parameters that this version shows otherwise."""
 
 
 class RcDefaults(NamedTuple):
@@ -270,9 +278,12 @@ class Vehicle:
         self.output: VehicleOutput
         self.restart: Action
         """Restart the autopilot."""
-        self.parameters = Parameters(
-            rules.parameters.defaults(), {**rules.parameters.of_vehicle(system, flight), **(overrides or {})}
-        )
+        table = rules.parameters
+        of_vehicle = {
+            table.renamed[name].name if name in table.renamed else name: value
+            for name, value in table.of_vehicle(system, flight).items()
+        }
+        self.parameters = Parameters(table.defaults(), {**of_vehicle, **(overrides or {})}, table.renamed)
         self.tuning = Tuning()
         self._tune()
         self.rc = RcChannels(rules.rc.transmitter)

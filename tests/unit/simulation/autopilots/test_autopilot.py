@@ -108,7 +108,7 @@ def test_connecting_can_leave_the_vehicle_off(yard: Yard) -> None:
 
 
 def test_the_banner_is_text_and_no_message(yard: Yard) -> None:
-    assert b"Init ArduCopter V4.5.6" in yard.autopilot().banner
+    assert b"Init ArduCopter V4.8.0-dev" in yard.autopilot().banner
 
 
 def test_each_vehicle_answers_to_its_own_system_id() -> None:
@@ -126,7 +126,7 @@ def _reading(system: int) -> dict[str, Any]:
     return {
         "target_system": system,
         "target_component": 1,
-        "param_id": "SYSID_THISMAV",
+        "param_id": "MAV_SYSID",
         "param_index": -1,
     }
 

@@ -1,4 +1,4 @@
-"""The boot of ArduPilot 4.5.6: the recorded timeline as data, and the work of each second after it.
+"""The boot of ArduPilot: the timeline that was recorded of 4.5.6 as data, and the work of each second.
 
 Times are seconds after boot. Parameters are announced as PARAM_VALUE with index 65535 and with the value that
 they have at that time.
@@ -12,6 +12,7 @@ from functools import partial
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.modes import INFO, update_prearm_state
 from volery.simulation.autopilots.ardupilot.payload import relays_at_boot
+from volery.simulation.autopilots.ardupilot.versions import Version
 from volery.simulation.autopilots.autopilot import BootEvent
 from volery.simulation.autopilots.mavlink.firmware import BootBytes
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
@@ -19,14 +20,14 @@ from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
 DEBUG = 7
 
 BANNER = (
-    "\n\nInit {name} V4.5.6 (7ce11b41)\n\nFree RAM: 131072\nBooting 0/0\nFirmware change: erasing EEPROM...\n"
+    "\n\nInit {name} {version}\n\nFree RAM: 131072\nBooting 0/0\nFirmware change: erasing EEPROM...\n"
     "done.\nload_all took 11661us\n0 0 0 AP_Logger_File: buffer size=204800\n"
 )
 
 
-def banner(name: str) -> bytes:
+def banner(name: str, version: Version) -> bytes:
     """Return the text that the firmware prints on its console after power-on."""
-    return BANNER.format(name=name).encode()
+    return BANNER.format(name=name, version=version.text).encode()
 
 
 def action_event(seconds: float, act: VehicleAction) -> BootEvent:
@@ -108,15 +109,6 @@ def for_both_units(text: str) -> tuple[str, str]:
     return text.format(unit=0), text.format(unit=1)
 
 
-ALIGNED = (
-    *(texts_event(5.63, text) for text in for_both_units("EKF3 IMU{unit} tilt alignment complete")),
-    *(
-        texts_event(5.73, text)
-        for text in for_both_units("EKF3 IMU{unit} MAG0 initial yaw alignment complete")
-    ),
-    texts_event(9.64, "GPS 1: detected as u-blox at 230400 baud"),
-)
-
 _IDS = ("INS_GYR_ID", "INS_ACC_ID", "INS_GYR2_ID", "INS_ACC2_ID")
 
 
@@ -150,7 +142,7 @@ def store_parameters(vehicle: Vehicle, values: Sequence[tuple[str, float]]) -> N
         vehicle.parameters.set(name, value)
 
 
-def copter_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
+def copter_events(version: Version, ready: VehicleAction) -> tuple[BootEvent, ...]:
     """Return the boot timeline of a copter. ``ready`` is called at the end of the set-up."""
     return (
         announcement_event(0.01, "COMPASS_DEV_ID", "COMPASS_DEV_ID2", "COMPASS_DEV_ID3", "COMPASS_EXTERNAL"),
@@ -169,7 +161,12 @@ def copter_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
         texts_event(2.58, "RC7: SaveWaypoint LOW"),
         announcement_event(3.28, "EK3_SRC1_POSXY"),
         texts_event(4.28, *for_both_units("EKF3 IMU{unit} initialised"), "AHRS: EKF3 active"),
-        *ALIGNED,
+        *(texts_event(5.63, text) for text in for_both_units("EKF3 IMU{unit} tilt alignment complete")),
+        *(
+            texts_event(5.73, text)
+            for text in for_both_units("EKF3 IMU{unit} MAG0 initial yaw alignment complete")
+        ),
+        texts_event(9.64, *version.receiver_found),
         action_event(19.84, set_origin),
         action_event(19.852, set_home_position),
         texts_event(19.852, "EKF3 IMU0 origin set"),
@@ -181,7 +178,7 @@ def copter_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
     )
 
 
-def rover_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
+def rover_events(version: Version, ready: VehicleAction) -> tuple[BootEvent, ...]:
     """Return the boot timeline of a rover. ``ready`` is called at the end of the set-up."""
     return (
         texts_event(0.01, "Calibrating barometer"),
@@ -203,7 +200,7 @@ def rover_events(ready: VehicleAction) -> tuple[BootEvent, ...]:
             texts_event(6.06, text)
             for text in for_both_units("EKF3 IMU{unit} MAG0 initial yaw alignment complete")
         ),
-        texts_event(9.67, "GPS 1: detected as u-blox at 230400 baud"),
+        texts_event(9.67, *version.receiver_found),
         action_event(10.34, set_origin),
         measurement_event(10.345, (("BARO1_GND_PRESS", 94504.55), ("BARO2_GND_PRESS", 94503.32))),
         action_event(10.36, set_home_position),

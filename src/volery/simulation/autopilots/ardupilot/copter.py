@@ -1,4 +1,4 @@
-"""ArduCopter 4.5.6: modes, arming checks and boot, composed as a firmware."""
+"""ArduCopter: modes, arming checks and boot, composed as a firmware."""
 
 from __future__ import annotations
 
@@ -33,9 +33,15 @@ from volery.simulation.autopilots.ardupilot.firmware import (
     own_parameters,
     send_version,
     streams,
+    telemetry_policy,
 )
 from volery.simulation.autopilots.ardupilot.flip import Flip
-from volery.simulation.autopilots.ardupilot.guided import copter_attitude, copter_global, copter_local
+from volery.simulation.autopilots.ardupilot.guided import (
+    copter_attitude,
+    copter_global,
+    copter_local,
+    strict_copter_attitude,
+)
 from volery.simulation.autopilots.ardupilot.landing_gear import watch_gear
 from volery.simulation.autopilots.ardupilot.landing_sequence import leave_sequence
 from volery.simulation.autopilots.ardupilot.modes import (
@@ -74,6 +80,7 @@ from volery.simulation.autopilots.ardupilot.sprayer import update_sprayer
 from volery.simulation.autopilots.ardupilot.takeoff_check import check_takeoff
 from volery.simulation.autopilots.ardupilot.telemetry import ACTIVE, CRITICAL, STANDBY
 from volery.simulation.autopilots.ardupilot.throw import Throw
+from volery.simulation.autopilots.ardupilot.versions import Version
 from volery.simulation.autopilots.ardupilot.weathervane import turn_into_wind
 from volery.simulation.autopilots.ardupilot.winch import no_servo, update_winch
 from volery.simulation.autopilots.autopilot import BootSequence, Firmware, PeriodicWork
@@ -119,6 +126,7 @@ AUTO_BITS = MANUAL_BITS | GUIDED
 """``base_mode`` of a disarmed vehicle, as recorded."""
 LEVEL_AND_HEIGHT = XY_CONTROL | Z_CONTROL
 
+TICK = 100 * MS
 READY = round(2.28 * S)
 ORIGIN = round(19.852 * S)
 POSITION = round(41.45 * S)
@@ -291,8 +299,8 @@ def on_step(vehicle: Vehicle) -> None:
     pass_transmitter_through(vehicle)
     update_sprayer(vehicle)
     update_camera(vehicle)
-    update_mount(vehicle, COPTER.periodic.tick)
-    update_winch(vehicle, COPTER.periodic.tick)
+    update_mount(vehicle, TICK)
+    update_winch(vehicle, TICK)
     watch_gear(vehicle)
     leave_sequence(vehicle)
     pilot_input.keep_track(vehicle)
@@ -301,14 +309,14 @@ def on_step(vehicle: Vehicle) -> None:
     update_target(vehicle)
     traffic.update_traffic(vehicle)
     check_takeoff(vehicle)
-    commands.continue_turn(vehicle, to_seconds(COPTER.periodic.tick))
-    turn_into_wind(vehicle, COPTER.periodic.tick)
+    commands.continue_turn(vehicle, to_seconds(TICK))
+    turn_into_wind(vehicle, TICK)
     if turn_tested_motor(vehicle) or not vehicle.armed:
         return
     _disarm_stopped_motors(vehicle)
     if not vehicle.landed:
         vehicle.ground.idle_since = vehicle.kernel.now()
-        vehicle.ground.flight_time += COPTER.periodic.tick
+        vehicle.ground.flight_time += TICK
         _notice_flight(vehicle)
         check_crash(vehicle)
     else:
@@ -358,10 +366,10 @@ def system_status(vehicle: Vehicle) -> int:
     return STANDBY if vehicle.landed else ACTIVE
 
 
-def send_banner(vehicle: Vehicle) -> None:
+def send_banner(vehicle: Vehicle, version: Version) -> None:
     """Send the status texts that follow a parameter list request."""
     shape = {0: "PLUS", 1: "X"}.get(round(vehicle.parameters["FRAME_TYPE"]), "X")
-    send_version(vehicle, "ArduCopter")
+    send_version(vehicle, "ArduCopter", version)
     vehicle.send_text(INFO, f"Frame: QUAD/{shape}")
 
 
@@ -388,69 +396,81 @@ def log_extras(vehicle: Vehicle) -> tuple[LogRow, ...]:
     return (*log_rows(vehicle), *precision_rows(vehicle))
 
 
-_MAVLINK = ardupilot_mavlink(
-    start=LinkStart(
-        boot_bytes=boot.bytes_at(
-            (0.0, boot.banner("ArduCopter")), (1.75, b"Init Gyro"), (2.01, b"*"), (2.037, b"*"), (2.28, b"\n")
+def copter(version: Version) -> Firmware:
+    """Return ArduCopter in one version."""
+    mavlink = ardupilot_mavlink(
+        version=version,
+        supported=COPTER_SUPPORTED,
+        start=LinkStart(
+            boot_bytes=boot.bytes_at(
+                (0.0, boot.banner("ArduCopter", version)),
+                (1.75, b"Init Gyro"),
+                (2.01, b"*"),
+                (2.037, b"*"),
+                (2.28, b"\n"),
+            ),
+            heartbeat_first=(round(1.05 * S),),
+            heartbeat_from=round(2.037 * S),
         ),
-        heartbeat_first=(round(1.05 * S),),
-        heartbeat_from=round(2.037 * S),
-    ),
-    messages={
-        **builders(QUADROTOR, CAPABILITIES, HEALTH, system_status),
-        "ESC_TELEMETRY_1_TO_4": telemetry.esc_telemetry,
-        "TERRAIN_REPORT": telemetry.terrain_report,
-        "WIND": telemetry.wind,
-    },
-    streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
-    commands={
-        **commands.copter_commands(
-            arming_problems,
-            failing_prearm_checks,
-            ARMING_TEXTS,
-            {mode.name: mode.number for mode in MODES.values()},
+        sent=telemetry_policy(
+            messages={
+                **builders(version, QUADROTOR, CAPABILITIES, HEALTH, system_status),
+                "ESC_TELEMETRY_1_TO_4": telemetry.esc_telemetry,
+                "TERRAIN_REPORT": telemetry.terrain_report,
+                "WIND": telemetry.wind,
+            },
+            streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
         ),
-        DO_AUX_FUNCTION: AUXILIARY.on_command,
-    },
-    handlers={
-        "ADSB_VEHICLE": traffic.on_adsb,
-        "FOLLOW_TARGET": follow.on_target,
-        "GLOBAL_POSITION_INT": _on_other_position,
-        "LANDING_TARGET": on_landing_target,
-        "SET_ATTITUDE_TARGET": copter_attitude,
-        "SET_POSITION_TARGET_GLOBAL_INT": copter_global,
-        "SET_POSITION_TARGET_LOCAL_NED": copter_local,
-    },
-    on_parameter_list=send_banner,
-)
-
-COPTER = Firmware(
-    name="ardupilot",
-    kind="multirotor",
-    rules=VehicleRules(
-        modes=MODES,
-        boot_mode=MODES[0],
-        return_point=return_point,
-        height_above_ground=height_above_ground,
-        limit=limit,
-        log_extras=log_extras,
-        startup=StartupTimes(READY, ORIGIN, POSITION, POSITION),
-        arming=ArmingTimes(
-            motors_rest=2 * S, spool_up=500 * MS, takeoff_slew=100 * MS, abandoned_after=1500 * MS
+        commands={
+            **commands.copter_commands(
+                arming_problems,
+                failing_prearm_checks,
+                ARMING_TEXTS,
+                {mode.name: mode.number for mode in MODES.values()},
+            ),
+            DO_AUX_FUNCTION: AUXILIARY.on_command,
+        },
+        handlers={
+            "ADSB_VEHICLE": traffic.on_adsb,
+            "FOLLOW_TARGET": follow.on_target,
+            "GLOBAL_POSITION_INT": _on_other_position,
+            "LANDING_TARGET": on_landing_target,
+            "SET_ATTITUDE_TARGET": strict_copter_attitude if version.rates_all_or_none else copter_attitude,
+            "SET_POSITION_TARGET_GLOBAL_INT": copter_global,
+            "SET_POSITION_TARGET_LOCAL_NED": copter_local,
+        },
+        on_parameter_list=partial(send_banner, version=version),
+    )
+    return Firmware(
+        name="ardupilot",
+        kind="multirotor",
+        rules=VehicleRules(
+            modes=MODES,
+            boot_mode=MODES[0],
+            return_point=return_point,
+            height_above_ground=height_above_ground,
+            limit=limit,
+            log_extras=log_extras,
+            startup=StartupTimes(READY, ORIGIN, POSITION, POSITION),
+            arming=ArmingTimes(
+                motors_rest=2 * S, spool_up=500 * MS, takeoff_slew=100 * MS, abandoned_after=1500 * MS
+            ),
+            parameters=ParameterTable(
+                parameters, copter_tuning, own_parameters, COPTER_SUPPORTED, version.renamed
+            ),
+            rc=RcDefaults((1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0)),
         ),
-        parameters=ParameterTable(parameters, copter_tuning, own_parameters, COPTER_SUPPORTED),
-        rc=RcDefaults((1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0)),
-    ),
-    boot=BootSequence(
-        boot.copter_events(finish_setup),
-        start_warm,
-        partial(boot.on_position, before_arming=failing_prearm_checks),
-    ),
-    periodic=PeriodicWork(
-        on_step=on_step,
-        each_second=partial(boot.each_second, before_arming=failing_prearm_checks),
-        each_second_from=EACH_SECOND,
-    ),
-    failsafes=COPTER_FAILSAFES,
-    endpoint=partial(MavlinkEndpoint, _MAVLINK),
-)
+        boot=BootSequence(
+            boot.copter_events(version, finish_setup),
+            start_warm,
+            partial(boot.on_position, before_arming=failing_prearm_checks),
+        ),
+        periodic=PeriodicWork(
+            tick=TICK,
+            on_step=on_step,
+            each_second=partial(boot.each_second, before_arming=failing_prearm_checks),
+            each_second_from=EACH_SECOND,
+        ),
+        failsafes=COPTER_FAILSAFES,
+        endpoint=partial(MavlinkEndpoint, mavlink),
+    )

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from volery.base.elementary import atan2
 from volery.base.time import S
+from volery.simulation.autopilots.ardupilot.versions import Version
 from volery.simulation.autopilots.mavlink.messages import EPOCH_US
 from volery.simulation.autopilots.onboard_log import FlightLog, LogSample
 
@@ -74,7 +75,7 @@ EXTRAS = {form.name: form for form in (PRX, PRXR, PL)}
 FORMS = (FMT, PARM, MSG, MODE, ARM, EV, ATT, POS, GPS, BAT, *EXTRAS.values())
 
 
-def encode(log: FlightLog) -> bytes:
+def encode(log: FlightLog, version: Version) -> bytes:
     """Return a log in DataFlash format."""
     name = "ArduCopter" if log.flies else "ArduRover"
     samples = list(log.samples())
@@ -89,7 +90,7 @@ def encode(log: FlightLog) -> bytes:
         )
         for form in FORMS
     ]
-    out.append(MSG.row(start, f"{name} V4.5.6 (7ce11b41)".encode()))
+    out.append(MSG.row(start, f"{name} {version.text}".encode()))
     out += [PARM.row(start, one.name.encode(), one.value, one.value) for one in log.parameters]
     out += [ARM.row(start, 1, 0, 0, 1), EV.row(start, ARMED_EVENT)]
     mode = -1.0

@@ -29,8 +29,8 @@ from volery.simulation.autopilots.ardupilot.commands import go_to_item
 from volery.simulation.autopilots.ardupilot.fence import fence_status
 from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
 from volery.simulation.autopilots.ardupilot.mount import attitude_status
-from volery.simulation.autopilots.ardupilot.parameters import COPTER_SUPPORTED
 from volery.simulation.autopilots.ardupilot.sensor_status import Health, sys_status
+from volery.simulation.autopilots.ardupilot.versions import Version
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.mavlink import messages
 from volery.simulation.autopilots.mavlink.channel import Peer
@@ -253,9 +253,9 @@ def board_id(vehicle: Vehicle) -> str:
     return f"{(vehicle.system + 2) % 16:x}d1219c7c4c5404aaa"
 
 
-def send_version(vehicle: Vehicle, name: str) -> None:
+def send_version(vehicle: Vehicle, name: str, version: Version) -> None:
     """Report firmware version and board, as after a parameter list request."""
-    vehicle.send_text(INFO, f"{name} V4.5.6 (7ce11b41)")
+    vehicle.send_text(INFO, f"{name} {version.text}")
     vehicle.send_text(INFO, f"{board_id(vehicle)}1f6d2a48adfda4")
 
 
@@ -275,11 +275,16 @@ def ignore_stream_request(_vehicle: Vehicle, _link: int, _stream: int, _rate: in
 
 
 def builders(
-    kind: int, capabilities: int, health: Health, system_status: Callable[[Vehicle], int]
+    version: Version,
+    kind: int,
+    capabilities: int,
+    health: Health,
+    system_status: Callable[[Vehicle], int],
 ) -> Mapping[str, Builder]:
     """Return the builders of all common messages.
 
     Args:
+        version: Version of the firmware.
         kind: MAV_TYPE.
         capabilities: Bits of MAV_PROTOCOL_CAPABILITY.
         health: Sensor bits of SYS_STATUS.
@@ -289,7 +294,7 @@ def builders(
     return {
         **BUILDERS,
         "AUTOPILOT_VERSION": lambda vehicle: telemetry.autopilot_version(
-            vehicle, capabilities, board_id(vehicle).encode()
+            version, capabilities, board_id(vehicle).encode()
         ),
         "HEARTBEAT": lambda vehicle: telemetry.heartbeat(vehicle, kind, system_status(vehicle)),
         "HIGH_LATENCY2": high_latency.report(kind, sensors),
@@ -320,24 +325,14 @@ MESSAGE_HANDLERS = {
 """Messages that need no answer, for every kind of vehicle."""
 
 
-def ardupilot_mavlink(
-    *,
-    start: LinkStart,
+def telemetry_policy(
     messages: Mapping[str, Builder],
     streams: Mapping[int, Sequence[str]],
-    commands: Mapping[int, Handler],
-    handlers: Mapping[str, MessageHandler],
-    on_parameter_list: VehicleAction,
     on_stream_request: Callable[[Vehicle, int, int, int], None] = ignore_stream_request,
     least_period: Ns = 3 * MS,
-) -> MavlinkFirmware:
-    """Return the MAVLink rules of one kind of vehicle: the shared ones, and the arguments."""
-
-    def on_banner(vehicle: Vehicle, _command: Command) -> int:
-        on_parameter_list(vehicle)
-        return ACCEPTED
-
-    sent = TelemetryPolicy(
+) -> TelemetryPolicy:
+    """Return what one kind of vehicle sends."""
+    return TelemetryPolicy(
         messages=messages,
         message_order=ORDER,
         streams=streams,
@@ -348,6 +343,25 @@ def ardupilot_mavlink(
         refuse_interval=refuse_interval,
         unknown_message=FAILED,
     )
+
+
+def ardupilot_mavlink(
+    *,
+    version: Version,
+    supported: Mapping[str, str],
+    start: LinkStart,
+    sent: TelemetryPolicy,
+    commands: Mapping[int, Handler],
+    handlers: Mapping[str, MessageHandler],
+    on_parameter_list: VehicleAction,
+) -> MavlinkFirmware:
+    """Return the MAVLink rules of one kind of vehicle: the shared ones, and the arguments."""
+    effective = {version.renamed[name].name if name in version.renamed else name for name in supported}
+
+    def on_banner(vehicle: Vehicle, _command: Command) -> int:
+        on_parameter_list(vehicle)
+        return ACCEPTED
+
     return MavlinkFirmware(
         start=start._replace(timesync_every=10 * S),
         telemetry=sent,
@@ -377,9 +391,10 @@ def ardupilot_mavlink(
             writes_parts=True,
         ),
         parameters=ParameterPolicy(
-            refuses=lambda name: name.startswith("SIM_") and name not in COPTER_SUPPORTED
+            refuses=lambda name: name.startswith("SIM_") and name not in effective,
+            reports_missing=version.reports_missing_parameters,
         ),
-        logs=LogPolicy(dataflash.encode, first=1, while_armed=False),
+        logs=LogPolicy(partial(dataflash.encode, version=version), first=1, while_armed=False),
         files=files.FILES,
         on_parameter_list=on_parameter_list,
     )

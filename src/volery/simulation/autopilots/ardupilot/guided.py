@@ -47,7 +47,7 @@ GLOBAL_FRAMES = (
 LOCAL_FRAMES = (LOCAL_NED, LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED)
 BODY_FRAMES = (BODY_NED, BODY_OFFSET_NED)
 
-ATTITUDE_IGNORED, THROTTLE_IGNORED, YAW_RATE_IGNORED = 1 << 7, 1 << 6, 1 << 2
+ATTITUDE_IGNORED, THROTTLE_IGNORED, YAW_RATE_IGNORED, RATES_IGNORED = 1 << 7, 1 << 6, 1 << 2, 0b111
 """Bits of SET_ATTITUDE_TARGET's ``type_mask``."""
 
 
@@ -163,6 +163,16 @@ def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> N
     attitude = None if mask & ATTITUDE_IGNORED or size < 0.5 else (w / size, x / size, y / size, z / size)
     rate = None if mask & YAW_RATE_IGNORED else fields["body_yaw_rate"]
     guided.follow_attitude(attitude, rate, min(1.0, max(0.0, fields["thrust"])))
+
+
+def strict_copter_attitude(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
+    """Handle it as from 4.6 on: without a throttle, or with some body rates but not all, the copter stops."""
+    guided, mask = vehicle.manoeuvre.flown, fields["type_mask"]
+    if mask & THROTTLE_IGNORED or mask & RATES_IGNORED not in (0, RATES_IGNORED):
+        if isinstance(guided, Guided):
+            guided.follow_velocity((0.0, 0.0, 0.0))
+    else:
+        copter_attitude(vehicle, fields, sender)
 
 
 def rover_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:

@@ -98,17 +98,17 @@ def _settings(p: Parameters) -> Iterator[str]:
     if p["FS_GCS_ENABLE"] == CONTINUE_MISSION:
         yield "FS_GCS_ENABLE=2 removed, see FS_OPTIONS"
     if not LEAST_LEAN <= p["ANGLE_MAX"] <= LARGEST_LEAN:
-        yield "Check ANGLE_MAX"
+        yield f"Check {p.name('ANGLE_MAX')}"
     if p["ACRO_BAL_ROLL"] > p["ATC_ANG_RLL_P"] or p["ACRO_BAL_PITCH"] > p["ATC_ANG_PIT_P"]:
         yield "Check ACRO_BAL_ROLL/PITCH"
     if p["PILOT_SPEED_UP"] <= 0.0:
-        yield "Check PILOT_SPEED_UP"
+        yield f"Check {p.name('PILOT_SPEED_UP')}"
     yield from (f"Bad parameter: {words}" for words in _gains(p))
 
 
 def _gains(p: Parameters) -> Iterator[str]:
     """Return the gains that no loop can have; with a feed-forward the others may be zero."""
-    yield from (f"{name} must be > 0" for name in (*POSITIVE, *ANGLE_GAINS) if not p[name] > 0.0)
+    yield from (f"{p.name(name)} must be > 0" for name in (*POSITIVE, *ANGLE_GAINS) if not p[name] > 0.0)
     for loop in RATE_LOOPS:
         forward = p[f"{loop}_FF"] > 0.0
         for gain in ("P", "I"):

@@ -1,4 +1,4 @@
-"""ArduRover 4.5.6: modes, arming checks and boot, composed as a firmware."""
+"""ArduRover: modes, arming checks and boot, composed as a firmware."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from volery.simulation.autopilots.ardupilot.firmware import (
     own_parameters,
     send_version,
     streams,
+    telemetry_policy,
 )
 from volery.simulation.autopilots.ardupilot.guided import rover_attitude, rover_global, rover_local
 from volery.simulation.autopilots.ardupilot.guided_items import rover_guided_leg
@@ -59,6 +60,7 @@ from volery.simulation.autopilots.ardupilot.telemetry import (
     STANDBY,
     nav_controller,
 )
+from volery.simulation.autopilots.ardupilot.versions import Version
 from volery.simulation.autopilots.autopilot import BootSequence, Firmware, PeriodicWork
 from volery.simulation.autopilots.autopilot_parameters import Parameter, load
 from volery.simulation.autopilots.manoeuvres.manual_flight import (
@@ -97,6 +99,7 @@ CAPABILITIES = 61_935
 AUTO_BITS = CUSTOM | GUIDED
 STEERED = RATE_CONTROL | ATTITUDE_CONTROL | YAW_CONTROL | XY_CONTROL
 
+TICK = 100 * MS
 READY = round(2.355 * S)
 HOME = round(10.36 * S)
 POSITION = round(42.08 * S)
@@ -241,13 +244,13 @@ def on_step(vehicle: Vehicle) -> None:
     pass_transmitter_through(vehicle)
     update_sprayer(vehicle)
     update_camera(vehicle)
-    update_mount(vehicle, ROVER.periodic.tick)
+    update_mount(vehicle, TICK)
     pilot_input.keep_track(vehicle)
     check_fence(vehicle, respond_rover)
     update_proximity(vehicle)
     drive_tested_output(vehicle, ROVER_DISARMED)
     if vehicle.armed:
-        vehicle.ground.flight_time += ROVER.periodic.tick
+        vehicle.ground.flight_time += TICK
 
 
 def system_status(vehicle: Vehicle) -> int:
@@ -259,16 +262,16 @@ def system_status(vehicle: Vehicle) -> int:
     return STANDBY if vehicle.mode.name == "HOLD" else ACTIVE
 
 
-def send_banner(vehicle: Vehicle) -> None:
+def send_banner(vehicle: Vehicle, version: Version) -> None:
     """Send the status texts that follow a parameter list request."""
-    send_version(vehicle, "ArduRover")
+    send_version(vehicle, "ArduRover", version)
 
 
 def on_stream_request(vehicle: Vehicle, index: int, stream: int, rate: int) -> None:
     """Store the requested stream rates in parameters."""
     names = STREAM_PARAMETERS.values() if stream == ALL else [STREAM_PARAMETERS[stream]]
     for name in names:
-        vehicle.set_parameter(f"SR{index}_{name}", rate)
+        vehicle.set_parameter(vehicle.parameters.name(f"SR{index}_{name}"), rate)
 
 
 def navigation(vehicle: Vehicle) -> Fields | None:
@@ -282,62 +285,70 @@ def parameters() -> tuple[Parameter, ...]:
     return load("volery.simulation.autopilots.ardupilot", "data/rover.parameters")
 
 
-_MAVLINK = ardupilot_mavlink(
-    start=LinkStart(
-        boot_bytes=boot.bytes_at(
-            (0.0, boot.banner("ArduRover")), (1.83, b"Init Gyro"), (2.0, b"*"), (2.35, b"*\n")
+def rover(version: Version) -> Firmware:
+    """Return ArduRover in one version."""
+    mavlink = ardupilot_mavlink(
+        version=version,
+        supported=ROVER_SUPPORTED,
+        start=LinkStart(
+            boot_bytes=boot.bytes_at(
+                (0.0, boot.banner("ArduRover", version)), (1.83, b"Init Gyro"), (2.0, b"*"), (2.35, b"*\n")
+            ),
+            heartbeat_first=(round(1.025 * S),),
+            heartbeat_from=round(3.04 * S),
         ),
-        heartbeat_first=(round(1.025 * S),),
-        heartbeat_from=round(3.04 * S),
-    ),
-    messages={
-        **builders(GROUND_ROVER, CAPABILITIES, HEALTH, system_status),
-        "NAV_CONTROLLER_OUTPUT": navigation,
-        "RC_CHANNELS_SCALED": telemetry.rc_channels_scaled,
-    },
-    streams=streams(("RC_CHANNELS_SCALED",), ()),
-    on_stream_request=on_stream_request,
-    least_period=25 * MS,
-    commands={
-        **commands.rover_commands(
-            arming_problems,
-            failing_prearm_checks,
-            ARMING_TEXTS,
-            {mode.name: mode.number for mode in MODES.values()},
+        sent=telemetry_policy(
+            messages={
+                **builders(version, GROUND_ROVER, CAPABILITIES, HEALTH, system_status),
+                "NAV_CONTROLLER_OUTPUT": navigation,
+                "RC_CHANNELS_SCALED": telemetry.rc_channels_scaled,
+            },
+            streams=streams(("RC_CHANNELS_SCALED",), ()),
+            on_stream_request=on_stream_request,
+            least_period=25 * MS,
         ),
-        DO_AUX_FUNCTION: AUXILIARY.on_command,
-    },
-    handlers={
-        "SET_ATTITUDE_TARGET": rover_attitude,
-        "SET_POSITION_TARGET_GLOBAL_INT": rover_global,
-        "SET_POSITION_TARGET_LOCAL_NED": rover_local,
-    },
-    on_parameter_list=send_banner,
-)
-
-ROVER = Firmware(
-    name="ardupilot",
-    kind="rover",
-    rules=VehicleRules(
-        modes=MODES,
-        boot_mode=INITIALISING,
-        return_point=return_point,
-        limit=limit_rover,
-        log_extras=log_rows,
-        startup=StartupTimes(READY, HOME, POSITION, HOME),
-        parameters=ParameterTable(parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
-        rc=RcDefaults((1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0), True),
-    ),
-    boot=BootSequence(
-        boot.rover_events(finish_setup),
-        start_warm,
-        partial(boot.on_position, before_arming=failing_prearm_checks),
-    ),
-    periodic=PeriodicWork(
-        on_step=on_step,
-        each_second=partial(boot.each_second, before_arming=failing_prearm_checks),
-        each_second_from=round(0.345 * S),
-    ),
-    failsafes=ROVER_FAILSAFES,
-    endpoint=partial(MavlinkEndpoint, _MAVLINK),
-)
+        commands={
+            **commands.rover_commands(
+                arming_problems,
+                failing_prearm_checks,
+                ARMING_TEXTS,
+                {mode.name: mode.number for mode in MODES.values()},
+            ),
+            DO_AUX_FUNCTION: AUXILIARY.on_command,
+        },
+        handlers={
+            "SET_ATTITUDE_TARGET": rover_attitude,
+            "SET_POSITION_TARGET_GLOBAL_INT": rover_global,
+            "SET_POSITION_TARGET_LOCAL_NED": rover_local,
+        },
+        on_parameter_list=partial(send_banner, version=version),
+    )
+    return Firmware(
+        name="ardupilot",
+        kind="rover",
+        rules=VehicleRules(
+            modes=MODES,
+            boot_mode=INITIALISING,
+            return_point=return_point,
+            limit=limit_rover,
+            log_extras=log_rows,
+            startup=StartupTimes(READY, HOME, POSITION, HOME),
+            parameters=ParameterTable(
+                parameters, rover_tuning, own_parameters, ROVER_SUPPORTED, version.renamed
+            ),
+            rc=RcDefaults((1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0), True),
+        ),
+        boot=BootSequence(
+            boot.rover_events(version, finish_setup),
+            start_warm,
+            partial(boot.on_position, before_arming=failing_prearm_checks),
+        ),
+        periodic=PeriodicWork(
+            tick=TICK,
+            on_step=on_step,
+            each_second=partial(boot.each_second, before_arming=failing_prearm_checks),
+            each_second_from=round(0.345 * S),
+        ),
+        failsafes=ROVER_FAILSAFES,
+        endpoint=partial(MavlinkEndpoint, mavlink),
+    )

@@ -13,6 +13,7 @@ from volery.base.time import US, S
 from volery.simulation.autopilots.ardupilot import airspeed, proximity
 from volery.simulation.autopilots.ardupilot.sensor_status import FIX_AFTER, NO_FIX_AFTER, receiver_is_lost
 from volery.simulation.autopilots.ardupilot.takeoff_check import has_speed_telemetry, reported_rotor_speed
+from volery.simulation.autopilots.ardupilot.versions import Version
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.mavlink.messages import (
@@ -514,17 +515,11 @@ def meminfo(_vehicle: Vehicle) -> Fields:
     return {"brkval": 0, "freemem": 65_535, "freemem32": 131_072}
 
 
-FLIGHT_SW_VERSION = 67_438_335
-"""4.5.6, official release, as recorded."""
-
-GIT_HASH = tuple(b"7ce11b41")
-
-
-def autopilot_version(_vehicle: Vehicle, capabilities: int, board: bytes) -> Fields:
+def autopilot_version(version: Version, capabilities: int, board: bytes) -> Fields:
     """Return AUTOPILOT_VERSION with the board's serial number."""
     return {
         "capabilities": capabilities,
-        "flight_sw_version": FLIGHT_SW_VERSION,
-        "flight_custom_version": GIT_HASH,
+        "flight_sw_version": version.number,
+        "flight_custom_version": tuple(version.commit.encode()),
         "uid2": tuple(board.ljust(18, b"\0")[:18]),
     }

@@ -237,7 +237,7 @@ class MavlinkEndpoint:
 
     def parameter_changed(self, name: str) -> None:
         """Send PARAM_VALUE on all links."""
-        fields = self._parameters.unlisted(name)
+        fields = self._parameters.unlisted(self._vehicle.parameters.name(name))
         if fields is not None:
             self.send_event("PARAM_VALUE", fields)
 

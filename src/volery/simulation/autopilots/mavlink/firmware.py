@@ -60,6 +60,8 @@ class ParameterPolicy(NamedTuple):
     """Whether a PARAM_SET with another type than the parameter's is ignored."""
     refuses: Callable[[str], bool] = _never
     """Whether a parameter of that name cannot be set: the value stays and a text says so."""
+    reports_missing: bool = False
+    """Whether PARAM_ERROR answers what asks for a parameter that does not exist or cannot have a value."""
     checksum: str = ""
     """Name of a checksum over all parameters that is sent first; empty: none."""
 

@@ -134,6 +134,10 @@ class CommandService:
 UNSOLICITED = 65535
 """Index of a PARAM_VALUE outside of a list."""
 
+DOES_NOT_EXIST, VALUE_OUT_OF_RANGE, PERMISSION_DENIED = 1, 2, 3
+"""MAV_PARAM_ERROR."""
+NO_INDEX = -1
+
 UINT32 = 5
 """MAV_PARAM_TYPE of a checksum."""
 
@@ -190,33 +194,46 @@ class ParameterService:
             self._kernel.call_at(self._kernel.now() + self._policy.period, lambda: self._burst(channel, end))
 
     def on_read(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """Handle PARAM_REQUEST_READ, by name or by index; no answer if there is no such parameter."""
+        """Handle PARAM_REQUEST_READ, by name or by index."""
         index = fields["param_index"]
         if index >= len(self._vehicle.parameters):
+            self._report(peer, fields, DOES_NOT_EXIST)
             return
         name = fields["param_id"] if index < 0 else self._vehicle.parameters.at(index).name
         self._kernel.call_at(
-            self._kernel.now() + self._policy.read_delay, lambda: self._send_value(peer.channel, name, index)
+            self._kernel.now() + self._policy.read_delay, lambda: self._send_value(peer, name, index)
         )
 
+    def _report(self, peer: Peer, asked: dict[str, Any], error: int) -> None:
+        """Answer with PARAM_ERROR, where the firmware does."""
+        if self._policy.reports_missing:
+            name, index = asked["param_id"], asked.get("param_index", NO_INDEX)
+            peer.answer("PARAM_ERROR", param_id=name, param_index=index, error=error)
+
     def on_set(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """Handle PARAM_SET: report the new value on all links; no answer if it cannot be set."""
+        """Handle PARAM_SET: report the new value on all links; else at most PARAM_ERROR."""
         name, kind, value = fields["param_id"], fields["param_type"], fields["param_value"]
         found = self._vehicle.parameters.find(name)
+        if found is None:
+            self._report(peer, fields, DOES_NOT_EXIST)
         if found is None or (self._policy.typed and kind != found.type):
             return
         if self._policy.refuses(name):
             self._vehicle.send_text(4, f"Param write denied ({name})")
+            self._report(peer, fields, PERMISSION_DENIED)
             self._vehicle.output.parameter_changed(name)
             return
-        self._vehicle.set_parameter(
+        if not self._vehicle.set_parameter(
             name, from_bytewise(found.type, value) if self._policy.bytewise else value
-        )
+        ):
+            self._report(peer, fields, VALUE_OUT_OF_RANGE)
 
-    def _send_value(self, channel: MavlinkChannel, name: str, index: int) -> None:
+    def _send_value(self, peer: Peer, name: str, index: int) -> None:
         fields = self.unlisted(name)
-        if fields is not None:
-            channel.send("PARAM_VALUE", fields if index < 0 else {**fields, "param_index": index})
+        if fields is None:
+            self._report(peer, {"param_id": name, "param_index": index}, DOES_NOT_EXIST)
+        else:
+            peer.channel.send("PARAM_VALUE", fields if index < 0 else {**fields, "param_index": index})
 
 
 # --- missions ---

@@ -14,7 +14,7 @@ from volery.simulation.autopilots.ardupilot import FIRMWARE
 class ArduPilotStation(Station):
     """One vehicle, one ground station on one link."""
 
-    firmware = FIRMWARE
+    firmware = FIRMWARE.of_version("4.5")
     home = LocalFrame(46.0, 7.0, 500.0)
 
     def listed(self, item: int, **fields: Any) -> None:
