@@ -108,12 +108,26 @@ def test_arming_is_refused_in_the_firmwares_words(
     assert not rig.vehicle.armed
 
 
-def test_guided_arms_with_the_throttle_up(bench: Any) -> None:
+@pytest.mark.parametrize(
+    ("mode", "pulses", "text"),
+    [
+        (4, (1500, 1500, 1700, 1500), "Throttle (RC3) is not neutral"),
+        (5, (1500, 1500, 1500, 1500), "Throttle (RC3) is not neutral"),
+        (5, (1500, 1500, 1700, 1500), "Throttle too high"),
+        (4, (1700, 1500, 1000, 1500), "Roll (RC1) is not neutral"),
+        (4, (1500, 1500, 1000, 1500), ""),
+    ],
+)
+def test_sticks_that_do_not_rest_forbid_arming(
+    mode: int, pulses: tuple[int, ...], text: str, bench: Any
+) -> None:
+    """In LOITER with the throttle in the middle, as recorded; the others by the same check."""
     rig = bench()
     rig.run(0.5)
-    rig.mode(4)
-    rig.sticks(1500, 1500, 1700, 1500)
-    assert rig.command(400, 1) == ACCEPTED
+    rig.mode(mode)
+    rig.sticks(*pulses)
+    assert rig.command(400, 1) == (FAILED if text else ACCEPTED)
+    assert rig.texts()[-1] == (f"Arm: {text}" if text else "Arming motors")
 
 
 @pytest.mark.parametrize("magic", [21196, 2989])

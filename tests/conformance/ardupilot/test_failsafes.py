@@ -66,8 +66,8 @@ def test_the_parameter_chooses_what_happens(value: int, mode: int, bench: Any) -
 
 def test_a_pilot_flies_on_when_the_station_is_lost(bench: Any) -> None:
     rig = bench(parameters={"FS_GCS_ENABLE": 1})
-    rig.sticks(1500, 1500, 1500, 1500)
     airborne_without_a_station(rig)
+    rig.sticks(1500, 1500, 1500, 1500)
     rig.mode(2)
     rig.run(6.5)
     assert rig.vehicle.mode.name == "ALT_HOLD"
@@ -172,7 +172,7 @@ def test_a_rover_holds_or_returns_as_asked(bench: Any) -> None:
         assert rig.command(400, 1) == 0
         rig.run(7.0)
         assert rig.vehicle.mode.number == mode
-        assert "GCS Failsafe" in rig.texts()
+        assert "Radio Failsafe" in rig.texts()  # as recorded: a rover mistakes the links
 
 
 def test_a_vehicle_that_lies_on_its_back_disarms(bench: Any) -> None:
@@ -201,18 +201,124 @@ def test_the_crash_check_can_be_switched_off(bench: Any) -> None:
     ids=["AUTO", "AUTO goes on", "MANUAL", "HOLD"],
 )
 def test_a_rover_without_its_station(enabled: int, mode: int, ends_in: int, bench: Any) -> None:
-    """The action follows FS_TIMEOUT after the loss, not in HOLD, and not in AUTO with FS_GCS_ENABLE 2."""
-    rig = bench(
-        "rover", parameters={"FS_GCS_ENABLE": enabled, "FS_GCS_TIMEOUT": 5, "FS_ACTION": 1, "FS_TIMEOUT": 4}
-    )
+    """The action follows FS_TIMEOUT after the loss, not in HOLD, and not in AUTO with FS_THR_ENABLE 2."""
+    times = {"FS_GCS_TIMEOUT": 5, "FS_TIMEOUT": 4}
+    rig = bench("rover", parameters={"FS_GCS_ENABLE": 1, "FS_THR_ENABLE": enabled, "FS_ACTION": 1, **times})
     rig.send("HEARTBEAT", type=6, autopilot=8)
     rig.run(0.5)
     rig.vehicle.mission.replace([MissionItem(16), MissionItem(16, x=-353_600_000, y=1_491_600_000)])
     rig.mode(mode)
     rig.command(400, 1)
     rig.run(8.0)
-    assert "GCS Failsafe" not in rig.texts()
+    assert "Radio Failsafe" not in rig.texts()
     rig.run(3.0)
     assert rig.vehicle.mode.number == ends_in
-    assert ("GCS Failsafe" in rig.texts()) == (mode != 4)
+    assert ("Radio Failsafe" in rig.texts()) == (mode != 4)
     assert ("Failsafe - Continuing Auto Mode" in rig.texts()) == (mode == ends_in == 10)
+
+
+def refused_to_arm(rig: Any) -> list[str]:
+    """What it says when it refuses to arm."""
+    before = len(rig.texts())
+    assert rig.command(400, 1) == 4
+    rig.run(0.1)
+    return [text for text in rig.texts()[before:] if text.startswith("Arm: ")]
+
+
+def test_a_battery_failsafe_forbids_arming_also_after_the_voltage_is_back(bench: Any) -> None:
+    """Recorded: 9.9 V at rest, critical at 10.0 V, low at 10.5 V."""
+    levels = {"BATT_LOW_VOLT": 10.5, "BATT_CRT_VOLT": 10.0, "BATT_LOW_TIMER": 2}
+    rig = bench(parameters={**levels, "SIM_BATT_VOLTAGE": 9.9})
+    rig.beat()
+    rig.mode(GUIDED)
+    rig.run(6.0)
+    assert refused_to_arm(rig) == ["Arm: Battery 1 low voltage failsafe", "Arm: Battery failsafe"]
+    set_parameter(rig, "SIM_BATT_VOLTAGE", 12.6)
+    rig.run(3.0)
+    assert refused_to_arm(rig) == ["Arm: Battery failsafe"]
+
+
+def test_a_lost_station_forbids_arming(bench: Any) -> None:
+    rig = bench(parameters={"FS_GCS_ENABLE": 1})
+    rig.send("HEARTBEAT", type=6, autopilot=8)
+    rig.mode(GUIDED)
+    rig.run(8.0)
+    assert refused_to_arm(rig) == ["Arm: GCS failsafe on"]
+    rig.beat()
+    rig.run(2.0)
+    assert rig.command(400, 1) == 0
+
+
+def test_a_receiver_without_a_fix_forbids_arming_in_modes_that_need_a_position(bench: Any) -> None:
+    rig = bench()
+    rig.beat()
+    rig.mode(GUIDED)
+    rig.run(1.0)
+    set_parameter(rig, "SIM_GPS_DISABLE", 1)
+    for _ in range(3):
+        rig.run(1.5)
+        assert refused_to_arm(rig) == ["Arm: GPS 1: Bad fix"]
+    rig.mode(0)
+    assert rig.command(400, 1) == 0
+
+
+def test_without_satellites_it_lands_in_the_recorded_time_and_refuses_modes(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    set_parameter(rig, "SIM_GPS_DISABLE", 1)
+    seconds = rig.run_until(lambda: rig.vehicle.mode.number == LAND, within=12.0)
+    assert seconds == pytest.approx(8.1, abs=0.4)
+    rig.run(1.0)
+    assert rig.mode(GUIDED) == 4
+    assert "Mode change to GUIDED failed: requires position" in rig.texts()
+
+
+def test_a_battery_of_a_stated_voltage_measures_it_in_flight(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    set_parameter(rig, "SIM_BATT_VOLTAGE", 10.4)
+    rig.run(2.0)
+    assert rig.vehicle.estimate.battery_volts == pytest.approx(10.4, abs=0.1)
+
+
+def test_a_copter_that_lacks_a_motor_stays_armed(bench: Any) -> None:
+    """Recorded: the crash check does not act, and it is not disarmed without force."""
+    rig = bench()
+    rig.airborne(15.0)
+    set_parameter(rig, "SIM_ENGINE_MUL", 0.0)
+    rig.run(20.0)
+    assert rig.vehicle.armed
+    assert rig.command(400, 0) == 4
+    assert rig.command(400, 0, 21196) == 0
+
+
+def test_a_place_that_is_no_number_is_denied(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    place = {"x": -353_630_000, "y": 1_491_652_000}
+    for frame, z, result in ((6, float("nan"), 2), (6, 10.0, 0), (6, 0.0, 2), (2, 10.0, 2)):
+        given = {"frame": frame, **place, "z": z, "param2": 1.0, "param4": float("nan")}
+        assert rig.command_int(192, **given) == result
+    assert rig.command_int(192, frame=6, x=950_000_000, y=place["y"], z=10.0, param2=1.0) == 2
+    assert rig.command(22, 0, 0, 0, 0, 0, 0, float("nan")) == 4
+
+
+def test_a_return_along_the_track_needs_a_track(bench: Any) -> None:
+    for kind, number in (("copter", SMART_RTL), ("rover", 12)):
+        rig = bench(kind)
+        rig.run(0.5)
+        assert rig.mode(number) == 4
+
+
+def test_a_rover_refuses_what_it_cannot_drive(bench: Any) -> None:
+    rig = bench("rover")
+    rig.beat()
+    rig.run(0.5)
+    assert rig.mode(10) == 4
+    assert rig.texts()[-2:] == ["No Mission. Can't set AUTO.", "Flight mode change failed"]
+    assert rig.mode(15) == 0
+    assert rig.command(178, 1, 2.0) == 4
+    assert rig.command(400, 1) == 0
+    rig.send("SET_POSITION_TARGET_LOCAL_NED", target_system=1, coordinate_frame=1, type_mask=3576, x=20.0)
+    rig.run(0.5)
+    assert rig.command(178, 1, 2.0) == 0

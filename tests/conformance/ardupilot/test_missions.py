@@ -227,7 +227,9 @@ def test_actions_conditions_and_jumps(bench: Any) -> None:
     rig.run_until(lambda: not rig.vehicle.armed, within=200.0)
     rig.run(0.5)
     reached = [one.fields["seq"] for one in rig.of("MISSION_ITEM_REACHED")]
-    assert reached == [1, 3, 4, 3, 4, 6, 7]
+    assert reached == [2, 3, 4, 3, 4, 6, 7]  # the speed of item 2 in the place of the take-off
+    assert "Mission: 2 ChangeSpeed" in rig.texts()
+    assert "Mission: 5 Jump 1/1" in rig.texts()
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,9 @@ class Px4Strip(Airstrip):
 
 
 BOTH = pytest.mark.parametrize(
-    ("strip", "known"), [(ArduPilotStrip, "RTL_SPEED"), (Px4Strip, "MPC_XY_CRUISE")], ids=["ardupilot", "px4"]
+    ("strip", "known"),
+    [(ArduPilotStrip, "RTL_SPEED_MS"), (Px4Strip, "MPC_XY_CRUISE")],
+    ids=["ardupilot", "px4"],
 )
 
 

@@ -411,10 +411,14 @@ class ReportState:
     """Texts that are sent once after a boot."""
     arming_checks_at: Ns = 0
     """Uptime of the last report of failed arming checks [ns]."""
+    arming_checks_due: bool = False
+    """Whether checks have begun to fail since then."""
     counters_at: Ns = 0
     """Uptime at which operating hours were last stored [ns]."""
     contacts: int = 0
     """Number of touch-downs reported."""
+    item_reached: int | None = None
+    """Number of an action that was reported instead of the waypoint before it."""
     high_latency: bool = False
     """Whether a command has switched the links of high latency on."""
     gauge_offset_mah: float = 0.0

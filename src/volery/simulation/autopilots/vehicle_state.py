@@ -117,6 +117,8 @@ class Manoeuvre:
         return hypot(self.target[0] - here[0], self.target[1] - here[1])
 
 
+FIX_3D = 3
+"""GPS_FIX_TYPE."""
 OFF = Setpoint(Control.OFF)
 IDLE = Setpoint(Control.IDLE)
 
@@ -164,6 +166,11 @@ def unlimited(_vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
 def height_above_home(vehicle: Vehicle) -> float:
     """Return the height above home: the default of a firmware without a range finder."""
     return vehicle.height
+
+
+def senses_ground(vehicle: Vehicle) -> bool:
+    """Return what the flight stack's landed detector reports: the default of a firmware."""
+    return vehicle.estimate.landed
 
 
 def no_rows(_vehicle: Vehicle) -> tuple[LogRow, ...]:
@@ -232,6 +239,10 @@ class VehicleRules:
     arming: ArmingTimes = field(default_factory=ArmingTimes)
     parameters: ParameterTable
     rc: RcDefaults
+    senses_ground: Callable[[Vehicle], bool] = senses_ground
+    """Return whether the landed detector of a vehicle in flight reports the ground."""
+    position_kept: float = 10.0
+    """Time for which a position counts after the receiver has lost its fix [s]."""
     return_point: Callable[[Vehicle], Vector | None] = do_nothing
     """Return where a return ends and its least height, north, east, down [m]; ``None``: home."""
     height_above_ground: Callable[[Vehicle], float] = height_above_home
@@ -358,9 +369,16 @@ class Vehicle:
         return self.flight.estimate()
 
     @property
+    def position_ok(self) -> bool:
+        """Whether the estimator has a position that counts."""
+        estimate = self.estimate
+        lost = estimate.fix_type < FIX_3D and estimate.gps_age >= self.rules.position_kept
+        return estimate.position_ok and not lost
+
+    @property
     def has_position(self) -> bool:
         """Whether modes that need a position may fly."""
-        return self.uptime() >= self.rules.startup.position_after and self.estimate.position_ok
+        return self.uptime() >= self.rules.startup.position_after and self.position_ok
 
     @property
     def height(self) -> float:
@@ -524,7 +542,7 @@ class Vehicle:
     def update_ground(self) -> None:
         """Update the ground state of a vehicle in flight; called at every tick."""
         if self.armed and not self.landed and self.flies:
-            on_ground = self.estimate.landed
+            on_ground = self.rules.senses_ground(self)
             requested = on_ground and self.manoeuvre.takeoff_requested()
             times = self.rules.arming
             self.ground.update(

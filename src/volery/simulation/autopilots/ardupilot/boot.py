@@ -78,7 +78,7 @@ def set_origin(vehicle: Vehicle) -> None:
 
 def set_home_position(vehicle: Vehicle) -> None:
     """Set the home position where the vehicle is, unless it has one or the estimator has no position."""
-    if vehicle.estimate.position_ok and vehicle.home is None:
+    if vehicle.position_ok and vehicle.home is None:
         vehicle.set_home_here()
 
 
@@ -86,7 +86,7 @@ def find_home(vehicle: Vehicle) -> None:
     """Set the home position as soon as the estimator has a position, if it had none at the usual time."""
     late = vehicle.uptime() > vehicle.rules.startup.origin_after + S // 2
     waits = vehicle.home is None and late and "elevation" not in vehicle.reports.sent_once
-    if waits and vehicle.estimate.position_ok:
+    if waits and vehicle.position_ok:
         set_home_position(vehicle)
         report_field_elevation(vehicle)
 

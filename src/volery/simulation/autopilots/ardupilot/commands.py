@@ -45,7 +45,11 @@ from volery.simulation.autopilots.mavlink.messages import (
 )
 from volery.simulation.autopilots.onboard_mission import (
     GLOBAL,
+    GLOBAL_INT,
     GLOBAL_RELATIVE,
+    GLOBAL_RELATIVE_INT,
+    GLOBAL_TERRAIN,
+    GLOBAL_TERRAIN_INT,
     JUMP_TAG,
     LAND_START,
     MissionItem,
@@ -129,7 +133,13 @@ def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
 
 
 def on_change_speed(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_CHANGE_SPEED."""
+    """Handle DO_CHANGE_SPEED; a rover has a speed of its own only on the way to a point."""
+    guided = vehicle.manoeuvre.flown
+    drives_itself = bool(vehicle.mode.controls) and not vehicle.mode.pilot
+    if not vehicle.flies and not drives_itself:
+        return FAILED
+    if isinstance(guided, GuidedRover) and guided.target is None:
+        return FAILED
     return ACCEPTED if change_speed(vehicle, round(command.param1), command.param2) else FAILED
 
 
@@ -224,17 +234,27 @@ def _is_place(command: Command) -> bool:
     return abs(command.x) <= 90.0 and abs(command.y) <= 180.0 and abs(command.z) < HIGHEST
 
 
+PLACE_FRAMES = (GLOBAL, GLOBAL_INT, GLOBAL_RELATIVE, GLOBAL_RELATIVE_INT, GLOBAL_TERRAIN, GLOBAL_TERRAIN_INT)
+
+
+def _means_here(command: Command) -> bool:
+    """Return whether a place or a height of 0 would mean the present one (Location::sanitize)."""
+    level = command.frame not in (GLOBAL, GLOBAL_INT) and command.z == 0.0
+    return (command.x == 0.0 and command.y == 0.0) or level
+
+
 def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
     """Handle DO_REPOSITION (COMMAND_INT only): flag 1 allows a change to GUIDED; copters ignore the speed."""
     if not command.is_int:
         return UNSUPPORTED
-    if not _is_place(command):
+    if vehicle.mode.number != guided and not round(command.param2) & 1:
         return DENIED
-    if vehicle.mode.number != guided:
-        if not round(command.param2) & 1:
-            return DENIED
-        if not change_mode(vehicle, guided):
-            return FAILED
+    if not _is_place(command) or command.frame not in PLACE_FRAMES or _means_here(command):
+        return DENIED
+    if not fence_admits(vehicle, vehicle.point(command.frame, command.x, command.y, command.z)):
+        return FAILED
+    if vehicle.mode.number != guided and not change_mode(vehicle, guided):
+        return FAILED
     if command.param1 > 0.0 and not vehicle.flies:
         vehicle.commanded.speed = command.param1
     yaw = None if isnan(command.param4) or not vehicle.flies else command.param4

@@ -19,9 +19,10 @@ from volery.simulation.autopilots.ardupilot.auxiliary import STOP_CHECKS, Auxili
 from volery.simulation.autopilots.ardupilot.avoidance import limit_copter, obstacle_problems
 from volery.simulation.autopilots.ardupilot.buttons import read_buttons
 from volery.simulation.autopilots.ardupilot.camera import update_camera
-from volery.simulation.autopilots.ardupilot.crash_check import check_crash
+from volery.simulation.autopilots.ardupilot.crash_check import check_crash, lacks_motor
 from volery.simulation.autopilots.ardupilot.estimator_sources import GLITCH_CHECK, watch_glitches
 from volery.simulation.autopilots.ardupilot.failsafes import (
+    BATTERY_FAILSAFES,
     COPTER_FAILSAFES,
     radio_never_received,
     radio_too_low,
@@ -59,6 +60,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
     in_other_modes,
     in_position_modes,
     mode_not_armable,
+    sticks_not_neutral,
 )
 from volery.simulation.autopilots.ardupilot.motor_test import turn_tested_motor
 from volery.simulation.autopilots.ardupilot.mount import update_mount
@@ -74,7 +76,7 @@ from volery.simulation.autopilots.ardupilot.precision_landing import (
 from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, log_rows, update_proximity
 from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.range_finder import follow_ground, height_above_ground
-from volery.simulation.autopilots.ardupilot.sensor_status import XY_CONTROL, Z_CONTROL, Health
+from volery.simulation.autopilots.ardupilot.sensor_status import POSITION_KEPT, XY_CONTROL, Z_CONTROL, Health
 from volery.simulation.autopilots.ardupilot.servo_outputs import pass_transmitter_through
 from volery.simulation.autopilots.ardupilot.sprayer import update_sprayer
 from volery.simulation.autopilots.ardupilot.takeoff_check import check_takeoff
@@ -221,6 +223,7 @@ MODES = {
 }
 
 CHECKS = (
+    Check("GCS failsafe on", lambda vehicle: "station" in vehicle.failsafes.active),
     Check("Need Alt Estimate", in_position_modes(0.0, 5.7)),
     Check("Gyros not healthy", between_uptimes(0.0, 1.8)),
     Check("Accels inconsistent", between_uptimes(1.8, 11.5)),
@@ -234,6 +237,7 @@ CHECKS = (
     Check("Throttle below failsafe", radio_too_low),
     Check("winch unhealthy", no_servo),
     *SHARED_CHECKS,
+    Check("Battery failsafe", lambda vehicle: not BATTERY_FAILSAFES.isdisjoint(vehicle.failsafes.active)),
     *FENCE_CHECKS,
     GLITCH_CHECK,
     PROXIMITY_CHECK,
@@ -249,15 +253,17 @@ def failing_prearm_checks(vehicle: Vehicle) -> list[str]:
     return failing_checks(vehicle, CHECKS, lambda one: copter_problems(one) + obstacle_problems(one))
 
 
-def arming_problems(vehicle: Vehicle) -> list[str]:
-    """Return the texts of all checks that forbid arming now: pre-arm checks, then mode and throttle."""
+def arming_problems(vehicle: Vehicle, *, by_rudder: bool = False) -> list[str]:
+    """Return the texts of all checks that forbid arming now: pre-arm checks, else mode or sticks."""
     found = failing_prearm_checks(vehicle)
     may_arm_auto = vehicle.mode.name == "AUTO" and round(vehicle.parameters["AUTO_OPTIONS"]) & 1
-    if not may_arm_auto:
-        found += mode_not_armable(vehicle)
+    if not found and not may_arm_auto:
+        found = mode_not_armable(vehicle)
+    if found or not vehicle.parameters["ARMING_CHECK"]:
+        return found
     if not vehicle.mode.starts_high and _throttle_is_high(vehicle):
-        found.append("Throttle too high")
-    return found
+        return ["Throttle too high"]
+    return sticks_not_neutral(vehicle, by_rudder=by_rudder)
 
 
 def _throttle_is_high(vehicle: Vehicle) -> bool:
@@ -293,7 +299,7 @@ def on_step(vehicle: Vehicle) -> None:
     watch_glitches(vehicle)
     if not pilot_input.sticks_rest(vehicle):
         pilot_input.read_mode_switch(vehicle, "FLTMODE_CH", "FLTMODE")
-        pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
+        pilot_input.read_rudder(vehicle, partial(arming_problems, by_rudder=True), ARMING_TEXTS, RUDDER_HOLD)
         AUXILIARY.read_switches(vehicle)
     read_buttons(vehicle, AUXILIARY)
     pass_transmitter_through(vehicle)
@@ -450,6 +456,8 @@ def copter(version: Version) -> Firmware:
             return_point=return_point,
             height_above_ground=height_above_ground,
             limit=limit,
+            position_kept=POSITION_KEPT,
+            senses_ground=lambda vehicle: vehicle.estimate.landed and not lacks_motor(vehicle),
             log_extras=log_extras,
             startup=StartupTimes(READY, ORIGIN, POSITION, POSITION),
             arming=ArmingTimes(

@@ -20,6 +20,19 @@ EMERGENCY = 0
 """MAV_SEVERITY."""
 
 
+LACKING = 0.3
+"""Share of a motor's thrust up to which the copter cannot be held."""
+
+
+def lacks_motor(vehicle: Vehicle) -> bool:
+    """Return whether SIM_ENGINE_MUL has taken a motor from a copter.
+
+    The original's simulator sets a falling copter level at its first contact, and its landed detector waits
+    for the lower limit of the motors: such a copter is neither crashed nor landed, and stays armed.
+    """
+    return vehicle.parameters["SIM_ENGINE_MUL"] <= LACKING
+
+
 def _down_axis(roll: float, pitch: float, yaw: float) -> Vector:
     """Return the direction of the body's down axis, north, east, down."""
     along, aside = cos(roll) * sin(pitch), -sin(roll)
@@ -43,6 +56,7 @@ def check_crash(vehicle: Vehicle) -> None:
     crashing = (
         vehicle.parameters["FS_CRASH_CHECK"] > 0.0
         and vehicle.mode.name not in UNCHECKED
+        and not lacks_motor(vehicle)
         and error > CRASH_ERROR
         and accel < CRASH_ACCEL
         and hypot(*estimate.velocity) < CRASH_SPEED

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from volery.base.time import S, from_seconds
+from volery.base.time import Ns, S, from_seconds
 from volery.simulation.autopilots.ardupilot.battery import left_mah, used_mah
 from volery.simulation.autopilots.ardupilot.landing_sequence import AUTO_RTL
 from volery.simulation.autopilots.ardupilot.modes import (
@@ -20,6 +20,13 @@ from volery.simulation.autopilots.autopilot import Failsafe
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
+
+LOST_FOR: Ns = S
+"""Ten checks, ten a second (EKF_CHECK_ITERATIONS_MAX)."""
+WARNED_EVERY: Ns = 30 * S
+LAND_IN_ANY_MODE = 3
+"""Value of FS_EKF_ACTION."""
+BATTERY_FAILSAFES = frozenset({"battery low", "battery critical"})
 
 CONTINUE_MISSION_ON_RADIO, CONTINUE_MISSION_ON_STATION = 1 << 0, 1 << 1
 CONTINUE_GUIDED_ON_RADIO, CONTINUE_LANDING, CONTINUE_PILOT_ON_STATION = 1 << 2, 1 << 3, 1 << 4
@@ -80,11 +87,17 @@ def battery_critical(vehicle: Vehicle) -> bool:
 
 
 def estimator_lost(vehicle: Vehicle) -> bool:
-    """Return whether an armed vehicle in flight lost the position that its mode needs."""
-    if vehicle.parameters["FS_EKF_THRESH"] <= 0.0 or not vehicle.armed or vehicle.landed:
+    """Return whether the estimator has had a position, and has had none for a second."""
+    since, reported = vehicle.failsafes.true_since, vehicle.reports.sent_once
+    if vehicle.parameters["FS_EKF_THRESH"] <= 0.0:
         return False
-    lost = not vehicle.estimate.position_ok
-    return lost and (vehicle.mode.needs_position or "estimator" in vehicle.failsafes.active)
+    if vehicle.has_position:
+        reported.add("position")
+    if vehicle.has_position or "position" not in reported:
+        since.pop("estimator", None)
+        return False
+    now = vehicle.kernel.now()
+    return now - since.setdefault("estimator", now) >= LOST_FOR
 
 
 def _report_battery(vehicle: Vehicle, level: str) -> int:
@@ -209,9 +222,15 @@ def _battery_lands(vehicle: Vehicle) -> bool:
 
 
 def _on_estimator_lost(vehicle: Vehicle) -> None:
-    """Enter LAND or ALT_HOLD, as FS_EKF_ACTION demands."""
-    vehicle.send_text(CRITICAL, "EKF variance")
-    mode = {1: LAND, 2: ALT_HOLD, 3: LAND}.get(round(vehicle.parameters["FS_EKF_ACTION"]))
+    """Report it; enter LAND or ALT_HOLD as FS_EKF_ACTION demands, if the vehicle is armed and needs it."""
+    now, since = vehicle.kernel.now(), vehicle.failsafes.true_since
+    if now - since.get("estimator warned", NEVER) > WARNED_EVERY:
+        since["estimator warned"] = now
+        vehicle.send_text(CRITICAL, "EKF variance")
+    action = round(vehicle.parameters["FS_EKF_ACTION"])
+    if not vehicle.armed or not (vehicle.mode.needs_position or action == LAND_IN_ANY_MODE):
+        return
+    mode = {1: LAND, 2: ALT_HOLD, LAND_IN_ANY_MODE: LAND}.get(action)
     if mode is not None and change_mode(vehicle, mode):
         vehicle.send_text(CRITICAL, f"EKF Failsafe: changed to {vehicle.mode.name} Mode")
 
@@ -251,7 +270,7 @@ def _act_on_rover(vehicle: Vehicle, action: int) -> None:
 
 
 CONTINUE_MISSION = 2
-"""Value of FS_THR_ENABLE and FS_GCS_ENABLE that continues in AUTO."""
+"""Value of FS_THR_ENABLE that continues in AUTO."""
 ACTIVE_IN_HOLD = 1 << 0
 """Bit of FS_OPTIONS."""
 
@@ -270,10 +289,15 @@ def _lost_for_long(vehicle: Vehicle, name: str, lost: Callable[[Vehicle], bool])
     return long and not stands and vehicle.mode.name != "RTL"
 
 
-def _on_rover_link_lost(vehicle: Vehicle, what: str, enabled_by: str) -> None:
-    vehicle.send_text(WARNING, f"{what} Failsafe")
+def _on_rover_link_lost(vehicle: Vehicle) -> None:
+    """Act on a lost link.
+
+    The original tells the two links apart by the check that finds the time-out first, and that of the radio
+    is made most often: a lost ground station is reported, and continues, as a lost radio.
+    """
+    vehicle.send_text(WARNING, "Radio Failsafe")
     vehicle.rc.release()
-    if vehicle.mode.name == "AUTO" and vehicle.parameters[enabled_by] == CONTINUE_MISSION:
+    if vehicle.mode.name == "AUTO" and vehicle.parameters["FS_THR_ENABLE"] == CONTINUE_MISSION:
         vehicle.send_text(WARNING, "Failsafe - Continuing Auto Mode")
     else:
         _act_on_rover(vehicle, round(vehicle.parameters["FS_ACTION"]))
@@ -287,13 +311,13 @@ ROVER_FAILSAFES = (
     Failsafe(
         "station",
         partial(_lost_for_long, name="station", lost=station_lost),
-        partial(_on_rover_link_lost, what="GCS", enabled_by="FS_GCS_ENABLE"),
+        _on_rover_link_lost,
         partial(_report_cleared, what="GCS"),
     ),
     Failsafe(
         "radio",
         partial(_lost_for_long, name="radio", lost=radio_lost),
-        partial(_on_rover_link_lost, what="Radio", enabled_by="FS_THR_ENABLE"),
+        _on_rover_link_lost,
         partial(_report_cleared, what="Radio"),
     ),
     Failsafe("battery low", battery_low, partial(_on_rover_battery, level="low")),

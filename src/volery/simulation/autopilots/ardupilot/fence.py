@@ -14,7 +14,13 @@ from volery.base.frames import Vector
 from volery.base.time import MS
 from volery.simulation.autopilots.ardupilot.fence_points import FENCE, clear_if_emptied
 from volery.simulation.autopilots.ardupilot.fence_shapes import shapes
-from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, NOTICE, Check, change_mode, disarm
+from volery.simulation.autopilots.ardupilot.modes import (
+    COPTER_DISARMED,
+    NOTICE,
+    change_mode,
+    disarm,
+    first_of,
+)
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, to_uint32
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -96,7 +102,7 @@ def check_fence(vehicle: Vehicle, respond: Respond) -> None:
     if not vehicle.parameters["FENCE_ENABLE"]:
         fence.breached.clear()
         return
-    if not vehicle.estimate.position_ok:
+    if not vehicle.position_ok:
         return
     found = _beyond(vehicle, vehicle.estimate.position, floor=fence.floor)
     new = [limit for limit, distance in found.items() if distance >= fence.breached.get(limit, 0.0)]
@@ -177,11 +183,7 @@ _TEXTS = (
 )
 
 
-def _check(text: str) -> Check:
-    return Check(text, lambda vehicle: _first_problem(vehicle) == text)
-
-
-FENCE_CHECKS = tuple(_check(text) for text in _TEXTS)
+FENCE_CHECKS = first_of(_TEXTS, _first_problem)
 """Arming checks of the fence; at most one of them fails."""
 
 # -- response

@@ -4,11 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import dist, isinf, isnan
+from math import dist, isfinite, isinf, isnan
 
 from volery.base.time import from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot.camera import DIGICAM_CONTROL, TRIGGER_DISTANCE, act_on_camera
-from volery.simulation.autopilots.ardupilot.commands import HIGHEST, SET_REVERSE, change_speed, turn_to
+from volery.simulation.autopilots.ardupilot.commands import (
+    FENCE_ENABLE,
+    HIGHEST,
+    REPEAT_RELAY,
+    REPEAT_SERVO,
+    ROI,
+    ROI_LOCATION,
+    ROI_NONE,
+    SET_REVERSE,
+    change_speed,
+    on_region,
+    turn_to,
+)
+from volery.simulation.autopilots.ardupilot.fence import on_fence_enable
 from volery.simulation.autopilots.ardupilot.guided_items import copter_guided_leg, set_limits
 from volery.simulation.autopilots.ardupilot.modes import (
     COPTER_DISARMED,
@@ -18,7 +31,15 @@ from volery.simulation.autopilots.ardupilot.modes import (
     change_mode,
     disarm,
 )
-from volery.simulation.autopilots.ardupilot.payload import GRIPPER, SET_RELAY, SET_SERVO, act_on_payload
+from volery.simulation.autopilots.ardupilot.mount_control import MOUNT_CONTROL, on_mount_control
+from volery.simulation.autopilots.ardupilot.payload import (
+    GRIPPER,
+    SET_RELAY,
+    SET_SERVO,
+    act_on_payload,
+    on_repeat_relay,
+    on_repeat_servo,
+)
 from volery.simulation.autopilots.ardupilot.payload_place import payload_leg
 from volery.simulation.autopilots.ardupilot.sprayer import DO_SPRAYER, act_on_sprayer
 from volery.simulation.autopilots.ardupilot.winch import DO_WINCH, act_on_winch
@@ -26,7 +47,7 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import HoldPlace
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Leg, MissionRules, copter_leg
 from volery.simulation.autopilots.manoeuvres.rover_driving import Stand
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint, quarter_time
-from volery.simulation.autopilots.mavlink.messages import EPOCH_US, finite
+from volery.simulation.autopilots.mavlink.messages import EPOCH_US, Command, Handler, finite
 from volery.simulation.autopilots.onboard_mission import (
     CHANGE_SPEED,
     CONDITION_DELAY,
@@ -45,6 +66,7 @@ from volery.simulation.autopilots.onboard_mission import (
     JUMP,
     JUMP_TAG,
     LAND,
+    LAND_START,
     LOITER_TIME,
     LOITER_TO_ALTITUDE,
     LOITER_TURNS,
@@ -93,13 +115,16 @@ NAMES = {
     GUIDED_ENABLE: "GuidedEnable",
     GUIDED_LIMITS: "GuidedLimits",
     PAYLOAD_PLACE: "PayloadPlace",
+    REPEAT_RELAY: "RepeatRelay",
+    REPEAT_SERVO: "RepeatServo",
+    LAND_START: "LandStart",
+    **dict.fromkeys((ROI_LOCATION, ROI_NONE, ROI), "SetROI"),
+    MOUNT_CONTROL: "MountControl",
+    FENCE_ENABLE: "FenceEnable",
+    JUMP_TAG: "Tag",
 }
 """Names of the items in the firmware's status texts."""
 
-KEPT_ONLY = frozenset({189, 195, 197, 201, 205, 182, 184, 207, 208, 212, JUMP_TAG})
-"""Items that are stored and read back without effect: mounts, repeated servos and relays, fences, regions of
-interest, and tags that only DO_JUMP_TAG looks for.
-"""
 
 PLACED = frozenset(
     {
@@ -117,7 +142,7 @@ PLACED = frozenset(
 )
 """Items whose place is checked and whose frame is stored."""
 
-KEEPS_FRAME = PLACED | {GUIDED_ENABLE, 189, 191, 195, 201}
+KEEPS_FRAME = PLACED | {GUIDED_ENABLE, LAND_START, 191, ROI_LOCATION, ROI}
 """Items whose frame is stored; the others read back frame 0. The last four: landing sequence, go-around and
 regions of interest.
 """
@@ -137,11 +162,12 @@ MISSION_FRAME = 2
 
 def stored_item(item: MissionItem) -> MissionItem | int:
     """Return an item as stored (frames without their INT variants, NaN as 0), or the MAV_MISSION_RESULT."""
-    if item.command not in NAMES and item.command not in KEPT_ONLY:
+    if item.command not in NAMES:
         return UNSUPPORTED
     if item.frame not in STORED_FRAMES and item.frame != MISSION_FRAME:
         return UNSUPPORTED_FRAME
     wrong = _wrong_parameter(item) or (_wrong_place(item) if item.command in PLACED else 0)
+    wrong = wrong or (0 if isfinite(item.z) else INVALID_Z)
     if wrong:
         return wrong
     frame = STORED_FRAMES.get(item.frame, GLOBAL) if item.command in KEEPS_FRAME else GLOBAL
@@ -195,36 +221,108 @@ def item_begins(vehicle: Vehicle, index: int, item: MissionItem) -> None:
     vehicle.send_text(INFO, f"Mission: {index} {NAMES.get(item.command, 'Unknown')}")
 
 
+SILENT = frozenset(
+    {GRIPPER, SET_SERVO, SET_RELAY, REPEAT_RELAY, REPEAT_SERVO, DIGICAM_CONTROL, TRIGGER_DISTANCE}
+    | {DO_SPRAYER, DO_AUX_FUNCTION, JUMP_TAG}
+)
+"""Actions that AP_Mission itself executes: their end is not reported."""
+
+
+def _is_reported(vehicle: Vehicle, item: MissionItem) -> bool:
+    """Return whether the end of an action is reported by its number."""
+    return item.command not in SILENT or (item.command == TRIGGER_DISTANCE and not vehicle.flies)
+
+
 def item_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
-    """Send MISSION_ITEM_REACHED, and a status text for items that reach a place or wait."""
-    vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": index})
+    """Send MISSION_ITEM_REACHED, and a status text for items that reach a place or wait.
+
+    The first action after the item is done in the same step of the original, which keeps one number to be
+    sent: the action's replaces the item's.
+    """
+    plan, following = vehicle.mission, index + 1
+    action = plan[following] if following < len(plan) else None
+    at_once = action is not None and not (action.navigates or action.is_condition or action.command == JUMP)
+    replaced = action is not None and at_once and _is_reported(vehicle, action)
+    vehicle.reports.item_reached = following if replaced else None
+    vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": following if replaced else index})
     if item.command in (WAYPOINT, SPLINE_WAYPOINT, LOITER_TIME, LOITER_TURNS, LOITER_TO_ALTITUDE, DELAY):
-        vehicle.send_text(INFO, f"Reached command #{index}")
+        words = "command" if vehicle.flies else "waypoint"
+        vehicle.send_text(INFO, f"Reached {words} #{index}")
+
+
+def action_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
+    """Report an action by its number, unless that has been sent instead of the item before it."""
+    if vehicle.reports.item_reached == index:
+        vehicle.reports.item_reached = None
+    elif _is_reported(vehicle, item):
+        vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": index})
+
+
+def jumped(vehicle: Vehicle, index: int, times: int, of: int) -> None:
+    """Report a jump."""
+    vehicle.send_text(INFO, f"Mission: {index} Jump {times}/{of if of >= 0 else 'unlimited'}")
+
+
+def _change_speed(vehicle: Vehicle, item: MissionItem) -> None:
+    if change_speed(vehicle, round(item.param1), item.param2) and not vehicle.flies:
+        vehicle.send_text(INFO, f"speed: {item.param2:.1f} m/s")
+
+
+def _turn(vehicle: Vehicle, item: MissionItem) -> None:
+    turn_to(vehicle, item.param1, item.param2, item.param3, relative=item.param4 == 1.0)
+
+
+def _set_home(vehicle: Vehicle, item: MissionItem) -> None:
+    if item.param1 == 1.0 or not item.has_place:
+        vehicle.set_home_here()
+    else:
+        vehicle.set_home(item.x / 1e7, item.y / 1e7, item.z)
+
+
+def _reverse(vehicle: Vehicle, item: MissionItem) -> None:
+    vehicle.commanded.backwards = item.param1 == 1.0
+
+
+def _wind_winch(vehicle: Vehicle, item: MissionItem) -> None:
+    if vehicle.flies:
+        act_on_winch(vehicle, item)
+
+
+def _as_command(handler: Handler) -> Callable[[Vehicle, MissionItem], None]:
+    """Return an action that executes an item as the command of its number."""
+
+    def act(vehicle: Vehicle, item: MissionItem) -> None:
+        params = item.param1, item.param2, item.param3, item.param4
+        handler(vehicle, Command(item.command, *params, item.x / 1e7, item.y / 1e7, item.z, item.frame, True))
+
+    return act
+
+
+ACTIONS: Mapping[int, Callable[[Vehicle, MissionItem], None]] = {
+    CHANGE_SPEED: _change_speed,
+    CONDITION_YAW: _turn,
+    SET_HOME: _set_home,
+    GUIDED_LIMITS: set_limits,
+    DO_SPRAYER: act_on_sprayer,
+    DIGICAM_CONTROL: act_on_camera,
+    TRIGGER_DISTANCE: act_on_camera,
+    SET_REVERSE: _reverse,
+    DO_WINCH: _wind_winch,
+    **dict.fromkeys((GRIPPER, SET_RELAY, SET_SERVO), act_on_payload),
+    **dict.fromkeys((ROI_LOCATION, ROI_NONE, ROI), _as_command(on_region)),
+    REPEAT_RELAY: _as_command(on_repeat_relay),
+    REPEAT_SERVO: _as_command(on_repeat_servo),
+    FENCE_ENABLE: _as_command(on_fence_enable),
+    MOUNT_CONTROL: _as_command(on_mount_control),
+}
+"""What executes the item of a command."""
 
 
 def act(vehicle: Vehicle, item: MissionItem) -> None:
-    """Execute an item that does not navigate."""
-    if item.command == CHANGE_SPEED:
-        change_speed(vehicle, round(item.param1), item.param2)
-    elif item.command == CONDITION_YAW:
-        turn_to(vehicle, item.param1, item.param2, item.param3, relative=item.param4 == 1.0)
-    elif item.command == SET_HOME:
-        if item.param1 == 1.0 or not item.has_place:
-            vehicle.set_home_here()
-        else:
-            vehicle.set_home(item.x / 1e7, item.y / 1e7, item.z)
-    elif item.command == GUIDED_LIMITS:
-        set_limits(vehicle, item)
-    elif item.command == DO_SPRAYER:
-        act_on_sprayer(vehicle, item)
-    elif item.command in (DIGICAM_CONTROL, TRIGGER_DISTANCE):
-        act_on_camera(vehicle, item)
-    elif item.command == SET_REVERSE:
-        vehicle.commanded.backwards = item.param1 == 1.0
-    elif item.command == DO_WINCH and vehicle.flies:
-        act_on_winch(vehicle, item)
-    else:
-        act_on_payload(vehicle, item)
+    """Execute an item that does not navigate; a tag and the start of a landing only mark a place."""
+    action = ACTIONS.get(item.command)
+    if action is not None:
+        action(vehicle, item)
 
 
 DAY_S = 86_400
@@ -325,7 +423,16 @@ def _rules(ended: Callable[[Vehicle], Manoeuvre | None], actions: Actions) -> Mi
     def execute(vehicle: Vehicle, item: MissionItem) -> None:
         actions.get(item.command, act)(vehicle, item)
 
-    return MissionRules(restarts=True, item_begins=item_begins, item_done=item_done, act=execute, ended=ended)
+    return MissionRules(
+        restarts=True,
+        item_begins=item_begins,
+        item_done=item_done,
+        act=execute,
+        action_begins=item_begins,
+        action_done=action_done,
+        jumped=jumped,
+        ended=ended,
+    )
 
 
 def copter_rules(actions: Actions) -> MissionRules:

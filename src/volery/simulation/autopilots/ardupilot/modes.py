@@ -7,6 +7,7 @@ vehicle.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 from volery.base.time import Ns, S
@@ -16,7 +17,7 @@ from volery.simulation.autopilots.ardupilot.landing_sequence import AUTO_RTL, ne
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED
 from volery.simulation.autopilots.onboard_mission import DELAY, TAKEOFF
-from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
+from volery.simulation.autopilots.vehicle_state import FIX_3D, Mode, Vehicle
 
 CRITICAL, WARNING, NOTICE, INFO = 2, 4, 5, 6
 """MAV_SEVERITY."""
@@ -28,6 +29,7 @@ LEARN_AND_SAVE = 2
 """MOT_HOVER_LEARN."""
 
 DISPLAY_EVERY: Ns = 30 * S
+DISPLAY_PAUSE: Ns = 4 * S
 
 COPTER_DISARMED, ROVER_DISARMED = "Disarming motors", "Throttle disarmed"
 """Status texts of disarming."""
@@ -64,23 +66,98 @@ def lost_position(vehicle: Vehicle) -> bool:
     return vehicle.mode.needs_position and settled and not vehicle.has_position
 
 
+def bad_fix(vehicle: Vehicle) -> bool:
+    """Return whether there is a receiver of satellites that has no fix now."""
+    known = vehicle.uptime() >= vehicle.rules.startup.position_after and vehicle.parameters["GPS_TYPE"] != 0.0
+    return known and vehicle.estimate.fix_type < FIX_3D
+
+
 def no_mission(vehicle: Vehicle) -> bool:
     """Return whether the mode is AUTO without a mission."""
     return vehicle.mode.name == "AUTO" and len(vehicle.mission) <= 1
 
 
-def low_battery(vehicle: Vehicle) -> bool:
-    """Return whether the battery is below BATT_ARM_VOLT or BATT_ARM_MAH."""
-    volts, charge = vehicle.parameters["BATT_ARM_VOLT"], vehicle.parameters["BATT_ARM_MAH"]
-    return 0.0 < vehicle.estimate.battery_volts < volts or left_mah(vehicle) < charge
+def first_of(texts: Sequence[str], problem: Callable[[Vehicle], str]) -> tuple[Check, ...]:
+    """Return checks of which at most one fails: that with the text which *problem* returns."""
+    return tuple(Check(text, partial(_is_problem, text=text, problem=problem)) for text in texts)
+
+
+def _is_problem(vehicle: Vehicle, text: str, problem: Callable[[Vehicle], str]) -> bool:
+    return problem(vehicle) == text
+
+
+_BATTERY_TEXTS = (
+    "Battery 1 below minimum arming voltage",
+    "Battery 1 below minimum arming capacity",
+    "Battery 1 low voltage failsafe",
+    "Battery 1 low capacity failsafe",
+    "Battery 1 critical voltage failsafe",
+    "Battery 1 critical capacity failsafe",
+    "Battery 1 capacity failsafe critical >= low",
+    "Battery 1 voltage failsafe critical >= low",
+)
+
+
+def _battery_problem(vehicle: Vehicle) -> str:
+    """Return the first check of the battery that fails (AP_BattMonitor_Backend::arming_checks), or ""."""
+    p, volts, charge = vehicle.parameters, vehicle.estimate.battery_volts, left_mah(vehicle)
+    low, critical = p["BATT_LOW_VOLT"], p["BATT_CRT_VOLT"]
+    low_mah, critical_mah = p["BATT_LOW_MAH"], p["BATT_CRT_MAH"]
+    failed = (
+        0.0 < volts < p["BATT_ARM_VOLT"],
+        charge < p["BATT_ARM_MAH"],
+        0.0 < volts < low,
+        charge < low_mah and low_mah > 0.0,
+        0.0 < volts < critical,
+        charge < critical_mah and critical_mah > 0.0,
+        0.0 < low_mah <= critical_mah,
+        0.0 < low <= critical,
+    )
+    return next((text for text, fails in zip(_BATTERY_TEXTS, failed, strict=True) if fails), "")
 
 
 SHARED_CHECKS = (
-    Check("Battery 1 below minimum arming voltage", low_battery),
-    Check("Need Position Estimate", lost_position),
+    *first_of(_BATTERY_TEXTS, _battery_problem),
+    Check("Need Position Estimate", lambda vehicle: lost_position(vehicle) and not bad_fix(vehicle)),
     Check("Mode requires mission", no_mission),
+    Check("GPS 1: Bad fix", lambda vehicle: vehicle.mode.needs_position and bad_fix(vehicle)),
+    Check("Radio failsafe on", lambda vehicle: "radio" in vehicle.failsafes.active),
 )
 """The last checks of copter and rover."""
+
+THROTTLE_CHECKED, STICKS_UNCHECKED = 1 << 5, 1 << 6
+"""Bits of RC_OPTIONS."""
+RESTS_AT_MIDDLE = 1 << 0
+"""Bit of PILOT_THR_BHV, of a copter."""
+
+
+def sticks_not_neutral(vehicle: Vehicle, *, by_rudder: bool) -> list[str]:
+    """Return the texts of the sticks that are not at rest, which arming requires while there is a receiver.
+
+    Args:
+        vehicle: The vehicle.
+        by_rudder: Whether the yaw stick of a copter, the steering of a rover, arms and so is not checked.
+    """
+    if not vehicle.failsafes.rc_received or "radio" in vehicle.failsafes.active:
+        return []
+    sticks, options = vehicle.tuning.sticks, round(vehicle.parameters["RC_OPTIONS"])
+    read = sticks.read(vehicle.rc)
+    found = []
+    if not options & STICKS_UNCHECKED:
+        arms = ("Yaw" if vehicle.flies else "Roll") if by_rudder else ""
+        found = [
+            ("Roll", sticks.roll, read.roll),
+            ("Pitch", sticks.pitch, read.pitch),
+            ("Yaw", sticks.yaw, read.yaw),
+        ]
+        found = [one for one in found if one[0] != arms]
+    middle = vehicle.flies and round(vehicle.parameters["PILOT_THR_BHV"]) & RESTS_AT_MIDDLE
+    if options & THROTTLE_CHECKED and not middle:
+        throttle = sticks.travels[2]
+        pulse = vehicle.rc[sticks.throttle]
+        deflected = throttle.share(pulse) if vehicle.flies else throttle.deflection(pulse)
+        found.append(("Throttle", sticks.throttle, deflected))
+    return [f"{name} (RC{channel}) is not neutral" for name, channel, deflection in found if deflection]
 
 
 def failing_checks(
@@ -144,14 +221,18 @@ def disarm(vehicle: Vehicle, words: str, force: bool) -> int:
 
 
 def update_prearm_state(vehicle: Vehicle, problems: Callable[[Vehicle], list[str]]) -> None:
-    """Evaluate the pre-arm checks; report those that fail every 30 s."""
+    """Evaluate the pre-arm checks; report those that fail every 30 s, and once they have begun to fail."""
     if vehicle.armed:
         vehicle.arming.checks_passed = True
         return
     found = problems(vehicle)
+    since = vehicle.uptime() - vehicle.reports.arming_checks_at
+    due = since >= DISPLAY_EVERY or (vehicle.reports.arming_checks_due and since > DISPLAY_PAUSE)
+    vehicle.reports.arming_checks_due |= bool(found) and vehicle.arming.checks_passed
     vehicle.arming.checks_passed = not found
-    if vehicle.uptime() - vehicle.reports.arming_checks_at >= DISPLAY_EVERY:
+    if due:
         vehicle.reports.arming_checks_at = vehicle.uptime()
+        vehicle.reports.arming_checks_due = False
         for text in found:
             vehicle.send_text(CRITICAL, f"PreArm: {text}")
 
@@ -233,6 +314,11 @@ def _not_set_up(vehicle: Vehicle, mode: Mode) -> str:
     """Return why a vehicle may not enter a mode, armed or not, or an empty text."""
     if (mode.name == "THROW" and vehicle.armed) or (mode.name == "FLIP" and not may_flip(vehicle)):
         return "init failed"
+    if mode.name == "SMART_RTL" and not vehicle.ground.track:
+        return "init failed"
+    if mode.name == "AUTO" and not vehicle.flies and len(vehicle.mission) <= 1:
+        vehicle.send_text(NOTICE, "No Mission. Can't set AUTO.")
+        return "init failed"
     if mode.name == "FOLLOW" and not vehicle.parameters["FOLL_ENABLE"]:
         vehicle.send_text(WARNING, "Set FOLL_ENABLE = 1")
         return "init failed"
@@ -244,8 +330,6 @@ def refusal(vehicle: Vehicle, mode: Mode) -> str:
     if mode.needs_position and not vehicle.has_position:
         return "requires position"
     if mode.name == "AUTO" and len(vehicle.mission) <= 1:
-        return "init failed"
-    if mode.name == "SMART_RTL" and not vehicle.ground.track:
         return "init failed"
     if vehicle.flies and vehicle.landed:
         return _refusal_on_ground(vehicle, mode)

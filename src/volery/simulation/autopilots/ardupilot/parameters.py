@@ -118,6 +118,7 @@ _SHARED = {
     "RALLY_INCL_HOME": "any value but 0: home counts as a rally point of the return",
     "RALLY_LIMIT_KM": "distance beyond which a rally point is not used; 0: none",
     "RALLY_TOTAL": "number of rally points",
+    "RC_OPTIONS": "bit 5: the throttle, bit 6 off: the other sticks must rest to arm",
     "RC_OVERRIDE_TIME": "time after which overrides end; 0 ignores them, a negative value keeps them",
     **{
         f"RELAY{number}_{part}": f"{words} of that relay"
@@ -131,7 +132,7 @@ _SHARED = {
     "RNGFND1_MAX_CM": "largest distance below that counts for landings and for the ground that is followed",
     "RNGFND1_MIN_CM": "least distance below that counts",
     "RNGFND1_TYPE": "any value but 0: there is a range finder below, and it is reported",
-    "SIM_BATT_VOLTAGE": "open-circuit voltage of the full battery; the default leaves the body's own",
+    "SIM_BATT_VOLTAGE": "voltage of the battery from then on, whatever it gives; the default leaves its own",
     "SIM_ENGINE_FAIL": "the motor that SIM_ENGINE_MUL weakens, from 0",
     "SIM_ENGINE_MUL": "share of that motor's thrust",
     "SIM_GPS_DISABLE": "any value but 0: the receiver sees no satellites",
@@ -284,6 +285,7 @@ COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
         "PILOT_ACCEL_Z": "the pilot's vertical acceleration",
         "PILOT_SPEED_DN": "the pilot's largest descent; 0: PILOT_SPEED_UP",
         "PILOT_SPEED_UP": "the pilot's largest climb",
+        "PILOT_THR_BHV": "bit 0: the throttle rests in the middle, arming does not check it",
         "PILOT_TKOFF_ALT": "height to which the pilot's climb from the ground goes on by itself",
         "PILOT_Y_RATE": "the pilot's turn rate",
         "RTL_ALT": "height of the return",

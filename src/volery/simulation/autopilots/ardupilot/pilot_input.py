@@ -112,6 +112,10 @@ def on_step(vehicle: Vehicle) -> None:
     expire_overrides(vehicle)
 
 
+OWN_VOLTAGE = 12.6
+"""SIM_BATT_VOLTAGE that leaves the battery as it is."""
+
+
 def simulate_faults(vehicle: Vehicle) -> None:
     """Inject the faults and the wind that SIM_ parameters name, once after each change; GPS_TYPE 0, too."""
     parameters = vehicle.parameters
@@ -131,7 +135,7 @@ def simulate_faults(vehicle: Vehicle) -> None:
         return
     vehicle.failsafes.simulated = wanted
     if volts != before[5]:
-        vehicle.flight.set_full_voltage(volts)
+        vehicle.flight.set_voltage(None if volts == OWN_VOLTAGE else volts)
     if wind != before[3:5]:
         speed, towards = wind[0], radians(wind[1] + 180.0)
         vehicle.flight.set_wind(north=speed * cos(towards), east=speed * sin(towards))

@@ -37,6 +37,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
     between_uptimes,
     failing_checks,
     mode_not_armable,
+    sticks_not_neutral,
 )
 from volery.simulation.autopilots.ardupilot.motor_test import drive_tested_output
 from volery.simulation.autopilots.ardupilot.mount import update_mount
@@ -46,6 +47,7 @@ from volery.simulation.autopilots.ardupilot.proximity import PROXIMITY_CHECK, lo
 from volery.simulation.autopilots.ardupilot.rally import return_point
 from volery.simulation.autopilots.ardupilot.sensor_status import (
     ATTITUDE_CONTROL,
+    POSITION_KEPT,
     RATE_CONTROL,
     XY_CONTROL,
     YAW_CONTROL,
@@ -208,9 +210,12 @@ def failing_prearm_checks(vehicle: Vehicle) -> list[str]:
     return failing_checks(vehicle, CHECKS, source_problems)
 
 
-def arming_problems(vehicle: Vehicle) -> list[str]:
+def arming_problems(vehicle: Vehicle, *, by_rudder: bool = False) -> list[str]:
     """Return the texts of all checks that forbid arming now."""
-    return failing_prearm_checks(vehicle) + mode_not_armable(vehicle)
+    found = failing_prearm_checks(vehicle) + mode_not_armable(vehicle)
+    if found or not vehicle.parameters["ARMING_CHECK"]:
+        return found
+    return sticks_not_neutral(vehicle, by_rudder=by_rudder)
 
 
 AUXILIARY = AuxiliaryFunctions(OPTION_MODES, arming_problems, ARMING_TEXTS)
@@ -237,7 +242,7 @@ def on_step(vehicle: Vehicle) -> None:
     watch_glitches(vehicle)
     if not pilot_input.sticks_rest(vehicle):
         pilot_input.read_mode_switch(vehicle, "MODE_CH", "MODE")
-        pilot_input.read_rudder(vehicle, arming_problems, ARMING_TEXTS, RUDDER_HOLD)
+        pilot_input.read_rudder(vehicle, partial(arming_problems, by_rudder=True), ARMING_TEXTS, RUDDER_HOLD)
         AUXILIARY.read_switches(vehicle)
     read_buttons(vehicle, AUXILIARY)
     pilot_input.mix_steering(vehicle)
@@ -331,6 +336,7 @@ def rover(version: Version) -> Firmware:
             boot_mode=INITIALISING,
             return_point=return_point,
             limit=limit_rover,
+            position_kept=POSITION_KEPT,
             log_extras=log_rows,
             startup=StartupTimes(READY, HOME, POSITION, HOME),
             parameters=ParameterTable(

@@ -16,6 +16,9 @@ NO_FIX_AFTER = int(9.64 * S)
 FIX_AFTER = int(9.85 * S)
 """Uptime [ns] from which the GPS receiver has a fix."""
 
+POSITION_KEPT = 7.0
+"""Time for which the position counts after the last fix [s] (posRetryTimeNoVel_ms of EKF3)."""
+
 # MAV_SYS_STATUS_SENSOR
 GYROSCOPES, ACCELEROMETERS, MAG, PRESSURE = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 DIFFERENTIAL_PRESSURE, GPS, RC_RECEIVER = 1 << 4, 1 << 5, 1 << 16

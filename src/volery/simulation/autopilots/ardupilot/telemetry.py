@@ -62,7 +62,7 @@ def local_position(vehicle: Vehicle) -> Fields | None:
     if vehicle.uptime() < vehicle.rules.startup.local_position_after:
         return None
     estimate = vehicle.estimate
-    if not estimate.position_ok:
+    if not vehicle.position_ok:
         return None
     x, y, z = estimate.position
     vx, vy, vz = estimate.velocity
@@ -311,7 +311,7 @@ def home_position(vehicle: Vehicle) -> Fields | None:
 
 def origin(vehicle: Vehicle) -> Fields | None:
     """Return GPS_GLOBAL_ORIGIN once the estimator has an origin."""
-    if vehicle.home is None or not vehicle.estimate.position_ok:
+    if vehicle.home is None or not vehicle.position_ok:
         return None
     latitude, longitude, amsl = vehicle.estimate.origin
     return {

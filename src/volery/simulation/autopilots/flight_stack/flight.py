@@ -45,6 +45,7 @@ from volery.simulation.world.environment_models import Terrain, Wind
 from volery.simulation.world.sensors import Measurement, Sigma, declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
     P_CELLS,
+    P_RESISTANCE,
     S_CHARGE,
     S_GUST,
     S_VELOCITY,
@@ -391,9 +392,14 @@ class Flight:
         """Inject or clear a fault: *cells* of the battery give no voltage; at least one always does."""
         self._world.set_input(self._body, P_CELLS, float(max(1, self.spec.battery.cells - cells)))
 
-    def set_full_voltage(self, volts: float) -> None:
-        """Exchange the battery for one of the same charge whose open-circuit voltage, full, is *volts*."""
-        self._world.set_input(self._body, P_CELLS, max(0.0, volts) / cell_voltage(1.0))
+    def set_voltage(self, volts: float | None) -> None:
+        """Inject or clear a fault: the battery has *volts*, whatever it gives; ``None``: its own again."""
+        battery = self.spec.battery
+        cells, resistance = float(battery.cells), battery.resistance_ohm
+        if volts is not None:
+            cells, resistance = max(0.0, volts) / cell_voltage(self.estimate().battery_left), 0.0
+        self._world.set_input(self._body, P_CELLS, cells)
+        self._world.set_input(self._body, P_RESISTANCE, resistance)
 
     def block_barometer(self, blocked: bool = True) -> None:
         """Inject or clear a fault: the barometer gives no new samples."""

@@ -70,6 +70,12 @@ class MissionRules:
     item_done: Callable[[Vehicle, int, MissionItem], None] = _ignore
     act: Callable[[Vehicle, MissionItem], None] = _ignore
     """Execute an item that does not navigate."""
+    action_begins: Callable[[Vehicle, int, MissionItem], None] = _ignore
+    """Called for items that do not navigate: for the first before the next leg begins, for others after."""
+    action_done: Callable[[Vehicle, int, MissionItem], None] = _ignore
+    """Called when they are done."""
+    jumped: Callable[[Vehicle, int, int, int], None] = _ignore
+    """Called with the index of a jump, how often it has been done, and how often it is to be."""
     ended: Callable[[Vehicle], Manoeuvre | None] = _ignore
     """Called at the end; returns what is flown then, or ``None``."""
 
@@ -101,10 +107,13 @@ class FlyMission(Manoeuvre):
         """Index and item of the leg; an upload may replace the mission meanwhile."""
         self._reached_at: Ns | None = None
         self._jumps: dict[int, int] = {}
-        self._held: deque[MissionItem] = deque()
+        self._held: deque[tuple[int, MissionItem]] = deque()
+        self._begun_later: list[tuple[int, MissionItem]] = []
+        """Actions that are reported as begun after the next leg."""
         self._condition_since: Ns = 0
         self._waiting: Brake | None = None
         """What is flown during a pause."""
+        self._first_action = True
         self.started = False
         """Whether the mission may leave the ground: by a start command, or by *leaves_ground*."""
 
@@ -198,14 +207,17 @@ class FlyMission(Manoeuvre):
         vehicle, plan = self.vehicle, self.vehicle.mission
         self._leg = None
         self._held.clear()
+        self._first_action = True
         for _ in range(len(plan) + 100):  # jumps may form a loop without a leg in it
             if index >= len(plan):
                 break
             item = plan[index]
             if item.navigates:
                 self._begin(index, item)
+                self._report_later()
                 return
             index = self._act(index, item)
+        self._report_later()
         plan.complete = True
         if not self._rules.restarts:
             plan.current = 0
@@ -239,21 +251,33 @@ class FlyMission(Manoeuvre):
         """Do an item that does not navigate and return the index of the next."""
         if item.command == JUMP:
             return self._jump(index, item)
+        first, self._first_action = self._first_action, False
+        if first:
+            self._rules.action_begins(self.vehicle, index, item)
+        elif not self._held:
+            self._begun_later.append((index, item))
         if item.is_condition or self._held:
             if not self._held:
                 self._condition_since = self.vehicle.kernel.now()
-            self._held.append(item)
+            self._held.append((index, item))
         else:
             self._do(item)
+            self._rules.action_done(self.vehicle, index, item)
             if self._rules.reports_actions:
                 self._rules.item_done(self.vehicle, index, item)
         return index + 1
+
+    def _report_later(self) -> None:
+        for index, item in self._begun_later:
+            self._rules.action_begins(self.vehicle, index, item)
+        self._begun_later.clear()
 
     def _jump(self, index: int, item: MissionItem) -> int:
         done = self._jumps.get(index, 0)
         if item.param2 != FOREVER and done >= item.param2:
             return index + 1
         self._jumps[index] = done + 1
+        self._rules.jumped(self.vehicle, index, done + 1, round(item.param2))
         return max(self._rules.first_item, round(item.param1))
 
     def _do(self, item: MissionItem) -> None:
@@ -261,13 +285,16 @@ class FlyMission(Manoeuvre):
 
     def _run_held(self) -> None:
         while self._held:
-            item = self._held[0]
+            index, item = self._held[0]
             if item.is_condition and not self._met(item):
                 return
             self._held.popleft()
             self._condition_since = self.vehicle.kernel.now()
             if not item.is_condition or item.command not in (CONDITION_DELAY, CONDITION_DISTANCE):
                 self._do(item)
+            self._rules.action_done(self.vehicle, index, item)
+            if self._held:
+                self._rules.action_begins(self.vehicle, *self._held[0])
 
     def _met(self, item: MissionItem) -> bool:
         if item.command == CONDITION_DELAY:

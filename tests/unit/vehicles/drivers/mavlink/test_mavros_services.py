@@ -28,7 +28,7 @@ from volery.vehicles.rtcm import crc24q
 from volery.vehicles.services import Item
 from volery.vehicles.vehicle_plan import Circle, Plan
 
-KNOWN = {"ardupilot": ("WPNAV_SPEED", "FENCE_ENABLE"), "px4": ("MPC_XY_CRUISE", "GF_ACTION")}
+KNOWN = {"ardupilot": ("WP_SPD", "FENCE_ENABLE"), "px4": ("MPC_XY_CRUISE", "GF_ACTION")}
 
 
 class MavrosStrip(Airstrip):
