@@ -15,6 +15,7 @@ import pytest
 from volery.base.time import MS, S
 from volery.ros.messages import message_class, new
 from volery.ros.messages.bags import create_bag, open_bag
+from volery.ros.messages.containers import Offer
 
 from .conftest import HERE, Ours, Run, Start
 
@@ -154,3 +155,21 @@ def test_the_graph_of_a_roscore(roscore: Any, start: Start, volery: Volery, tmp_
     drawn = (tmp_path / "graph.svg").read_text()
     assert "/chatter" in drawn
     assert "/talker" in drawn
+
+
+def test_what_is_latched_is_played_and_recorded_as_such(
+    ros: Run, start: Start, volery: Volery, tmp_path: Path
+) -> None:
+    """A subscriber that comes late hears what was latched; recorded again it still is, by the same node."""
+    path, again = tmp_path / "latched.bag", tmp_path / "again.bag"
+    with create_bag(path) as made:
+        made.write("/plan", 0, new(STRING, data="once"), Offer(True, "/planner"))
+        made.write("/tick", 30 * S, new(STRING, data="on"), Offer(False, "/planner"))
+    start(*VOLERY, "bag", "play", str(path), "--quiet")
+    assert 'data: "once"' in ros("rostopic", "echo", "-n1", "/plan")
+    told = volery("bag", "record", again, "--topic", "/plan", "--seconds", "5")
+    assert told == {"recorded": {"/plan": 1}, "problems": {}}
+    (connection,) = open_bag(again).connections
+    assert connection.source.offer.latched
+    assert connection.source.offer.sender.startswith("/volery_play")
+    assert "std_msgs/String" in ros("rosbag", "info", "--yaml", str(again))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -192,17 +192,14 @@ def convert(
     bag = open_bag(recording)
     if out.resolve() == recording.resolve():
         raise UsageError(f"{out} is the recording itself; give another name")
-    chosen = set(topics or bag.usual)
-    unknown = chosen - {topic.name for topic in bag.topics}
+    recorded = {topic.name for topic in bag.topics}
+    chosen = set(topics or (one for one in recorded if not one.startswith(OF_THE_RUN)))
+    unknown = chosen - recorded
     if unknown:
         raise UsageError(f"{recording} has no topic {', '.join(sorted(unknown))}")
-    of_the_run = {one for one in bag.unreadable if one.startswith(OF_THE_RUN)}
-    left_out = {
-        topic: why
-        for topic, why in bag.unreadable.items()
-        if (topic in chosen or not topics) and topic not in of_the_run
-    }
-    _note_defects(output, bag, but=of_the_run | left_out.keys())
+    if not bag.complete:
+        output.note(f"{bag.path} is truncated; only its complete part is read")
+    left_out: dict[str, str] = {}
     written = 0
     duration = to_seconds(bag.end - bag.start)
     with create_bag(out) as writer, _progress_bar(output, duration, f"writing {out.name}") as show:
@@ -210,13 +207,13 @@ def convert(
             try:
                 writer.copy(connection, raw.at, raw.data)
             except UsageError as error:
-                left_out.setdefault(raw.source.topic, f"messages that cannot be written: {error}")
+                left_out.setdefault(raw.source.topic, str(error))
                 continue
             written += 1
             show(to_seconds(raw.at - bag.start))
     fields = bag.left_out
     for topic, why in left_out.items():
-        output.note(f"{topic}: left out: {why}")
+        output.note(f"{topic}: messages are left out: {why}")
     for topic, why in fields.items():
         output.note(f"{topic}: fields are left out: {why}")
     _note_damage(output, bag)
@@ -226,12 +223,11 @@ def convert(
     return LEFT_OUT if lost and not allow_loss else OK
 
 
-def _note_defects(output: Output, bag: Bag, but: Collection[str] = ()) -> None:
+def _note_defects(output: Output, bag: Bag) -> None:
     if not bag.complete:
         output.note(f"{bag.path} is truncated; only its complete part is read")
     for topic, why in bag.unreadable.items():
-        if topic not in but:
-            output.note(f"{topic} is left out: {why}")
+        output.note(f"{topic} is left out: {why}")
     _note_damage(output, bag)
 
 

@@ -155,7 +155,8 @@ class Bag:
     def messages(self, topics: Collection[str] | None = None) -> Iterator[BagMessage]:
         """Yield the messages of `topics` (by default of all that can be decoded), in order of time."""
         for connection, raw in self.raw(topics):
-            assert connection.recorded is not None
+            if connection.recorded is None:
+                continue
             try:
                 message = connection.recorded.message(raw.data)
             except (UsageError, RecursionError, *DAMAGE):
@@ -164,13 +165,13 @@ class Bag:
             yield BagMessage(raw.at, raw.source.topic, message)
 
     def raw(self, topics: Collection[str] | None = None) -> Iterator[tuple[BagConnection, RawMessage]]:
-        """Yield the undecoded messages of `topics` and their connections, in order of time."""
+        """Yield the messages of `topics` and their connections, also those that cannot be decoded."""
         known = {one.source: one for one in self.connections}
         for raw in self._raw():
             connection = known.get(raw.source)
             if connection is None:  # only its undamaged part is known
                 connection = known[raw.source] = BagConnection(raw.source, 0, "")
-            if not connection.problem and (topics is None or raw.source.topic in topics):
+            if topics is None or raw.source.topic in topics:
                 yield connection, raw
 
     def note(self, what: str) -> None:
@@ -299,6 +300,7 @@ _METADATA_VERSION: Literal[9] = 9
 
 SENDER = "sender of "
 """Key, before a topic's name, of the custom data of a rosbag 2 that hold the node which ROS 1 recorded."""
+_NO_HASH = f"RIHS01_{'0' * 64}"
 _FOREVER = QosTime(2147483647, 4294967295)
 
 
@@ -367,12 +369,13 @@ class _Writer:
     def copy(self, connection: BagConnection, at: Ns, data: bytes) -> None:
         """Add an undecoded message of another recording."""
         source, recorded = connection.source, connection.recorded
-        if recorded is None:
-            raise UsageError(connection.problem)
         known = self._copied.get(source)
         if known is None:
-            recorded.resolve(data)
-            written = self._copy_of(recorded)
+            if recorded is None:
+                written = self._verbatim(connection)
+            else:
+                recorded.resolve(data)
+                written = self._copy_of(recorded)
             made = self._connect(source.topic, source.type, written, source.offer)
             known = self._copied[source] = made, written.convert
         self._writer.write(known[0], at, known[1](data))
@@ -384,6 +387,10 @@ class _Writer:
     def _copy_of(self, recorded: RecordedType) -> Written:
         """Return how a recorded type is written."""
         raise NotImplementedError
+
+    def _verbatim(self, connection: BagConnection) -> Written:
+        """Return how messages that cannot be decoded are written; raise ``UsageError`` if they cannot be."""
+        raise UsageError(connection.problem)
 
     def _encoded(self, message: Message) -> bytes:
         raise NotImplementedError
@@ -454,6 +461,13 @@ class Rosbag2Writer(_Writer):
         if first is recorded or "ros1" in (first.encoding, recorded.encoding):
             return recorded.for_ros2()
         return recorded.as_other(first)
+
+    def _verbatim(self, connection: BagConnection) -> Written:
+        source = connection.source
+        if source.encoding != "cdr" or source.type.count("/") != 2:
+            raise UsageError(connection.problem)
+        text = source.definition if source.schema == "msg" else ""
+        return Written(text, source.digest or _NO_HASH, bytes)
 
     def _encoded(self, message: Message) -> bytes:
         return to_cdr(message)

@@ -429,6 +429,32 @@ class McapStorage:
 
 
 class _Folder(DirectoryReader):
+    """rosbags' reader of a folder, which drops messages whose connection the metadata states otherwise."""
+
+    def open(self) -> None:
+        """Open the files, and give their connections the QoS and the checksum that the metadata states."""
+        super().open()
+        for storage in self.storages:
+            storage.connections = [self._aligned(one) for one in storage.connections]
+
+    def _aligned(self, stored: Connection) -> Connection:
+        same = [
+            (place, one)
+            for place, one in enumerate(self.connections)
+            if (one.topic, one.msgtype) == (stored.topic, stored.msgtype)
+        ]
+        for _, one in same:
+            if one.ext == stored.ext:
+                return stored._replace(digest=one.digest)
+        if not same:
+            number = max((one.id for one in self.connections), default=0) + 1
+            self.connections.append(stored._replace(id=number, owner=self))
+            return stored
+        place, stated = same[0]
+        if isinstance(stated.ext, ConnectionExtRosbag2) and not stated.ext.offered_qos_profiles:
+            stated = self.connections[place] = stated._replace(ext=stored.ext)
+        return stored._replace(ext=stated.ext, digest=stated.digest)
+
     STORAGE_PLUGINS: Any = MappingProxyType({**DirectoryReader.STORAGE_PLUGINS, "mcap": McapStorage})
 
 

@@ -26,6 +26,7 @@ from volery.ros.messages.encodings import (
 )
 from volery.ros.messages.store import (
     DISTRIBUTIONS,
+    distribution,
     message_class,
     parse_definition,
     store,
@@ -51,30 +52,35 @@ class RecordedType:
 
     Args:
         source: The connection.
-        distribution: ROS 2 distribution that the recording states; for a recording without definitions.
+        stated: ROS 2 distribution that the recording states; for one without definitions.
 
     Raises:
         UsageError: messages of this type cannot be decoded; the text says why.
     """
 
-    def __init__(self, source: Source, distribution: str = "") -> None:
+    def __init__(self, source: Source, stated: str = "") -> None:
         self.name, self.encoding = source.type, source.encoding
         self._source = source
-        self._hint = distribution
+        self._hint = stated
         self.assumed = ""
-        """Whose definition was assumed, if the recording has none and it is not ours."""
+        """Whose definition was assumed, if the recording has none that its messages fit."""
         if source.encoding not in READABLE:
             stated = f"encoded as {source.encoding}" if source.encoding else "of no stated encoding"
             raise UsageError(f"its messages are {stated}; {choices(READABLE)} can be read")
         self._types: Typestore | None = None
+        self._resolved = False
         problem = "not defined in the recording"
-        if source.definition.strip():
+        if source.definition.strip() or (source.schema and not self._is_known):
             try:
                 self._types = _defined(self.name, source.encoding, source.schema, source.definition)
             except (RecursionError, SyntaxError, *DAMAGE) as error:  # classes are made of source code
                 problem += f": {error}"
-        if self._types is None and not any(self.name in one.fielddefs for _, one in self._candidates()):
+        if self._types is None and not self._is_known:
             raise UsageError(f"its type {self.name or '(none)'} is not known and {problem}")
+
+    @property
+    def _is_known(self) -> bool:
+        return any(self.name in one.fielddefs for _, one in self._candidates())
 
     # -- decoding
 
@@ -91,6 +97,8 @@ class RecordedType:
             raise UsageError(f"these {len(data)} bytes are no {self.name} of ROS 1: {error}") from error
 
     def _decoded(self, types: Typestore, data: bytes) -> Any:
+        if types is store():
+            message_class(self.name)  # before rosbags compiles its own class into the decoder
         decode = bounded(types, len(data))
         try:
             if self.encoding == "ros1":
@@ -126,8 +134,11 @@ class RecordedType:
 
     def differences(self) -> str:
         """Describe what was read by another definition than ours; empty if nothing was."""
-        parts = [f"the fields of {self.assumed}, as the recording has no definition"] if self.assumed else []
         made: Conversion | None = self.__dict__.get("to_ours")
+        parts = []
+        if self.assumed and (self._source.definition or (made is not None and not made.same_bytes)):
+            why = "does not fit" if self._source.definition else "is not in the recording"
+            parts.append(f"the fields of {self.assumed}, as its definition {why}")
         if made is not None and not made.same_bytes:
             if not self.assumed:
                 parts.append("its definition in the recording")
@@ -193,17 +204,23 @@ class RecordedType:
         self._types_for(data)
 
     def _types_for(self, data: bytes) -> Typestore:
-        """Return the store with the definition; one that is not recorded is the first that `data` fits."""
-        if self._types is None:
-            for label, types in self._candidates():
-                if self.name in types.fielddefs and self._fits(types, data):
-                    self._types, self.assumed = types, label
-                    break
-            else:
-                self._types = self._known
-            for made in ("to_ours", "to_noetic", "_noetic_types"):
-                self.__dict__.pop(made, None)
-        return self._types
+        """Return the store with the definition.
+
+        If none is recorded, or one that the first message does not fit, it is the first that this fits.
+        """
+        if not self._resolved:
+            self._resolved = True
+            if self._types is None or not self._fits(self._types, data):
+                self._assume(data)
+        return self._known
+
+    def _assume(self, data: bytes) -> None:
+        for label, types in self._candidates():
+            if self.name in types.fielddefs and self._fits(types, data):
+                self._types, self.assumed = types, label or distribution().capitalize()
+                for made in ("to_ours", "to_noetic", "_noetic_types"):
+                    self.__dict__.pop(made, None)
+                return
 
     def _fits(self, types: Typestore, data: bytes) -> bool:
         try:

@@ -27,7 +27,7 @@ from volery.base.errors import UsageError
 from volery.cli.main import application
 from volery.ros.messages.bags import create_bag, open_bag, qos_profile
 from volery.ros.messages.containers import Offer
-from volery.ros.messages.store import new
+from volery.ros.messages.store import distribution, new
 
 MARKER, STATE, RANGE = "visualization_msgs/msg/Marker", "mavros_msgs/msg/State", "sensor_msgs/msg/Range"
 
@@ -149,7 +149,7 @@ def test_a_recording_of_foxy_in_both_storages(tmp_path: Path, plugin: StoragePlu
     bag = open_bag(path)
     assert [(one.message.id, one.message.text) for one in bag.messages()] == [(n, "here") for n in range(3)]
     if plugin == StoragePlugin.SQLITE3:
-        assert "the fields of Galactic, as the recording has no definition" in bag.differences[0]
+        assert "the fields of Galactic, as its definition is not in the recording" in bag.differences[0]
     assert converted(path, tmp_path / "b")[1]["written"] == 3
     assert [one.id for one in read_by_rosbags(tmp_path / "b")] == [0, 1, 2]
 
@@ -410,3 +410,57 @@ def test_a_value_that_does_not_fit_the_other_definition_is_named(tmp_path: Path)
         convert(made(wide, "a/msg/B", n=300))
     with pytest.raises(UsageError, match=r"a/msg/B\.m: .* does not fit: not all of them are uint8"):
         convert(made(wide, "a/msg/B", m=np.array([300], np.uint16)))
+
+
+def test_a_folder_whose_metadata_states_other_qos_than_its_file(tmp_path: Path) -> None:
+    """As ROS 2's own test bags; rosbags drops the messages of such a connection."""
+    path = tmp_path / "a"
+    with create_bag(path) as writer:
+        writer.write("/n", 1, new("std_msgs/Int32", data=5), Offer(True, "", (LATCHED,)))
+        writer.write("/m", 2, new("std_msgs/Int32", data=6), Offer(False, "", (UNRELIABLE,)))
+    metadata = path / "metadata.yaml"
+    lines = metadata.read_text().replace("reliability: best_effort", "reliability: reliable").splitlines()
+    metadata.write_text("\n".join(lines))
+    bag = open_bag(path)
+    assert [one.message.data for one in bag.messages()] == [5, 6]
+
+
+def test_a_definition_without_text_is_that_of_a_type_without_fields(tmp_path: Path) -> None:
+    def fill(writer: McapWriter) -> None:
+        schema = writer.register_schema("void_msgs/msg/Nothing", "ros2msg", b"")
+        writer.add_message(writer.register_channel("/e", "cdr", schema), 1, b"\0\1\0\0\0", 1)
+
+    path = mcap(tmp_path / "a.mcap", "ros2", fill)
+    (read,) = open_bag(path).messages()
+    assert read.message.__msgtype__ == "void_msgs/msg/Nothing"
+    assert converted(path, tmp_path / "b")[0] == 0
+
+
+def test_a_definition_that_does_not_fit_its_messages_gives_way_to_one_that_does(tmp_path: Path) -> None:
+    def fill(writer: McapWriter) -> None:
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"uint8 level\n")
+        data = b"\0\1\0\0\7\0\0\0a word\0"
+        writer.add_message(writer.register_channel("/s", "cdr", schema), 1, data, 1)
+
+    bag = open_bag(mcap(tmp_path / "a.mcap", "ros2", fill))
+    assert [one.message.data for one in bag.messages()] == ["a word"]
+    assert bag.differences == [
+        f"std_msgs/msg/String is read by the fields of {distribution().capitalize()}, "
+        "as its definition does not fit"
+    ]
+
+
+def test_messages_that_cannot_be_decoded_are_copied_within_ros2(tmp_path: Path) -> None:
+    """Events of services are defined by the text of the service."""
+    name, data = "demo_msgs/srv/Add_Event", b"\0\1\0\0anything"
+
+    def fill(writer: McapWriter) -> None:
+        schema = writer.register_schema(name, "ros2msg", b"int64 a\n---\nint64 sum\n")
+        writer.add_message(writer.register_channel("/add/_service_event", "cdr", schema), 1, data, 1)
+
+    path = mcap(tmp_path / "a.mcap", "ros2", fill)
+    assert "Add_Event is not known" in open_bag(path).unreadable["/add/_service_event"]
+    assert converted(path, tmp_path / "b")[:2] == (0, {"written": 1, "left_out": {}, "fields_left_out": {}})
+    ((connection, raw),) = open_bag(tmp_path / "b").raw()
+    assert (connection.source.type, raw.data) == (name, data)
+    assert converted(path, tmp_path / "c.bag")[0] == 3
