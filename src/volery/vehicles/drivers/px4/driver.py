@@ -26,7 +26,7 @@ from math import isfinite, nan
 
 from volery.base.errors import Refused, UsageError, VehicleError
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
-from volery.base.time import MINUTE, MS, Ns, S
+from volery.base.time import MINUTE, MS, Ns, S, from_seconds
 from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant
 from volery.vehicles.driver import (
@@ -162,6 +162,19 @@ class PX4(MavlinkDriver):
             climb,
             self._reposition_step(f"rise to {height:g} m", level, LEVELLED_WITHIN),
         )
+
+    def arm(self) -> Sequence[Step]:
+        """Arm when PX4 has forgotten sticks that ended: counted at arming, their loss is one in flight."""
+        parameters = self._backend.parameters or {}
+        lost_after = from_seconds(parameters.get("COM_RC_LOSS_T", 0.5))
+        wait = Step(
+            ask="have the last sticks forgotten",
+            send=send_nothing,
+            done=lambda _: self._manual.forgotten(lost_after),
+            within=lost_after + 5 * S,
+            skippable=True,
+        )
+        return (wait, *super().arm())
 
     def _armed_in_hold(self) -> Sequence[Step]:
         """Return steps that arm in Hold; a pilot who changes the mode meanwhile has control."""
@@ -467,7 +480,10 @@ class PX4(MavlinkDriver):
         if not self.telemetry.armed:
             return ()
         centre = self._end_manual_control()
-        return (*centre, self._change_mode(mode), disarmed_step(ask, mode, within))
+        enter = self._change_mode(mode)
+        # a drone that disarms meanwhile is down already, and PX4 leaves the mode at once
+        entered = replace(enter, done=lambda seen: not seen.armed or enter.done(seen))
+        return (*centre, entered, disarmed_step(ask, mode, within))
 
 
 def mission_items(mission: Sequence[MissionItem], here: Position) -> list[Item]:

@@ -195,6 +195,10 @@ later.
 """
 
 
+FORGOTTEN_AFTER: Ns = 500 * MS
+"""Time that PX4 takes to notice the loss of manual control, beyond COM_RC_LOSS_T."""
+
+
 class ManualControlStream:
     """Stream of manual control, which PX4 needs more than twice a second (COM_RC_LOSS_T).
 
@@ -213,6 +217,7 @@ class ManualControlStream:
         self._mode_before = ""
         self._centred_at: Ns = 0
         self._began_at: Ns = 0
+        self._ended_at: Ns | None = None
         self._timer: Handle | None = None
 
     def note_commanded(self, mode: str) -> None:
@@ -225,6 +230,7 @@ class ManualControlStream:
         """Send *control* at once and repeat it."""
         if self.held is None:
             self._began_at = self._kernel.now()
+        self._ended_at = None
         self.held = control
         self._send()
         if self._timer is None and self._backend.cycle is None and self.held is not None:
@@ -259,7 +265,13 @@ class ManualControlStream:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
+        if self.held is not None:
+            self._ended_at = self._kernel.now()
         self.held = None
+
+    def forgotten(self, lost_after: Ns) -> bool:
+        """Return whether PX4 no longer counts the stream, which it does for *lost_after* after its end."""
+        return self._ended_at is None or self._kernel.now() - self._ended_at >= lost_after + FORGOTTEN_AFTER
 
     @property
     def _centre(self) -> ManualControl:

@@ -14,7 +14,7 @@ import pytest
 from rigs import scripted
 from rigs.bench import Bench
 from rigs.scripted import ACCEPTED, ASK, GET_HOME, INTERVAL, STREAMED, Scripted
-from volery.base.time import MS, S
+from volery.base.time import MS, S, from_seconds
 from volery.links.frame import Frame
 from volery.vehicles.drivers.px4 import open_driver
 from volery.vehicles.drivers.px4.events import event_id
@@ -53,6 +53,7 @@ class FakePx4(Scripted):
     version: int = 17694975
     mission_state: int = 0
     intended: str = HOLD
+    sticks_at_arming: list[bool] = field(default_factory=list)
 
     home = HOME
     metres = (1.1113e-2, 0.7812e-2)
@@ -111,7 +112,7 @@ class FakePx4(Scripted):
     # -- living
 
     def _sticks_come(self) -> bool:
-        return self.kernel.now() - self.sticks_at < S // 2
+        return self.kernel.now() - self.sticks_at < from_seconds(self.parameters.get("COM_RC_LOSS_T", 0.5))
 
     def _streamed(self) -> bool:
         return self.kernel.now() - self.streamed_at < LOST_AFTER
@@ -206,6 +207,7 @@ class FakePx4(Scripted):
             return ACCEPTED
         if not craft.healthy or (craft.mode in MANUAL_MODES and not self._sticks_come()):
             return REJECTED
+        self.sticks_at_arming.append(self._sticks_come())
         craft.armed, craft.status = True, 4
         return ACCEPTED
 

@@ -414,6 +414,35 @@ def test_stabilized_flight_without_a_position(bench: Make) -> None:
     assert {"x": 200, "z": 600} in [{"x": f["x"], "z": f["z"]} for f in at.autopilot.sent(STICKS)]
 
 
+def test_ended_sticks_are_forgotten_before_it_arms_again(bench: Make) -> None:
+    at = bench()
+    at.autopilot.parameters["COM_RC_LOSS_T"] = 2.0
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.manual_control(1.0, 0, 0.5, 0)
+        drone.altitude_hold()
+        drone.come_to_rest()  # the sticks go on until it is down
+        drone.come_to_rest()
+        drone.takeoff(5)
+
+    at.fly(mission)
+    assert at.autopilot.sticks_at_arming == [False, False]
+
+
+def test_land_ends_when_it_disarms_before_the_mode_changes(bench: Make) -> None:
+    at = bench()
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        at.autopilot.ignore.add(SET_MODE)
+        at.kernel.call_at(at.kernel.now() + S, lambda: at.autopilot.down(HOLD))
+        drone.land()
+
+    at.fly(mission)
+    assert not at.craft.armed
+
+
 def test_sticks_are_centred_before_a_mode_that_flies_by_itself_and_then_go_on(bench: Make) -> None:
     at = bench()
 
