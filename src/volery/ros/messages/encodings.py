@@ -317,13 +317,13 @@ def cdr_to_ros1(name: str, data: bytes) -> bytes:
 
 def ros1_to_cdr(full: str, data: bytes | memoryview) -> bytes:
     """Convert ROS 1 bytes with the fields of our type `full` to CDR's; ``SerdeError`` if they are none."""
+    message_class(full)  # before rosbags compiles its own class into the decoder
     return bytes(_types_for(full, len(data)).ros1_to_cdr(data, full))
 
 
 def from_ros1(name: str, data: bytes | memoryview) -> Any:
     """Decode ROS 1 bytes as a message of type `name`; raise ``UsageError`` if they are no such message."""
     full = message_name(name)
-    message_class(full)
     convert = _from_noetic(full)
     try:
         if convert.same_bytes:
