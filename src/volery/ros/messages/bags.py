@@ -368,17 +368,25 @@ class _Writer:
 
     def copy(self, connection: BagConnection, at: Ns, data: bytes) -> None:
         """Add an undecoded message of another recording."""
+        try:
+            made, convert = self._copied.get(connection.source) or self._begin_copy(connection, data)
+            encoded = convert(data)
+        except (RecursionError, *DAMAGE) as error:
+            raise UsageError(f"they do not fit their type {connection.source.type}: {error}") from error
+        self._writer.write(made, at, encoded)
+
+    def _begin_copy(
+        self, connection: BagConnection, data: bytes
+    ) -> tuple[Connection, Callable[[bytes], bytes]]:
         source, recorded = connection.source, connection.recorded
-        known = self._copied.get(source)
-        if known is None:
-            if recorded is None:
-                written = self._verbatim(connection)
-            else:
-                recorded.resolve(data)
-                written = self._copy_of(recorded)
-            made = self._connect(source.topic, source.type, written, source.offer)
-            known = self._copied[source] = made, written.convert
-        self._writer.write(known[0], at, known[1](data))
+        if recorded is None:
+            written = self._verbatim(connection)
+        else:
+            recorded.resolve(data)
+            written = self._copy_of(recorded)
+        made = self._connect(source.topic, source.type, written, source.offer), written.convert
+        self._copied[source] = made
+        return made
 
     def _written(self, name: str) -> Written:
         """Return definition and checksum of one of our types."""

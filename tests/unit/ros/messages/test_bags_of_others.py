@@ -464,3 +464,16 @@ def test_messages_that_cannot_be_decoded_are_copied_within_ros2(tmp_path: Path) 
     ((connection, raw),) = open_bag(tmp_path / "b").raw()
     assert (connection.source.type, raw.data) == (name, data)
     assert converted(path, tmp_path / "c.bag")[0] == 3
+
+
+def test_messages_that_do_not_fit_their_type_are_named_and_cost_the_status(tmp_path: Path) -> None:
+    noetic = get_typestore(Stores.ROS1_NOETIC)
+    path = tmp_path / "a.bag"
+    with Writer1(path) as writer:
+        connection = writer.add_connection("/s", "std_msgs/msg/String", typestore=noetic)
+        for number, data in enumerate((b"\2\0\0\0ab", b"\xff\xff\xff\x7fab", b"\2\0\0\0cd")):
+            writer.write(connection, number, data)
+    status, result, notes = converted(path, tmp_path / "b")
+    assert (status, result["written"]) == (3, 2)
+    assert "/s: messages are left out: " in notes
+    assert [one.data for one in read_by_rosbags(tmp_path / "b")] == ["ab", "cd"]
