@@ -51,6 +51,24 @@ def write_text(path: Path, text: str) -> None:
             rest = rest[file.write(rest) :]
 
 
+def replace_text(path: Path, text: str) -> None:
+    """Write *text* as UTF-8 in the place of the file *path*, which stays as it is if that fails.
+
+    A device or a pipe is written to. Raises ``OSError`` as ``create_file`` does.
+    """
+    if path.exists() and not path.is_file():
+        path.write_text(text, encoding="utf-8")
+        return
+    part = path.with_name(f".{path.name}.part")
+    try:
+        write_text(part, text)
+        part.replace(path)
+    except OSError:
+        with suppress(OSError):
+            part.unlink()
+        raise
+
+
 def read_text(path: Path) -> str:
     """Return the text of a regular file in UTF-8.
 

@@ -22,14 +22,14 @@ from volery.bridge.node_interface import (
     stamped,
 )
 from volery.links.frame import Frame
-from volery.links.mavlink_messages import mission_type
+from volery.links.mavlink_messages import item_scale, mission_type
 from volery.ros.messages import new, service
 
 ANSWERED_WITHIN: Ns = 1500 * MS
 ATTEMPTS = 3
+REPORTS = 5
+"""Reports of the current item that may still state the one before."""
 ACCEPTED = 0
-GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})
-"""MAV_FRAMEs with latitude and longitude."""
 _ITEM_PARAMETERS = ("param1", "param2", "param3", "param4")
 _LIST = "mavros_msgs/msg/WaypointList"
 
@@ -56,14 +56,9 @@ PLAN_TOPICS = (
 )
 
 
-def _scale(frame: int) -> float:
-    """Return the units of x and y of a MISSION_ITEM_INT per degree or metre."""
-    return 1e7 if frame in GLOBAL_FRAMES else 1e4
-
-
 def to_item(waypoint: Any, sequence: int, kind: int = MISSION.kind) -> dict[str, Any]:
     """Return a waypoint as the fields of a MISSION_ITEM_INT."""
-    scale = _scale(waypoint.frame)
+    scale = item_scale(waypoint.command, waypoint.frame)
     return {
         "seq": sequence,
         "frame": waypoint.frame,
@@ -80,7 +75,7 @@ def to_item(waypoint: Any, sequence: int, kind: int = MISSION.kind) -> dict[str,
 
 def to_waypoint(item: dict[str, Any]) -> Any:
     """Return the fields of a MISSION_ITEM_INT as a waypoint."""
-    scale = _scale(item["frame"])
+    scale = item_scale(item["command"], item["frame"])
     return new(
         "mavros_msgs/msg/Waypoint",
         frame=item["frame"],
@@ -209,14 +204,25 @@ class MissionServices(PlanServices):
         message = new("mavros_msgs/msg/WaypointReached", header=stamped(at), wp_seq=fields["seq"])
         self._publish("mission/reached", message)
 
+    def publish_list(self, waypoints: list[Any]) -> None:
+        """Publish the list as it is on board, with the current item marked."""
+        for sequence, waypoint in enumerate(waypoints):
+            waypoint.is_current = sequence == self.current
+        super().publish_list(waypoints)
+
     def _update_current(self, fields: Fields, at: Ns) -> None:
         changed, self.current = fields["seq"] != self.current, fields["seq"]
         if changed and self.waypoints:
             self.publish_list(self.waypoints)
 
     def set_current(self, request: Any) -> Any:
-        """Handle ``mission/set_current``."""
+        """Handle ``mission/set_current``: success is that the autopilot reports the item as current."""
+        wanted = {"seq": request.wp_seq}
         with self._link.subscribe("MISSION_CURRENT") as answers:
-            answer = self._request(answers, "MISSION_SET_CURRENT", {"seq": request.wp_seq})
+            answer = self._request(answers, "MISSION_SET_CURRENT", wanted)
+            for _ in range(REPORTS):  # those under way when it was asked state the item before
+                if answer is None or answer.fields["seq"] == request.wp_seq:
+                    break
+                answer = answers.next(ANSWERED_WITHIN)
         succeeded = answer is not None and answer.fields["seq"] == request.wp_seq
         return service("mavros_msgs/srv/WaypointSetCurrent").response(succeeded)

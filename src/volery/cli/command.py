@@ -145,6 +145,9 @@ def exit_status(output: Output, command: Callable[[], int]) -> int:
         if missing is not None:
             output.complain(f"volery: {missing}")
             return BAD_INPUT
+        if isinstance(error, OSError) and error.errno in NO_ROOM:
+            output.complain(f"volery: {error.filename or 'a file'} cannot be written: {error.strerror}")
+            return FAILED
         output.complain(
             f"volery: internal error: {type(error).__name__}: {error}\n"
             "  --debug shows where. Please report it together with the command."

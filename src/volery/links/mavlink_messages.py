@@ -537,3 +537,31 @@ class MessageStreams:
             self._handles[period] = self._kernel.every(period, lambda: self._send(period, first))
 
         self._handles[period] = self._kernel.call_at(now + period - (now - first) % period, begin)
+
+
+# -- x and y of mission items
+
+GLOBAL_FRAMES = frozenset({0, 3, 5, 6, 10, 11})
+"""MAV_FRAMEs with latitude and longitude."""
+_NO_PLACE_FRAME = 2
+"""MAV_FRAME_MISSION."""
+_PER_DEGREE, _PER_METRE = 10_000_000, 10_000
+
+
+@cache
+def item_scale(command: int, frame: int) -> int:
+    """Return the units of x and y of a MISSION_ITEM_INT per unit of parameters 5 and 6.
+
+    Latitude and longitude are sent in 1e-7 degrees, local coordinates in 1e-4 m. A command without a place,
+    by ``hasLocation`` of MAVLink's definitions, or in MAV_FRAME_MISSION has other parameters there, which are
+    sent as they are. A command that the definitions do not have counts as one with a place.
+    """
+    entry = dialect.enums["MAV_CMD"].get(command)
+    if frame == _NO_PLACE_FRAME or (entry is not None and not getattr(entry, "has_location", True)):
+        return 1
+    return _PER_DEGREE if frame in GLOBAL_FRAMES else _PER_METRE
+
+
+def has_global_place(command: int, frame: int) -> bool:
+    """Return whether parameters 5 and 6 of an item are latitude and longitude."""
+    return item_scale(command, frame) == _PER_DEGREE

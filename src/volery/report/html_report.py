@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, get_args
 from rich.console import RenderableType
 
 from volery.base.errors import UsageError
-from volery.base.files import write_text
+from volery.base.files import read_text, write_text
 from volery.base.installed import require_extra
 from volery.report.comparison import all_comparisons
 from volery.report.digest import Digest, Json
@@ -438,15 +438,29 @@ class Recovered(NamedTuple):
     lost: str
 
 
+def _is_cut(file: Path) -> bool:
+    """Return whether a file is not even JSON: a full disk has cut it off."""
+    try:
+        json.loads(read_text(file))
+    except ValueError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
 def recover(folder: Path) -> Recovered:
     """Write ``report.html``, and ``run.json`` and ``timeline.json`` if the run did not write them.
 
-    A recovered record has no wall time and no versions, since the trace does not contain them. Raises
-    ``UsageError`` as ``gather`` does.
+    A recovered record has no wall time and no versions, since the trace does not contain them. A ``run.json``
+    that was cut off counts as none. Raises ``UsageError`` as ``gather`` does.
     """
-    if (folder / RUN_FILE).exists():
+    cut = (folder / RUN_FILE).exists() and (folder / TRACE_FILE).exists() and _is_cut(folder / RUN_FILE)
+    if (folder / RUN_FILE).exists() and not cut:
         material = gather(folder)
     else:
+        if cut:
+            (folder / RUN_FILE).unlink()
         with Reading(folder / TRACE_FILE):
             pass  # raises before a file is made
         timeline = TimelineWriter(folder / TIMELINE_FILE)

@@ -12,7 +12,7 @@ from typing import Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from volery.base.errors import UsageError
-from volery.base.files import write_text
+from volery.base.files import replace_text
 
 RUN_SCHEMA: Final = "volery-run/1"
 RUN_FILE = "run.json"
@@ -233,7 +233,7 @@ def write_record(record: RunRecord, folder: Path) -> Path:
     """
     path = folder / RUN_FILE
     try:
-        write_text(path, record.model_dump_json(by_alias=True, indent=2) + "\n")
+        replace_text(path, record.model_dump_json(by_alias=True, indent=2) + "\n")
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
     return path

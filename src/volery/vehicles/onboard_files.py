@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import BinaryIO
 
 from volery.base.errors import Refused, UsageError
 from volery.vehicles.services import FileEntry, FileSystem
@@ -63,8 +65,21 @@ def check_absent(file: str | Path) -> None:
         raise UsageError(f"{file} exists; choose another name")
 
 
+OVERLAP = 64
+"""Bytes that are read again, to find out whether an earlier transfer was of the same file."""
+
+
+def _is_beginning(stream: BinaryIO, have: int, size: int, read: Callable[[int], bytes]) -> bool:
+    """Return whether the last of *have* bytes of *stream* are those of the file that *read* reads."""
+    if have > size:
+        return False
+    start = max(0, have - OVERLAP)
+    stream.seek(start)
+    return read(start)[: have - start] == stream.read()
+
+
 def write_parts(file: str | Path, size: int, read: Callable[[int], bytes], show: Show | None) -> Path:
-    """Write what *read* returns from each place on, and go on where an earlier call was ended.
+    """Write what *read* returns from each place on, and go on where an earlier call for it was ended.
 
     Args:
         file: path of the file, which may not exist; until it is whole it ends in ``.part``.
@@ -78,9 +93,9 @@ def write_parts(file: str | Path, size: int, read: Callable[[int], bytes], show:
     check_absent(file)
     path, part = Path(file), Path(f"{file}.part")
     try:
-        have = part.stat().st_size if part.exists() else 0
-        with part.open("ab") as stream:
-            if have > size:  # of another file, or of one that was erased since
+        with part.open("a+b") as stream:
+            have = stream.seek(0, os.SEEK_END)
+            if have and not _is_beginning(stream, have, size, read):  # of another file
                 have = 0
                 stream.truncate(0)
             while have < size:

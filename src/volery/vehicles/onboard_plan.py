@@ -6,15 +6,20 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 
 from volery.base.errors import Refused, UsageError, choices
-from volery.base.position import AMSL, AboveHome, Position
-from volery.links.mavlink_messages import constant
+from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
+from volery.links.mavlink_messages import constant, has_global_place
 from volery.vehicles.limits import Fence as ClientFence
 from volery.vehicles.services import FENCE, MISSION, RALLY, Item, Services
 from volery.vehicles.telemetry import Telemetry
 from volery.vehicles.vehicle_plan import (
+    AUTOPILOTS,
     DO_JUMP,
+    GROUND_ROVER,
+    QUADROTOR,
     Plan,
     areas_of,
+    breach_return_items,
+    breach_return_place,
     fence_areas,
     fence_items,
     rally_items,
@@ -26,6 +31,7 @@ _WAYPOINT = constant("MAV_CMD_NAV_WAYPOINT")
 _LAST_NAVIGATION = 95
 """MAV_CMD_NAV_LAST: commands up to it lead to a place."""
 _ABSOLUTE = (constant("MAV_FRAME_GLOBAL"), constant("MAV_FRAME_GLOBAL_INT"))
+_TERRAIN = (constant("MAV_FRAME_GLOBAL_TERRAIN_ALT"), constant("MAV_FRAME_GLOBAL_TERRAIN_ALT_INT"))
 _HOME = Item(_WAYPOINT, 0, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0)
 """Item 0 of an ArduPilot, which it fills in itself."""
 
@@ -53,12 +59,12 @@ class OnboardPlan:
         An empty part clears that list. The mission then begins with ``start_mission()``.
 
         Args:
-            plan: the plan, or a ``.plan`` file of QGroundControl.
+            plan: the plan, or a ``.plan`` or ``QGC WPL 110`` file of a ground station.
             only: parts to replace: ``mission``, ``fence``, ``rally``.
 
         Raises:
             UsageError: the file is no plan.
-            OutOfBounds: the mission violates limits or fence.
+            OutOfBounds: the mission or a rally point violates limits or fence.
             CapabilityError: the autopilot keeps no such list.
             Refused: the autopilot refuses an item.
         """
@@ -68,8 +74,10 @@ class OnboardPlan:
             self._check_places(found)
             self._upload_mission(found.mission)
         if "fence" in parts:
-            self._services.upload_items(FENCE, fence_items(found.fence))
+            areas = [*fence_items(found.fence), *breach_return_items(found.breach_return)]
+            self._services.upload_items(FENCE, areas)
         if "rally" in parts:
+            self._check_rally(found)
             self._services.upload_items(RALLY, rally_items(found.rally))
         return found
 
@@ -83,10 +91,19 @@ class OnboardPlan:
     def download(self, only: Collection[str] = PARTS) -> Plan:
         """Return what is on board; parts that are not asked for are empty."""
         parts = _checked(only)
-        mission = self._download_mission() if "mission" in parts else ()
-        areas = fence_areas(self._services.download_items(FENCE)) if "fence" in parts else ()
+        seen = self._telemetry
+        mission, home = self._download_mission() if "mission" in parts else ((), None)
+        areas = self._services.download_items(FENCE) if "fence" in parts else []
         places = rally_places(self._services.download_items(RALLY)) if "rally" in parts else ()
-        return Plan(mission, areas, places, self._telemetry.home)
+        return Plan(
+            mission,
+            fence_areas(areas),
+            places,
+            home or seen.home,
+            breach_return_place(areas),
+            AUTOPILOTS.get(seen.autopilot, 0),
+            GROUND_ROVER if seen.kind == "rover" else QUADROTOR,
+        )
 
     def clear(self, only: Collection[str] = PARTS) -> None:
         """Delete what is on board."""
@@ -100,26 +117,45 @@ class OnboardPlan:
         home = [_HOME] if self._services.home_first and items else []
         self._services.upload_items(MISSION, [*home, *numbered])
 
-    def _download_mission(self) -> tuple[Item, ...]:
+    def _download_mission(self) -> tuple[tuple[Item, ...], Position | None]:
+        """Return the mission, and home where the list begins with it."""
         first = 1 if self._services.home_first else 0
-        items = self._services.download_items(MISSION)[first:]
-        return tuple(_jump_moved(item, 1 - first) for item in items)
+        items = self._services.download_items(MISSION)
+        home = None
+        if first and items and (items[0].latitude or items[0].longitude):
+            home = Position(items[0].latitude, items[0].longitude, AMSL(items[0].z))
+        return tuple(_jump_moved(item, 1 - first) for item in items[first:]), home
 
     def _check_places(self, plan: Plan) -> None:
-        if self._telemetry.position is None or self._telemetry.home is None:
-            if any(item.latitude or item.longitude for item in plan.mission):
-                raise Refused(
-                    self._telemetry.name,
-                    "upload a mission",
-                    "its position is not known, so limits and fence cannot be checked; wait_ready() first",
-                )
-            return
-        for number, item in enumerate(plan.mission, 1):
-            if item.command > _LAST_NAVIGATION or not (item.latitude or item.longitude):
-                continue
-            absolute = item.frame in _ABSOLUTE
-            altitude = AMSL(item.z) if absolute else AboveHome(item.z)
-            self._check(f"mission item {number}", Position(item.latitude, item.longitude, altitude))
+        places = [
+            (f"mission item {number}", Position(item.latitude, item.longitude, _altitude(item)))
+            for number, item in enumerate(plan.mission, 1)
+            if item.command <= _LAST_NAVIGATION
+            and has_global_place(item.command, item.frame)
+            and (item.latitude or item.longitude)
+        ]
+        self._check_all("upload a mission", places)
+
+    def _check_rally(self, plan: Plan) -> None:
+        places = [(f"rally point {number}", place) for number, place in enumerate(plan.rally, 1)]
+        self._check_all("upload rally points", places)
+
+    def _check_all(self, asked: str, places: list[tuple[str, Position]]) -> None:
+        """Check places against limits and fence, which count from home."""
+        if places and (self._telemetry.position is None or self._telemetry.home is None):
+            raise Refused(
+                self._telemetry.name,
+                asked,
+                "its position is not known, so limits and fence cannot be checked; wait_ready() first",
+            )
+        for what, place in places:
+            self._check(what, place)
+
+
+def _altitude(item: Item) -> Altitude:
+    if item.frame in _TERRAIN:
+        return AboveGround(item.z)
+    return AMSL(item.z) if item.frame in _ABSOLUTE else AboveHome(item.z)
 
 
 def _checked(only: Collection[str]) -> Collection[str]:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from volery.base.errors import UsageError, VehicleError
+from volery.base.files import replace_text
 from volery.vehicles.limits import is_number
 from volery.vehicles.services import Parameter, Services
 
@@ -91,7 +92,7 @@ class Parameters:
         found = self._services.read_parameters()
         text = _qgc_text(found, self._system) if path.suffix == QGC else _plain_text(found)
         try:
-            path.write_text(text, encoding="utf-8")
+            replace_text(path, text)
         except OSError as error:
             raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
         return len(found)

@@ -1,7 +1,8 @@
 """A plan: mission, geofence and rally points, as QGroundControl keeps them in a ``.plan`` file.
 
 The items of the mission are MAVLink's own, so that a plan goes through unchanged whatever it contains. Item
-numbers in jumps count as in the file, from 1.
+numbers in jumps count from 1, in the order of the items; a file states the ``doJumpId`` of an item instead.
+The text files of Mission Planner and MAVProxy (``QGC WPL 110``), which hold a mission only, are read, too.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from volery.base.errors import UsageError
+from volery.base.files import replace_text
 from volery.base.position import AMSL, AboveHome, Position
-from volery.links.mavlink_messages import constant
+from volery.links.mavlink_messages import constant, has_global_place, item_scale
 from volery.vehicles.limits import Fence as ClientFence
 from volery.vehicles.limits import Zone
 from volery.vehicles.services import Item
@@ -27,11 +29,21 @@ _POLYGON_IN = constant("MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION")
 _POLYGON_OUT = constant("MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION")
 _CIRCLE_IN = constant("MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION")
 _CIRCLE_OUT = constant("MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION")
+_BREACH_RETURN = constant("MAV_CMD_NAV_FENCE_RETURN_POINT")
 _RALLY = constant("MAV_CMD_NAV_RALLY_POINT")
+_WAYPOINT = constant("MAV_CMD_NAV_WAYPOINT")
 _NO_PARAMETERS = (0.0, 0.0, 0.0, 0.0)
 
-_ARDUPILOT, _PX4 = 3, 12
-"""MAV_AUTOPILOT in a file."""
+AUTOPILOTS: Mapping[str, int] = {"ArduPilot": 3, "PX4": 12}
+"""MAV_AUTOPILOT in a file, by the name in telemetry."""
+QUADROTOR, GROUND_ROVER = 2, 10
+"""MAV_TYPE in a file."""
+VERSION, PART_VERSION = 1, 2
+"""Versions of a file, and of its mission, geofence and rally points, that are read and written."""
+_ALTITUDE_MODES: Mapping[int, int] = {0: 2, 3: 1, 5: 2, 6: 1, 10: 4, 11: 4}
+"""MAV_FRAME to QGroundControl's mode of altitude: 1 above home, 2 AMSL, 4 above terrain."""
+_WPL = "QGC WPL 110"
+_LARGEST_COMMAND, _LARGEST_FRAME = 65_535, 255
 
 Corner = tuple[float, float]
 
@@ -76,21 +88,29 @@ class Plan:
         fence: areas to stay in and to keep out of.
         rally: places to return to instead of home; altitudes above home.
         home: planned home (AMSL), for the file; an autopilot sets its own.
+        breach_return: place to return to when the geofence is breached, above home; ``None`` for home.
+        autopilot: MAV_AUTOPILOT that the file is for.
+        vehicle: MAV_TYPE that the file is for.
     """
 
     mission: tuple[Item, ...] = ()
     fence: tuple[Area, ...] = ()
     rally: tuple[Position, ...] = ()
     home: Position | None = None
+    breach_return: Position | None = None
+    autopilot: int = AUTOPILOTS["PX4"]
+    vehicle: int = QUADROTOR
 
     def __post_init__(self) -> None:
-        for place in self.rally:
+        for place in (*self.rally, *((self.breach_return,) if self.breach_return else ())):
             if not isinstance(place.altitude, AboveHome):
-                raise UsageError(f"rally point {place}: its altitude is AboveHome(...)")
+                raise UsageError(f"rally point or place of return {place}: its altitude is AboveHome(...)")
+        for number, item in enumerate(self.mission, 1):
+            _check_item(item, number)
 
     @classmethod
     def read(cls, file: str | Path) -> Plan:
-        """Return the plan in a ``.plan`` file of QGroundControl.
+        """Return the plan in a ``.plan`` file of QGroundControl, or the mission of a ``QGC WPL 110`` file.
 
         Raises:
             UsageError: the file is none; the error names what is wrong and where.
@@ -101,25 +121,41 @@ class Plan:
                 raise UsageError(f"{path}: there is no such file")
             if path.stat().st_size > LARGEST_FILE:
                 raise UsageError(f"{path}: larger than {LARGEST_FILE} bytes; this is no plan")
-            document = json.loads(path.read_text(encoding="utf-8"))
+            text = path.read_text(encoding="utf-8")
+            document = None if text.startswith(_WPL) else json.loads(text)
         except OSError as error:
             raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
         except (ValueError, RecursionError) as error:
             raise UsageError(f"{path}: this is not JSON: {error}") from None
         try:
-            return _plan_of(document)
+            return _plan_of_text(text) if text.startswith(_WPL) else _plan_of(document)
         except UsageError as error:
             raise UsageError(f"{path}: {error}") from None
-        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
             raise UsageError(f"{path}: no plan of QGroundControl: {type(error).__name__} {error}") from None
 
     def write(self, file: str | Path) -> None:
         """Write a ``.plan`` file that QGroundControl reads."""
         path = Path(file)
         try:
-            path.write_text(json.dumps(_document_of(self), indent=4) + "\n", encoding="utf-8")
+            replace_text(path, json.dumps(_document_of(self), indent=4) + "\n")
         except OSError as error:
             raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _check_item(item: Item, number: int) -> None:
+    """Refuse an item that MAVLink cannot carry, or that has a place and no altitude."""
+    what = f"item {number} (command {item.command})"
+    if not (0 <= item.command <= _LARGEST_COMMAND and 0 <= item.frame <= _LARGEST_FRAME):
+        raise UsageError(f"{what}, frame {item.frame}: MAVLink has no such command or frame")
+    scale = item_scale(item.command, item.frame)
+    for place, value in ((5, item.latitude), (6, item.longitude)):
+        if not isfinite(value) or (scale == 1 and value != round(value)):
+            raise UsageError(f"{what}: parameter {place} = {value:g}; MAVLink carries whole numbers there")
+    if has_global_place(item.command, item.frame) and (item.latitude or item.longitude):
+        Position(item.latitude, item.longitude, AMSL(0.0))
+        if not isfinite(item.z):
+            raise UsageError(f"{what} has a place and no altitude; state one")
 
 
 def areas_of(fence: ClientFence) -> tuple[Area, ...]:
@@ -171,6 +207,20 @@ def fence_areas(items: Iterable[Item]) -> tuple[Area, ...]:
     return tuple(areas)
 
 
+def breach_return_items(place: Position | None) -> list[Item]:
+    """Return the place to return to from a breach as an item of MAV_MISSION_TYPE_FENCE."""
+    if place is None:
+        return []
+    at = place.latitude, place.longitude, place.altitude.metres
+    return [Item(_BREACH_RETURN, ABOVE_HOME, _NO_PARAMETERS, *at)]
+
+
+def breach_return_place(items: Iterable[Item]) -> Position | None:
+    """Return the place to return to from a breach among items of MAV_MISSION_TYPE_FENCE."""
+    found = [one for one in items if one.command == _BREACH_RETURN]
+    return Position(found[0].latitude, found[0].longitude, AboveHome(found[0].z)) if found else None
+
+
 def rally_items(places: Iterable[Position]) -> list[Item]:
     """Return rally points as items of MAV_MISSION_TYPE_RALLY."""
     return [
@@ -190,11 +240,17 @@ def rally_places(items: Iterable[Item]) -> tuple[Position, ...]:
 def _plan_of(document: Any) -> Plan:
     if not isinstance(document, dict) or document.get("fileType") != "Plan":
         raise UsageError('no plan of QGroundControl: its "fileType" is not "Plan"')
+    _check_version("plan", document, VERSION)
     mission = document.get("mission", {})
-    items = [
-        item for number, one in enumerate(mission.get("items", []), 1) for item in _items_of(one, number)
-    ]
     fence, rally = document.get("geoFence", {}), document.get("rallyPoints", {})
+    for name, part in (("mission", mission), ("geofence", fence), ("list of rally points", rally)):
+        _check_version(name, part, PART_VERSION)
+    entries = [
+        entry for number, one in enumerate(mission.get("items", []), 1) for entry in _entries_of(one, number)
+    ]
+    numbered = list(enumerate(entries, 1))
+    places_by_id = {entry["doJumpId"]: number for number, entry in numbered if "doJumpId" in entry}
+    items = [_item_of(entry, number, places_by_id) for number, entry in numbered]
     circles = [
         Circle(_corner(one["circle"]["center"]), float(one["circle"]["radius"]), bool(one["inclusion"]))
         for one in fence.get("circles", [])
@@ -204,9 +260,54 @@ def _plan_of(document: Any) -> Plan:
         for one in fence.get("polygons", [])
     ]
     places = [Position(float(a), float(b), AboveHome(float(c))) for a, b, c in rally.get("points", [])]
-    at = mission.get("plannedHomePosition")
-    home = Position(float(at[0]), float(at[1]), AMSL(float(at[2]))) if at else None
-    return Plan(tuple(items), (*polygons, *circles), tuple(places), home)
+    back, at = fence.get("breachReturn"), mission.get("plannedHomePosition")
+    return Plan(
+        tuple(items),
+        (*polygons, *circles),
+        tuple(places),
+        Position(float(at[0]), float(at[1]), AMSL(float(at[2]))) if at and None not in at else None,
+        Position(float(back[0]), float(back[1]), AboveHome(float(back[2]))) if back else None,
+        int(mission.get("firmwareType", AUTOPILOTS["PX4"])),
+        int(mission.get("vehicleType", QUADROTOR)),
+    )
+
+
+def _check_version(name: str, part: Any, known: int) -> None:
+    """Refuse another version of a part of a file: its fields may have other meanings."""
+    stated = part.get("version", known)
+    if stated != known:
+        raise UsageError(
+            f"a {name} of version {stated!r}; {known} is read: open it in QGroundControl and save it again"
+        )
+
+
+def _plan_of_text(text: str) -> Plan:
+    """Return the mission of a ``QGC WPL 110`` file: a row for each item, of twelve columns.
+
+    The columns are number, current, frame, command, seven parameters and continuation. The first row is home
+    if it is a waypoint AMSL, as Mission Planner and MAVProxy write it; jumps count from there.
+    """
+    items: list[Item] = []
+    for number, line in enumerate(text.splitlines()[1:], 2):
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        try:
+            frame, command = int(words[2]), int(words[3])
+            first, second, third, fourth, x, y, z = (float(word) for word in words[4:11])
+        except (ValueError, IndexError):
+            raise UsageError(f"line {number}: {line.strip()!r} is no item of a {_WPL} file") from None
+        items.append(Item(command, frame, (first, second, third, fourth), x, y, z))
+    at = items[0] if items and (items[0].command, items[0].frame) == (_WAYPOINT, 0) else None
+    home = Position(at.latitude, at.longitude, AMSL(at.z)) if at and (at.latitude or at.longitude) else None
+    first_number = 0 if at else 1
+    mission = [
+        item._replace(parameters=(item.parameters[0] + first_number, *item.parameters[1:]))
+        if item.command == DO_JUMP
+        else item
+        for item in items[1 if at else 0 :]
+    ]
+    return Plan(tuple(mission), home=home, autopilot=AUTOPILOTS["ArduPilot"])
 
 
 def _corner(place: Any) -> Corner:
@@ -214,25 +315,36 @@ def _corner(place: Any) -> Corner:
     return float(latitude), float(longitude)
 
 
-def _items_of(one: Mapping[str, Any], number: int) -> list[Item]:
-    """Return the items of an entry of a mission; a survey holds its own."""
+def _entries_of(one: Mapping[str, Any], number: int) -> list[Mapping[str, Any]]:
+    """Return the simple items of an entry of a mission; a survey holds its own."""
     if one.get("type") == "SimpleItem":
-        first, second, third, fourth, latitude, longitude, height = (
-            nan if value is None else float(value) for value in one["params"]
-        )
-        place = [0.0 if isnan(value) else value for value in (latitude, longitude, height)]
-        if place[0] or place[1]:
-            Position(place[0], place[1], AMSL(0.0))
-        return [Item(int(one["command"]), int(one["frame"]), (first, second, third, fourth), *place)]
+        return [one]
     held = one.get("TransectStyleComplexItem", {}).get("Items")
     if held is None:
         kind = one.get("complexItemType", one.get("type"))
         raise UsageError(f"item {number} is a {kind!r}, which only QGroundControl computes")
-    return [item for each in held for item in _items_of(each, number)]
+    return [entry for each in held for entry in _entries_of(each, number)]
+
+
+def _item_of(entry: Mapping[str, Any], number: int, places_by_id: Mapping[Any, int]) -> Item:
+    """Return an item. *places_by_id*: the numbers of all by ``doJumpId``, empty if none states it."""
+    first, second, third, fourth, x, y, z = (
+        nan if value is None else float(value) for value in entry["params"]
+    )
+    command, frame = int(entry["command"]), int(entry["frame"])
+    if command == DO_JUMP and places_by_id:
+        if first not in places_by_id:
+            raise UsageError(f"item {number} jumps to doJumpId {first:g}, which no item has")
+        first = float(places_by_id[first])
+    x, y = (0.0 if isnan(value) else value for value in (x, y))
+    if isnan(z) and not (has_global_place(command, frame) and (x or y)):
+        z = 0.0
+    return Item(command, frame, (first, second, third, fourth), x, y, z)
 
 
 def _document_of(plan: Plan) -> dict[str, Any]:
-    home = plan.home or next((_place_of(item) for item in plan.mission if item.latitude), None)
+    places = (one for one in plan.mission if has_global_place(one.command, one.frame) and one.latitude)
+    home = plan.home or next((Position(one.latitude, one.longitude, AMSL(0.0)) for one in places), None)
     at = [home.latitude, home.longitude, home.altitude.metres] if home else [0.0, 0.0, 0.0]
     polygons = [
         {"polygon": [list(corner) for corner in one.corners], "inclusion": one.stay_in, "version": 1}
@@ -248,30 +360,28 @@ def _document_of(plan: Plan) -> dict[str, Any]:
         for one in plan.fence
         if isinstance(one, Circle)
     ]
+    place = plan.breach_return
+    back = {"breachReturn": [place.latitude, place.longitude, place.altitude.metres]} if place else {}
     return {
         "fileType": "Plan",
-        "geoFence": {"circles": circles, "polygons": polygons, "version": 2},
+        "geoFence": {"circles": circles, "polygons": polygons, "version": PART_VERSION, **back},
         "groundStation": "volery",
         "mission": {
             "cruiseSpeed": 15,
-            "firmwareType": _PX4,
+            "firmwareType": plan.autopilot,
             "globalPlanAltitudeMode": 1,
             "hoverSpeed": 5,
             "items": [_entry_of(item, number) for number, item in enumerate(plan.mission, 1)],
             "plannedHomePosition": at,
-            "vehicleType": 2,
-            "version": 2,
+            "vehicleType": plan.vehicle,
+            "version": PART_VERSION,
         },
         "rallyPoints": {
             "points": [[one.latitude, one.longitude, one.altitude.metres] for one in plan.rally],
-            "version": 2,
+            "version": PART_VERSION,
         },
-        "version": 1,
+        "version": VERSION,
     }
-
-
-def _place_of(item: Item) -> Position:
-    return Position(item.latitude, item.longitude, AMSL(0.0))
 
 
 def _entry_of(item: Item, number: int) -> dict[str, Any]:
@@ -279,7 +389,7 @@ def _entry_of(item: Item, number: int) -> dict[str, Any]:
     return {
         "AMSLAltAboveTerrain": None,
         "Altitude": item.z,
-        "AltitudeMode": 1 if item.frame == ABOVE_HOME else 2,
+        "AltitudeMode": _ALTITUDE_MODES.get(item.frame, 2),
         "autoContinue": True,
         "command": item.command,
         "doJumpId": number,

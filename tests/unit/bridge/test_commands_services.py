@@ -1,12 +1,15 @@
 from math import nan, pi
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from volery.base.time import MS
+from volery.bridge.plan_services import MissionServices, to_item, to_waypoint
 from volery.ros import messages
 from volery.trace.events import Text
 
+WAYPOINT = "mavros_msgs/msg/Waypoint"
 LOCAL, GLOBAL = "SET_POSITION_TARGET_LOCAL_NED", "SET_POSITION_TARGET_GLOBAL_INT"
 
 
@@ -331,9 +334,33 @@ def test_a_mission_that_is_refused_or_not_answered(rig: Any) -> None:
 
 def test_the_current_waypoint(rig: Any) -> None:
     rig.connect()
-    rig.answers["MISSION_SET_CURRENT"] = lambda fields: rig.emit("MISSION_CURRENT", seq=min(fields["seq"], 3))
+
+    def set_current(fields: Any) -> None:
+        rig.emit("MISSION_CURRENT", seq=0)  # on its way when it was asked
+        rig.emit("MISSION_CURRENT", seq=min(fields["seq"], 3))
+
+    rig.answers["MISSION_SET_CURRENT"] = set_current
     assert rig.call("mission/set_current", "mavros_msgs/WaypointSetCurrent", wp_seq=2).success
     assert not rig.call("mission/set_current", "mavros_msgs/WaypointSetCurrent", wp_seq=7).success
+
+
+def test_the_current_waypoint_is_marked_whatever_was_pushed() -> None:
+    published: list[Any] = []
+    context: Any = SimpleNamespace(link=None, publish=lambda topic, message: published.append(message))
+    services = MissionServices(context)
+    services.publish_list([messages.new(WAYPOINT, is_current=one == 1) for one in range(3)])
+    services.translators()["MISSION_CURRENT"]({"seq": 2}, 0)
+    flags = [[one.is_current for one in message.waypoints] for message in published]
+    assert flags[-1] == [False, False, True]
+    assert published[-1].current_seq == 2
+
+
+def test_parameters_of_a_waypoint_without_a_place_go_out_as_they_are() -> None:
+    shot = to_item(messages.new(WAYPOINT, command=203, frame=2, x_lat=1.0, y_long=7.0), 0)
+    assert (shot["x"], shot["y"]) == (1, 7)
+    assert to_waypoint(shot).x_lat == 1.0
+    there = to_item(messages.new(WAYPOINT, command=16, frame=3, x_lat=46.0, y_long=-103.0), 0)
+    assert (there["x"], there["y"]) == (460_000_000, -1_030_000_000)
 
 
 def test_warnings_are_of_the_nodes_component(rig: Any) -> None:

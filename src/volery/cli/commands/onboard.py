@@ -6,7 +6,7 @@ None of these commands moves a vehicle, and one that flies goes on flying.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.text import Text
 
-from volery.base.errors import UsageError, choices
+from volery.base.errors import NotArrived, UsageError, choices
 from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output, make_table, number_column
 
@@ -36,7 +36,14 @@ Only = Annotated[
 ParameterFile = Annotated[
     Path, typer.Argument(metavar="FILE", help=".params of QGroundControl; .param or .parm of others.")
 ]
-PlanFile = Annotated[Path, typer.Argument(metavar="FILE.plan", help="Plan of QGroundControl.")]
+PlanFile = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FILE", help=".plan of QGroundControl; upload takes QGC WPL 110 of other stations, too."
+    ),
+]
+HOME_WITHIN_S = 3.0
+"""Wait for the home that a downloaded plan states."""
 
 KINDS = ("drone", "rover")
 
@@ -134,9 +141,10 @@ def upload(output: Output, url: Url, file: PlanFile, only: Only = None, kind: Ki
 
     plan = Plan.read(file)
     with _attached(url, kind) as vehicle:
-        if plan.mission and "mission" in _parts(only):
-            vehicle.wait_ready()
-        vehicle.plan.upload(plan, _parts(only))
+        parts = _parts(only)
+        if (plan.mission and "mission" in parts) or (plan.rally and "rally" in parts):
+            vehicle.wait_ready()  # limits count from home
+        vehicle.plan.upload(plan, parts)
     output.note(f"{_count(plan)} are on board of {url}")
     return OK
 
@@ -145,6 +153,8 @@ def upload(output: Output, url: Url, file: PlanFile, only: Only = None, kind: Ki
 def download(output: Output, url: Url, file: PlanFile, only: Only = None, kind: Kind = "drone") -> int:
     """Write mission, geofence and rally points on board into a plan."""
     with _attached(url, kind) as vehicle:
+        with suppress(NotArrived):  # home is part of the file
+            vehicle.wait_located(HOME_WITHIN_S)
         plan = vehicle.plan.download(_parts(only))
     plan.write(file)
     output.note(f"{_count(plan)}: {file}")

@@ -26,6 +26,10 @@ FAIL_WITH_ERRNO, END_OF_FILE = 2, 6
 SIZE, HEADER = 251, 12
 PIECE = SIZE - HEADER
 """Bytes of a file in one message."""
+MOST_ENTRIES = 100_000
+"""Entries of a folder that are listed."""
+LARGEST_BURST = 1_000_000
+"""Bytes after the requested place that are kept; autopilots send 120 kB at most for one request."""
 GAPS_AT_ONCE = 5
 """Pieces that are requested together: ArduPilot keeps five requests."""
 _HEAD = struct.Struct("<HBBBBBxI")
@@ -66,21 +70,28 @@ class FileTransfer:
         self._send_to = send_to
         self._sequence = 0
         self._session = 0
+        self._size = 0
 
     def list(self, folder: str) -> list[FileEntry]:
         """See ``FileSystem``."""
         asked = f"list {folder}"
         found: list[FileEntry] = []
-        passed = 0
-        while True:
+        passed, last = 0, b""
+        while passed < MOST_ENTRIES:
             reply = self._ask(asked, LIST, self._named(folder), offset=passed)
             if reply is None:
                 return found
             entries = [entry for entry in reply.data.split(b"\0") if entry]
             if not entries:
                 return found
+            if reply.data == last:
+                raise Refused(self._name, asked, f"it sends the same entries again, from {passed} on")
+            last = reply.data
             passed += len(entries)
             found += [entry for entry in map(_entry, entries) if entry is not None]
+        raise Refused(
+            self._name, asked, f"it has more than {MOST_ENTRIES:,} entries, or sends them without end"
+        )
 
     def open(self, path: str) -> int:
         """See ``FileSystem``."""
@@ -88,12 +99,13 @@ class FileTransfer:
         if reply is None or len(reply.data) < 4:
             raise Refused(self._name, f"open {path}", "its answer states no size")
         self._session = reply.session
-        return int.from_bytes(reply.data[:4], "little")
+        self._size = int.from_bytes(reply.data[:4], "little")
+        return self._size
 
     def read(self, path: str, offset: int) -> bytes:
         """See ``FileSystem``."""
         asked = f"read {path} from byte {offset}"
-        read = _PartialRead(offset)
+        read = _PartialRead(offset, min(self._size, offset + LARGEST_BURST))
 
         def gather(send: Action, whole: Callable[[], bool]) -> None:
             self._requests.gather(
@@ -167,13 +179,13 @@ class FileTransfer:
 
 
 class _PartialRead:
-    """The pieces of a file that have arrived from *offset* on; they may overlap."""
+    """The pieces of a file that have arrived from *offset* to *end*; they may overlap."""
 
-    def __init__(self, offset: int) -> None:
+    def __init__(self, offset: int, end: int) -> None:
         self.pieces: dict[int, bytes] = {}
         self.ended = False
         self.refusal = 0
-        self._offset = offset
+        self._offset, self._end = offset, end
 
     def take(self, frame: Frame) -> None:
         """Keep the piece of a file that a frame brings."""
@@ -183,7 +195,7 @@ class _PartialRead:
         if reply.refused:
             self.ended = True
             self.refusal = _code(reply.data)
-        elif reply.data:
+        elif reply.data and reply.offset < self._end:  # a peer may state any place in 4 GB
             self.pieces[reply.offset] = reply.data
             self.ended = self.ended or reply.last
 

@@ -19,6 +19,7 @@ from volery.links.mavlink_messages import (
     constant,
     entry_name,
     from_bytewise,
+    item_scale,
     message_type,
     mission_type,
     to_bytewise,
@@ -27,6 +28,7 @@ from volery.vehicles.drivers.mavlink.file_transfer import FileTransfer
 from volery.vehicles.drivers.mavlink.pending_requests import AGAIN, TRIES, PendingRequests
 from volery.vehicles.rtcm import correction_parts
 from volery.vehicles.services import (
+    MISSION,
     Item,
     LogEntry,
     Parameter,
@@ -314,7 +316,8 @@ class MavlinkServices(PendingRequests):
             ):
                 return None
             parameters = (fields["param1"], fields["param2"], fields["param3"], fields["param4"])
-            place = fields["x"] / 1e7, fields["y"] / 1e7
+            scale = item_scale(fields["command"], fields["frame"])
+            place = fields["x"] / scale, fields["y"] / scale
             return Item(fields["command"], fields["frame"], parameters, *place, fields["z"])
 
         return self.ask(
@@ -324,6 +327,8 @@ class MavlinkServices(PendingRequests):
     def upload_items(self, kind: int, items: Sequence[Item]) -> None:
         """See ``Services``."""
         asked = f"store {len(items)} items of its {_LISTS[kind]}"
+        first = 0 if self.home_first and kind == MISSION else 1
+        sent: list[int] = []
 
         def answer(frame: Frame) -> bool | None:
             if mission_type(frame.fields) != kind:
@@ -331,9 +336,17 @@ class MavlinkServices(PendingRequests):
             if frame.name in ("MISSION_REQUEST", "MISSION_REQUEST_INT"):
                 number = frame.fields["seq"]
                 if number < len(items):
+                    sent.append(number)
                     self._send_to("MISSION_ITEM_INT", **item_fields(items[number], number, kind))
                 return None
-            _refuse_list(self._name, frame, kind, asked)
+            result = _refusal(frame, kind)
+            if result and sent:
+                why = _why_refused(result, items[sent[-1]], sent[-1] + first)
+                raise Refused(self._name, asked, why)
+            if result == "UNSUPPORTED":
+                raise CapabilityError(f"{self._name}: {asked}: the autopilot keeps no {_LISTS[kind]}")
+            if result:
+                raise Refused(self._name, asked, f"the autopilot answered {result}")
             return True if frame.name == "MISSION_ACK" else None
 
         def send() -> None:
@@ -430,19 +443,49 @@ def _check_fits(vehicle: str, asked: str, before: Parameter, value: float) -> No
 _LISTS = {0: "mission", 1: "geofence", 2: "rally points"}
 
 
-def _refuse_list(name: str, frame: Frame, kind: int, asked: str = "") -> None:
-    """Raise if *frame* is the refusal of a list of that kind."""
-    if frame.name != "MISSION_ACK" or mission_type(frame.fields) != kind or frame.fields["type"] == 0:
-        return
-    result = entry_name("MAV_MISSION_RESULT", frame.fields["type"]).removeprefix("MAV_MISSION_")
+def _refuse_list(name: str, frame: Frame, kind: int) -> None:
+    """Raise if *frame* is the refusal of a list of that kind, before any of its items."""
+    result = _refusal(frame, kind)
     if result == "UNSUPPORTED":
-        raise CapabilityError(f"{name}: {asked or 'read'}: the autopilot keeps no {_LISTS[kind]}")
-    raise Refused(name, asked or f"read its {_LISTS[kind]}", f"the autopilot answered {result}")
+        raise CapabilityError(f"{name}: read: the autopilot keeps no {_LISTS[kind]}")
+    if result:
+        raise Refused(name, f"read its {_LISTS[kind]}", f"the autopilot answered {result}")
+
+
+def _refusal(frame: Frame, kind: int) -> str:
+    """Return the reason of the refusal of a list, as MAV_MISSION_RESULT names it; empty if it is none."""
+    if frame.name != "MISSION_ACK" or mission_type(frame.fields) != kind or frame.fields["type"] == 0:
+        return ""
+    return entry_name("MAV_MISSION_RESULT", frame.fields["type"]).removeprefix("MAV_MISSION_")
+
+
+_PLACES = {"INVALID_PARAM5_X": 5, "INVALID_PARAM6_Y": 6, "INVALID_PARAM7": 7}
+
+
+def _why_refused(result: str, item: Item, number: int) -> str:
+    """Return what the autopilot refuses of item *number* of the plan, in words."""
+    command = entry_name("MAV_CMD", item.command)
+    what = f"item {number}, command {item.command}"
+    if not command.isdigit():
+        what = f"item {number}, MAV_CMD_{command} ({item.command})"
+    values = (*item.parameters, item.latitude, item.longitude, item.z)
+    last = result.removeprefix("INVALID_PARAM")
+    place = _PLACES.get(result, int(last) if last.isdigit() else 0)
+    if place:
+        return f"the autopilot does not take parameter {place} = {values[place - 1]:.9g} of {what}"
+    if result == "UNSUPPORTED":
+        return f"the autopilot does not take {what} in a mission, or not with its parameters"
+    if result == "UNSUPPORTED_FRAME":
+        return f"the autopilot does not take {what} in the frame {item.frame}"
+    if result == "INVALID_SEQUENCE":
+        return f"the autopilot lost the order at {what}; is another program storing a plan at the same time?"
+    return f"the autopilot answered {result} at {what}"
 
 
 def item_fields(item: Item, number: int, kind: int) -> dict[str, Any]:
     """Return an item as the fields of MISSION_ITEM_INT."""
     first, second, third, fourth = item.parameters
+    scale = item_scale(item.command, item.frame)
     return {
         "seq": number,
         "frame": item.frame,
@@ -453,8 +496,8 @@ def item_fields(item: Item, number: int, kind: int) -> dict[str, Any]:
         "param2": second,
         "param3": third,
         "param4": fourth,
-        "x": round(item.latitude * 1e7),
-        "y": round(item.longitude * 1e7),
+        "x": round(item.latitude * scale),
+        "y": round(item.longitude * scale),
         "z": item.z,
         "mission_type": kind,
     }
