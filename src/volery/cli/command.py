@@ -12,6 +12,7 @@ are the fields of a dataclass: a parameter with that type stands for all of them
 
 from __future__ import annotations
 
+import errno
 import inspect
 import signal
 import sys
@@ -34,6 +35,9 @@ if TYPE_CHECKING:
 
 OK, FAILED, BAD_INPUT, LEFT_OUT = 0, 1, 2, 3
 """Exit statuses. ``LEFT_OUT``: done, but for what the output names; ``--allow-loss`` makes it ``OK``."""
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+"""A disk that is full or read-only is no fault of this program."""
 
 BAD_INPUT_ERRORS = (ModelError, UsageError, EstimateError, CapabilityError)
 """Errors that the user corrects in a file or in the call."""
