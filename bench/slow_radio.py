@@ -37,8 +37,8 @@ def flown(rate: float, gains: PidGains, *, thesis: bool, link: str) -> tuple[flo
 
         drone.kernel.record = record
         drone.wait_ready()
-        actuation = RcOverride(drone, thesis_scale(), gains=None) if thesis else RcOverride(drone)
-        turns = Rotation(HEADINGS, 12.0, PidLaw(gains), "PID", holds_place=not thesis)
+        actuation = RcOverride(drone, thesis_scale() if thesis else None, gains=None)
+        turns = Rotation(HEADINGS, 12.0, PidLaw(gains), "PID", holds_place=False)
         ControlledFlight(drone, turns, actuation).run()
     times, measured, goal = np.array(rows).T
     signal = make_signal("yaw", "deg", (times, measured), (times, goal), period=DEGREES)

@@ -69,6 +69,7 @@ def fly_watched(
     height: float = 4.0,
     during: Callable[[Any, Drone], None] | None = None,
     after_s: float = 0.0,
+    as_stated: bool = False,
 ) -> Watched:
     """Fly under a law while the switch moves.
 
@@ -82,6 +83,7 @@ def fly_watched(
         height: height of the take-off.
         during: called with the fleet and the drone before the flight.
         after_s: time that passes after the flight, s.
+        as_stated: whether the gains are flown as they are.
     """
     url = f"sim:{DRONE}?start=warm&attitude=50&rate=20&rc=20{options}"
     opened = open_vehicles({DRONE: url}, {DRONE: Drone}, VehicleSettings())
@@ -123,6 +125,7 @@ def fly_watched(
         ACTUATIONS[by](drone),
         switch=switch,
         height=height,
+        as_stated=lambda _: as_stated,
     )
     try:
         with kernel.adopt(SCRIPT):

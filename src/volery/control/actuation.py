@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import copysign, degrees, isnan, radians, sqrt
+from math import copysign, degrees, inf, isnan, radians, sqrt
 from typing import NamedTuple, Protocol
 
 from volery.base.elementary import atan, cos, exp, log, sin
@@ -18,6 +18,14 @@ from volery.base.errors import UsageError
 from volery.control.laws import PidGains, PidLaw
 from volery.control.link_failsafes import BY_STICKS
 from volery.control.turn_prediction import TurnModel, TurnPrediction
+from volery.control.vehicle_answer import (
+    PREDICTED,
+    PREDICTED_WITHIN_S,
+    TILT_ANSWERS,
+    VELOCITY_ANSWERS,
+    Answer,
+    answer_of,
+)
 from volery.trace.events import Text
 from volery.vehicles import Drone
 from volery.vehicles.telemetry import HALF_US, MIDDLE_US
@@ -58,6 +66,11 @@ class Actuation(Protocol):
         """Turn in degrees that is still to come by the commands already given; 0 where it is not modelled."""
         return 0.0
 
+    @property
+    def answer(self) -> Answer | None:
+        """How the vehicle answers commands; ``None`` where they have other units than ``Command``."""
+        return None
+
     def take_off(self, height: float) -> None:
         """Arm and climb to *height* m above home; blocks until it is there."""
 
@@ -66,6 +79,19 @@ class Actuation(Protocol):
 
     def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
         """Send one command."""
+
+
+def _turn_model(drone: Drone, scale: RcScale | None = None) -> TurnModel | None:
+    """Return the model of turns, unless headings are reported too rarely for a prediction."""
+    scale = scale or RC_SCALES.get(drone.telemetry.autopilot)
+    rare = drone.telemetry.heading_reports.seconds > PREDICTED_WITHIN_S
+    return None if scale is None or rare else scale.turning
+
+
+def _answer(answers: Mapping[str, Answer], drone: Drone, model: TurnModel | None) -> Answer:
+    """Return the answer of the drone's autopilot; with a *model* its turns are predicted."""
+    answer = answer_of(answers, drone.telemetry.autopilot)
+    return answer if model is None else answer._replace(turn=PREDICTED)
 
 
 class VelocitySetpoints(Actuation):
@@ -85,19 +111,20 @@ class VelocitySetpoints(Actuation):
         """Turn in degrees that is still to come."""
         return self._turning.lead
 
+    @property
+    def answer(self) -> Answer | None:
+        """How the autopilot follows velocities."""
+        return _answer(VELOCITY_ANSWERS, self._drone, _turn_model(self._drone))
+
     def take_off(self, height: float) -> None:
         """Take off by the autopilot's own take-off."""
         self._drone.takeoff(height)
-        self._model_turns()
+        self._turning = TurnPrediction(_turn_model(self._drone))
 
     def engage(self) -> None:
         """Stop where it is."""
         self._drone.hold()
-        self._model_turns()
-
-    def _model_turns(self) -> None:
-        scale = RC_SCALES.get(self._drone.telemetry.autopilot)
-        self._turning = TurnPrediction(scale.turning if scale is not None else None)
+        self._turning = TurnPrediction(_turn_model(self._drone))
 
     def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
         """Send a velocity and a turn rate."""
@@ -211,6 +238,11 @@ class _TiltLoop:
         self._laws: tuple[PidLaw, PidLaw] | None = None
         self.reset()
 
+    @property
+    def tilts(self) -> bool:
+        """Whether there are gains."""
+        return self._gains is not None
+
     def reset(self) -> None:
         """Begin anew after a takeover."""
         self._laws = (PidLaw(self._gains), PidLaw(self._gains)) if self._gains is not None else None
@@ -264,6 +296,16 @@ class RcOverride(Actuation):
         return self._turning.lead
 
     @property
+    def answer(self) -> Answer | None:
+        """How the drone follows velocities by its sticks; ``None`` with channels of another scale."""
+        drone, scale = self._drone, self.scale
+        if scale is not RC_SCALES.get(drone.telemetry.autopilot):
+            return None
+        turns = _answer(VELOCITY_ANSWERS, drone, _turn_model(drone, scale)).turn  # by rate, as set-points
+        answer = _answer(TILT_ANSWERS, drone, None)._replace(turn=turns)
+        return answer if self._loop.tilts else answer._replace(velocity_within_s=inf)
+
+    @property
     def scale(self) -> RcScale:
         """Scale of the channels. Raises ``UsageError`` for an autopilot without one."""
         if self._scale is None:
@@ -283,7 +325,7 @@ class RcOverride(Actuation):
     def engage(self) -> None:
         """Enter altitude hold with centred sticks; a transmitter whose throttle stick is low is recorded."""
         self._loop.reset()
-        self._turning = TurnPrediction(self.scale.turning)
+        self._turning = TurnPrediction(_turn_model(self._drone, self.scale))
         drone, channels = self._drone, self._drone.telemetry.rc
         own = channels[THROTTLE - 1] if len(channels) >= THROTTLE else 0
         if LOW_THROTTLE[0] <= own < LOW_THROTTLE[1]:
@@ -303,10 +345,27 @@ class RcOverride(Actuation):
         self._drone.manual_control(pitch, roll, throttle, scale.turn.position(command.yaw_rate))
 
 
-CLIMB_RATES: Mapping[str, tuple[float, float]] = {"ArduPilot": (2.5, 1.5)}
-"""Climb and descent in m/s at a thrust of 1 and of 0, where an autopilot takes thrust as a climb rate
-(WPNAV_SPEED_UP, WPNAV_SPEED_DN); the others take it as collective thrust.
-"""
+class ClimbByThrust(NamedTuple):
+    """Thrust that an autopilot takes as a climb rate: 0.5 keeps the height."""
+
+    up: float
+    """Climb at a thrust of 1, m/s."""
+    down: float
+    """Descent at a thrust of 0, m/s."""
+    dead: float = 0.0
+    """Half of the range about 0.5 in which it keeps the height."""
+
+    def thrust(self, climb: float) -> float:
+        """Return the thrust of a climb rate in m/s."""
+        share = min(1.0, abs(climb) / (self.up if climb > 0.0 else self.down))
+        return 0.5 + copysign(self.dead + (0.5 - self.dead) * share, climb) if share > 0.0 else 0.5
+
+
+CLIMBS_BY_THRUST: Mapping[str, ClimbByThrust] = {
+    "ArduPilot": ClimbByThrust(2.5, 1.5),  # WPNAV_SPEED_UP, WPNAV_SPEED_DN
+    "DJI": ClimbByThrust(2.0, 2.0, 0.05),  # as the driver maps thrust
+}
+"""Autopilots that take thrust as a climb rate, by the first word of their name."""
 THRUST_GAINS = PidGains(kp=0.12, ki=0.08, low=-0.3, high=0.3)
 """From an error of climb rate in m/s to a share of thrust about hover."""
 MOST_TILT = 20.0
@@ -326,6 +385,11 @@ class AttitudeSetpoints(Actuation):
         self._loop = _TiltLoop(gains)
         self._thrust = PidLaw(THRUST_GAINS)
 
+    @property
+    def answer(self) -> Answer | None:
+        """How the drone follows velocities by its attitude."""
+        return _answer(TILT_ANSWERS, self._drone, None)
+
     def take_off(self, height: float) -> None:
         """Take off by the autopilot's own take-off."""
         self._drone.takeoff(height)
@@ -339,10 +403,9 @@ class AttitudeSetpoints(Actuation):
     def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
         """Send an attitude, a thrust and a turn rate."""
         forward, right = self._loop.tilt(command, measured, sample_s, MOST_TILT)
-        rates = CLIMB_RATES.get(self._drone.telemetry.autopilot)
-        if rates is not None:
-            share = command.up / rates[0 if command.up > 0.0 else 1]
-            thrust = 0.5 + 0.5 * min(1.0, max(-1.0, share))
+        by_rate = CLIMBS_BY_THRUST.get(self._drone.telemetry.autopilot.partition(" ")[0])
+        if by_rate is not None:
+            thrust = by_rate.thrust(command.up)
         else:
             thrust = 0.5 + float(self._thrust(command.up, measured.velocity_up, sample_s).output)
         self._drone.set_attitude(

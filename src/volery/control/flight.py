@@ -14,14 +14,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from math import inf, isfinite, nan
+from math import inf, isfinite, isnan, nan
 
-from volery.base.errors import NotArrived, Overridden, VehicleError, VoleryError
+from volery.base.errors import CapabilityError, NotArrived, OffTrack, Overridden, VehicleError, VoleryError
 from volery.base.frames import LocalFrame
 from volery.base.time import MS, Ns, S, from_seconds, to_seconds
 from volery.control.actuation import Actuation, Command, Measured
+from volery.control.law_watch import ErrorWatch, FollowWatch, ended_off
+from volery.control.laws import PidGains, PidLaw
 from volery.control.manoeuvres import Landing, LoopSample, Manoeuvre
 from volery.control.safety_switch import Authority, Emergency, Received, SwitchSettings, SwitchState, decide
+from volery.control.vehicle_answer import LEAST_SHARE, suited
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Rate, sleep
 from volery.trace.events import ControlSample, Text
@@ -34,7 +37,12 @@ POLL_PERIOD: Ns = 10 * MS
 """Time between two looks where the loop of this program receives the reports, as over ROS."""
 SWITCH_WITHIN_S = 30.0
 """Time within which the operator must move the switch to its middle position before a flight."""
-LANDED_WITHIN_S = 180.0
+DESCENT_FACTOR, DESCENT_MARGIN_S = 1.5, 20.0
+"""Time-out of the landing law over the time that its rates need."""
+REPORTS_WITHIN: Ns = 3 * S
+"""Time within which the rate of the reports must be known."""
+HOLDS_FOR: Ns = 2 * S
+"""Time for which the drone holds between a law that was ended and the landing."""
 STILL_SPEED = 0.15
 """Speed in m/s below which a descending drone may stand on the ground."""
 STILL_FOR_S = 2.0
@@ -71,6 +79,7 @@ class ControlledFlight:
         switch: the operator's switch; ``None`` flies without one.
         period: sample time, ns.
         height: height of the take-off, m above home.
+        as_stated: whether the gains of a loop are flown as they are, and not suited to the vehicle.
         on_sample: called before each sample of the manoeuvre with the time in s since it began, for pushes
             and changes of gains.
     """
@@ -84,12 +93,19 @@ class ControlledFlight:
         switch: SwitchSettings | None = None,
         period: Ns = PERIOD,
         height: float = 5.0,
+        as_stated: Callable[[str], bool] = lambda _: False,
         on_sample: Callable[[float], None] = lambda _: None,
     ) -> None:
         self._drone, self._manoeuvre, self._actuation = drone, manoeuvre, actuation
         self._switch, self._period, self._height = switch, period, height
         self._on_sample = on_sample
+        self._as_stated = as_stated
         self._landing = Landing()
+        self._usual: dict[PidLaw, PidGains] = {}
+        self._shares: dict[str, float] = {}
+        self._errors, self._follows = ErrorWatch(manoeuvre.laws), FollowWatch()
+        self._last: dict[str, LoopSample] = {}
+        self._still_s = 0.0
         self._state = SwitchState()
         self._looked_at: Ns = -1
         self._frame: LocalFrame | None = None
@@ -102,18 +118,72 @@ class ControlledFlight:
         """Who has control."""
         return self._state.authority
 
-    def run(self) -> None:
+    def run(self) -> str:
         """Take off if the drone stands, fly the manoeuvre and land.
+
+        Returns:
+            How far from its last set-points the manoeuvre ended, if that is too far; else an empty text.
 
         Raises:
             VehicleError: the switch was not received in its middle position, or the drone cannot be flown.
+            CapabilityError: the vehicle reports too rarely for a law.
+            OffTrack: the law was ended since its error grew or the drone did not follow; it was landed.
         """
         self._await_switch()
+        self._await_reports()
+        self._suit_gains()
         if not self._drone.flying:
             self._blocking(lambda: self._actuation.take_off(self._height))
             self._engaged = self.authority is Authority.AUTONOMOUS
-        if self._fly(self._manoeuvre):
-            self._land()
+            self._suit_gains()  # to the reports in flight
+        if not self._fly(self._manoeuvre):
+            return ""
+        off = ended_off(self._last.values(), self._manoeuvre.accuracy)
+        self._land()
+        return off
+
+    # -- the vehicle
+
+    def _await_reports(self) -> None:
+        """Wait until it is known how often the vehicle reports, at most for ``REPORTS_WITHIN``."""
+        kernel, seen = self._drone.kernel, self._drone.telemetry
+        until = kernel.now() + REPORTS_WITHIN
+        reports = (seen.position_reports, seen.heading_reports)
+        while any(isnan(one.seconds) for one in reports) and kernel.now() < until:
+            sleep(kernel, POLL_PERIOD)
+            self._drone.telemetry  # noqa: B018  # a node's loop is run by reading it
+
+    def _suit_gains(self) -> None:
+        """Suit the gains that the user has not stated to how the vehicle answers and reports."""
+        answer, seen = self._actuation.answer, self._drone.telemetry
+        if answer is None:
+            return
+        if seen.position_reports.seconds > answer.velocity_within_s:
+            raise CapabilityError(
+                f"{self._drone.name} reports its velocity each {seen.position_reports.seconds:.2f} s; tilt "
+                f"angles of a law need it each {answer.velocity_within_s:g} s; fly by set-points, or request "
+                f"more reports (rate= in the address)"
+            )
+        for manoeuvre in (self._manoeuvre, self._landing):
+            for loop, law in manoeuvre.laws.items():
+                process = answer.of(loop)
+                if process is None or self._as_stated(loop) or not isinstance(law, PidLaw):
+                    continue
+                reports_s = (seen.heading_reports if loop == "yaw" else seen.position_reports).seconds
+                usual = self._usual.setdefault(law, law.gains)
+                gains, share = suited(usual, process, reports_s, to_seconds(self._period))
+                if share < LEAST_SHARE:
+                    raise CapabilityError(
+                        f"{self._drone.name}: no law of {loop} is stable on it: it is reported each "
+                        f"{reports_s:.1f} s; request more reports"
+                    )
+                law.gains = gains
+                if manoeuvre is self._manoeuvre and self._shares.get(loop, 1.0) != share:
+                    self._shares[loop] = share
+                    self._note(
+                        f"gains of {loop} are {share:.2f} of the usual ones (kp {gains.kp:.3g}), for how it "
+                        f"answers and a report each {reports_s:.2f} s"
+                    )
 
     # -- the switch
 
@@ -126,16 +196,22 @@ class ControlledFlight:
         until = kernel.now() + from_seconds(SWITCH_WITHIN_S)
         while self._look() is not Authority.AUTONOMOUS:
             if kernel.now() >= until:
-                pulse = self._received().pulse
-                channel = self._switch.channel
-                found = f"channel {channel} is at {pulse} us" if pulse else f"channel {channel} has no signal"
-                raise NotArrived(
-                    self._drone.name,
-                    "wait for the safety switch",
-                    f"{found}; move it to the middle ({self._switch.manual_below} to "
-                    f"{self._switch.landing_above} us), or fly without a switch",
-                )
+                raise NotArrived(self._drone.name, "wait for the safety switch", self._missing_switch())
             sleep(kernel, WATCH_PERIOD)
+
+    def _missing_switch(self) -> str:
+        """Return in words why the switch does not give control, and the remedy."""
+        assert self._switch is not None
+        received, channel = self._received(), self._switch.channel
+        without = "fly without a switch (--switch none)"
+        if not any(received._replace(pulse=one).valid for one in self._drone.telemetry.rc):
+            return f"no transmitter is received at all; switch one on, or {without}"
+        if not received.valid:
+            return (
+                f"channel {channel} has no signal; state the channel of the switch (--switch), or {without}"
+            )
+        low, high = self._switch.middle
+        return f"channel {channel} is at {received.pulse} us; move it to {low} to {high} us, or {without}"
 
     def _received(self) -> Received:
         assert self._switch is not None
@@ -250,8 +326,36 @@ class ControlledFlight:
             if not self._take_control(manoeuvre):
                 continue
             self._on_sample(to_seconds(now - begun))
-            self._sample(manoeuvre, sample_s)
+            wrong = self._sample(manoeuvre, sample_s) or manoeuvre.stuck
+            if wrong:
+                self._give_up(wrong)
+                return False
         return True
+
+    def _give_up(self, wrong: str) -> None:
+        """Hold, then land by the autopilot, and raise what was wrong."""
+        self._note(f"{wrong}; it holds, then the autopilot lands it")
+        ended = "it held and landed"
+        try:
+            self._blocking(self._stop)
+            if self.authority is Authority.MANUAL:
+                self._fly_on_by_pilot()
+            else:
+                self._finish_landing()
+        except VehicleError as error:
+            if isinstance(error, Overridden):
+                raise
+            ended = str(error)
+        raise OffTrack(self._drone.name, "fly under a law", f"{wrong}; {ended}")
+
+    def _stop(self) -> None:
+        try:
+            self._drone.hold()
+            sleep(self._drone.kernel, HOLDS_FOR)
+        except VehicleError as error:
+            if isinstance(error, Overridden):
+                raise
+            self._note(f"it does not hold: {error}")
 
     def _await_sample(self, rate: Rate) -> None:
         """Sleep until the next sample is due; a takeover in the meantime releases at once."""
@@ -267,16 +371,24 @@ class ControlledFlight:
             if self.authority is Authority.MANUAL:
                 return False
             manoeuvre.reset()
+            self._errors.reset()
+            self._follows.reset()
             self._engaged = True
         return True
 
-    def _sample(self, manoeuvre: Manoeuvre, sample_s: float) -> Measured:
+    def _sample(self, manoeuvre: Manoeuvre, sample_s: float) -> str:
+        """Fly one sample; return what is wrong with the law or the vehicle, in words."""
         measured = self._measure()
         command, samples = manoeuvre.step(measured, sample_s)
-        self._actuation.apply(limited_descent(command, measured.up), measured, sample_s)
+        command = limited_descent(command, measured.up)
+        self._actuation.apply(command, measured, sample_s)
         for one in samples:
             self._record(one)
-        return measured
+            self._last[one.loop] = one
+        wrong = self._errors.check(samples, sample_s)
+        if not wrong and self._actuation.answer is not None:
+            wrong = self._follows.check(command, measured, sample_s)
+        return wrong
 
     def _measure(self) -> Measured:
         """Return what telemetry reports; an old position is unknown."""
@@ -339,12 +451,14 @@ class ControlledFlight:
 
         The autopilot lands all the way where the law cannot: without telemetry, a height or control.
         """
-        kernel = self._drone.kernel
-        landing, still_s = self._landing, 0.0
+        kernel, seen, landing = self._drone.kernel, self._drone.telemetry, self._landing
         landing.reset()
+        self._still_s = 0.0
+        self._errors, self._follows = ErrorWatch(landing.laws), FollowWatch()
         rate = Rate(kernel, self._period)
-        last = kernel.now()
-        until = last + from_seconds(LANDED_WITHIN_S)
+        begun = last = kernel.now()
+        needed_s = landing.duration(seen.above_home) if isfinite(seen.above_home) else 0.0
+        until = last + from_seconds(DESCENT_FACTOR * needed_s + DESCENT_MARGIN_S)
         try:
             while kernel.now() < until:
                 self._await_sample(rate)
@@ -361,18 +475,29 @@ class ControlledFlight:
                     break
                 if self._drone.telemetry.stale or not isfinite(self._drone.telemetry.above_home):
                     break
-                if not self._take_control(landing):
-                    continue
-                measured = self._sample(landing, sample_s)
-                still = abs(measured.velocity_up) < STILL_SPEED and measured.up < 1.0
-                still_s = still_s + sample_s if still else 0.0
-                if self._drone.landed or still_s >= STILL_FOR_S:
+                if self._take_control(landing) and self._is_down(self._sample(landing, sample_s), sample_s):
                     break
+            else:
+                self._note(
+                    f"the landing law was not down after {to_seconds(kernel.now() - begun):.0f} s, at "
+                    f"{self._drone.telemetry.above_home:.1f} m above home; the autopilot lands it"
+                )
         except VehicleError as error:
             if isinstance(error, Overridden):
                 raise
             self._note(f"the autopilot lands: {error}")
         self._finish_landing()
+
+    def _is_down(self, wrong: str, sample_s: float) -> bool:
+        """Return whether the landing law has done its part: it stands, or what is *wrong* ends the law."""
+        seen = self._drone.telemetry
+        still = abs(seen.velocity.up) < STILL_SPEED and seen.above_home < 1.0
+        self._still_s = self._still_s + sample_s if still else 0.0
+        if self._drone.landed or self._still_s >= STILL_FOR_S:
+            return True
+        if wrong:
+            self._note(f"the landing law: {wrong}; the autopilot lands it")
+        return bool(wrong)
 
     def _fly_on_by_pilot(self) -> None:
         """Wait until the pilot has landed, or gives control back."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from math import hypot, isfinite
+from math import hypot, inf, isfinite
 from typing import NamedTuple
 
 from volery.base.errors import UsageError
@@ -24,6 +24,8 @@ POSITION_GAINS = PidGains(kp=0.9, ki=0.02, low=-4.0, high=4.0, deceleration=1.2)
 HEIGHT_GAINS = PidGains(kp=1.0, ki=0.05, low=-1.5, high=2.0, deceleration=0.8)
 """From m to m/s of climb."""
 
+STUCK_AFTER_S = 60.0
+"""Time in s without coming nearer to a way point after which it is given up."""
 THESIS_SAMPLE_S = 0.1
 """Sample time of the thesis's laws: roscopter's default rate of 10 Hz."""
 _KP, _KI, _KD = per_sample(2.0, 0.1, 0.07, THESIS_SAMPLE_S)
@@ -56,10 +58,18 @@ class Manoeuvre(ABC):
 
     laws: Mapping[str, Law]
 
+    accuracy: float = 1.0
+    """Distance in m from the last set-point within which it ends where it should."""
+
     @property
     @abstractmethod
     def done(self) -> bool:
         """Whether it has ended."""
+
+    @property
+    def stuck(self) -> str:
+        """Why it will not end, in words; empty while it goes on."""
+        return ""
 
     @abstractmethod
     def step(self, measured: Measured, sample_s: float) -> tuple[Command, Sequence[LoopSample]]:
@@ -91,23 +101,32 @@ def set_gains(manoeuvre: Manoeuvre, loop: str, gains: PidGains) -> None:
 
 
 class _Hold:
-    """Holds the place that was measured first: horizontal position and height."""
+    """Holds the place that was measured first, along the loops that it is given.
 
-    def __init__(self, position: PidGains = POSITION_GAINS, height: PidGains = HEIGHT_GAINS) -> None:
-        self.laws = {"north": PidLaw(position), "east": PidLaw(position), "altitude": PidLaw(height)}
-        self.at: tuple[float, float, float] | None = None
+    Args:
+        laws: laws of ``north``, ``east`` and, to hold the height, too, ``altitude``.
+    """
 
-    def command(self, measured: Measured, sample_s: float) -> tuple[float, float, float]:
-        here = measured.north, measured.east, measured.up
-        if self.at is None and all(map(isfinite, here)):
+    def __init__(self, laws: Mapping[str, PidLaw]) -> None:
+        self.laws = laws
+        self.at: Mapping[str, float] | None = None
+
+    def step(self, measured: Measured, sample_s: float) -> tuple[Command, list[LoopSample]]:
+        here = {"north": measured.north, "east": measured.east, "altitude": measured.up}
+        if self.at is None and all(map(isfinite, here.values())):
             self.at = here
         if self.at is None:
-            return 0.0, 0.0, 0.0
-        north, east, up = (
-            float(law(goal, value, sample_s).output)
-            for law, goal, value in zip(self.laws.values(), self.at, here, strict=True)
-        )
-        return north, east, up
+            return Command(), []
+        outputs, samples = dict.fromkeys(here, 0.0), []
+        for loop, law in self.laws.items():
+            terms = law(self.at[loop], here[loop], sample_s)
+            outputs[loop] = float(terms.output)
+            samples.append(LoopSample(loop, "PID", "m", 0.0, self.at[loop], here[loop], terms))
+        return Command(outputs["north"], outputs["east"], outputs["altitude"]), samples
+
+
+def _plane_laws() -> dict[str, PidLaw]:
+    return {"north": PidLaw(POSITION_GAINS), "east": PidLaw(POSITION_GAINS)}
 
 
 class Rotation(Manoeuvre):
@@ -136,8 +155,9 @@ class Rotation(Manoeuvre):
             raise UsageError(f"rotation: each heading for {hold_s:g} s; give a time above 0")
         self._headings = list(headings)
         self._hold_s = hold_s
-        self._place = _Hold() if holds_place else None
-        self.laws = {"yaw": law or PidLaw(YAW_GAINS)}
+        held = {**_plane_laws(), "altitude": PidLaw(HEIGHT_GAINS)} if holds_place else {}
+        self._place = _Hold(held)
+        self.laws = {"yaw": law or PidLaw(YAW_GAINS), **held}
         self._controller = controller
         self._elapsed = 0.0
 
@@ -153,8 +173,8 @@ class Rotation(Manoeuvre):
         goal = self._headings[index]
         terms = self.laws["yaw"](goal, measured.heading + measured.lead, sample_s)
         sample = LoopSample("yaw", self._controller, "deg", DEGREES, goal, measured.heading, terms)
-        place = self._place.command(measured, sample_s) if self._place is not None else (0.0, 0.0, 0.0)
-        return Command(*place, float(terms.output)), [sample]
+        place, held = self._place.step(measured, sample_s)
+        return place._replace(yaw_rate=float(terms.output)), [sample, *held]
 
 
 class Altitude(Manoeuvre):
@@ -176,8 +196,9 @@ class Altitude(Manoeuvre):
             raise UsageError(f"altitude: each height for {hold_s:g} s; give a time above 0")
         self._heights = list(heights)
         self._hold_s = hold_s
-        self._place = _Hold()
-        self.laws = {"altitude": law or PidLaw(HEIGHT_GAINS)}
+        held = _plane_laws()
+        self._place = _Hold(held)
+        self.laws = {"altitude": law or PidLaw(HEIGHT_GAINS), **held}
         self._controller = controller
         self._elapsed = 0.0
 
@@ -193,8 +214,8 @@ class Altitude(Manoeuvre):
         goal = self._heights[index]
         terms = self.laws["altitude"](goal, measured.up, sample_s)
         sample = LoopSample("altitude", self._controller, "m", 0.0, goal, measured.up, terms)
-        north, east, _ = self._place.command(measured, sample_s)
-        return Command(north, east, float(terms.output)), [sample]
+        place, held = self._place.step(measured, sample_s)
+        return place._replace(up=float(terms.output)), [sample, *held]
 
 
 class Corner(NamedTuple):
@@ -232,6 +253,7 @@ class Waypoints(Manoeuvre):
             raise UsageError(f"way points: tolerance {tolerance:g} m, {rounds} rounds; give both above 0")
         self._points = list(points) * rounds
         self._tolerance, self._hold_s = tolerance, hold_s
+        self.accuracy = max(self.accuracy, tolerance)
         horizontal, vertical = gains
         self._place = {"north": PidLaw(horizontal), "east": PidLaw(horizontal), "altitude": PidLaw(vertical)}
         self._yaw = PidLaw(YAW_GAINS)
@@ -240,12 +262,29 @@ class Waypoints(Manoeuvre):
         self._index = 0
         self._within = 0.0
         self._worst = 0.0
+        self._nearest, self._for_s = inf, 0.0
         self.corners: list[Corner] = []
 
     @property
     def done(self) -> bool:
         """Whether the last point was reached and held."""
         return self._index >= len(self._points)
+
+    def reset(self) -> None:
+        """Begin anew after a takeover, from where it then is."""
+        super().reset()
+        self._nearest, self._for_s = inf, 0.0
+
+    @property
+    def stuck(self) -> str:
+        """Why the present point is not reached, in words."""
+        if self.done or self._for_s < STUCK_AFTER_S + self._hold_s:
+            return ""
+        return (
+            f"way point {self._index + 1} of {len(self._points)} was not held within {self._tolerance:g} m "
+            f"for {self._hold_s:g} s, though {self._for_s:.0f} s passed without coming nearer than "
+            f"{self._nearest:.2f} m; a larger tolerance may do"
+        )
 
     def step(self, measured: Measured, sample_s: float) -> tuple[Command, Sequence[LoopSample]]:
         """Fly towards the present point."""
@@ -269,6 +308,8 @@ class Waypoints(Manoeuvre):
             return
         goal = self._points[self._index]
         distance = hypot(*(a - b for a, b in zip(here, goal, strict=True)))
+        nearer = distance < self._nearest
+        self._nearest, self._for_s = (distance, 0.0) if nearer else (self._nearest, self._for_s + sample_s)
         if not distance <= self._tolerance:
             self._within, self._worst = 0.0, 0.0
             return
@@ -278,6 +319,7 @@ class Waypoints(Manoeuvre):
             self.corners.append(Corner(self._index, self._worst))
             self._index += 1
             self._within, self._worst = 0.0, 0.0
+            self._nearest, self._for_s = inf, 0.0
 
 
 def cube(
@@ -317,7 +359,7 @@ class Landing(Manoeuvre):
 
     def __init__(self, steps: Sequence[tuple[float, float]] = STEPS, touch_down: float = TOUCH_DOWN) -> None:
         self._steps, self._touch_down = steps, touch_down
-        self._place = _Hold()
+        self._place = _Hold(_plane_laws())
         self._yaw = PidLaw(YAW_GAINS)
         self._heading: float | None = None
         self.laws: Mapping[str, Law] = {**self._place.laws, "yaw": self._yaw}
@@ -337,16 +379,24 @@ class Landing(Manoeuvre):
         """Return the rate of descent at *height* m above home; an unknown height is a low one."""
         return next((rate for above, rate in self._steps if height > above), self._touch_down)
 
+    def duration(self, height: float) -> float:
+        """Return the time in s that the descent from *height* m takes."""
+        seconds = 0.0
+        for above, rate in self._steps:
+            seconds += max(0.0, height - above) / rate
+            height = min(height, above)
+        return seconds + max(0.0, height) / self._touch_down
+
     def step(self, measured: Measured, sample_s: float) -> tuple[Command, Sequence[LoopSample]]:
         """Descend."""
-        north, east, _ = self._place.command(measured, sample_s)
+        place, held = self._place.step(measured, sample_s)
         if self._heading is None and isfinite(measured.heading):
             self._heading = measured.heading
         turn = self._yaw(self._heading or 0.0, measured.heading + measured.lead, sample_s)
         rate = self.rate(measured.up)
         terms = Terms(rate + measured.velocity_up, 0.0, 0.0, 0.0, -rate, -rate)
         sample = LoopSample("landing", "ramp", "m/s", 0.0, -rate, measured.velocity_up, terms)
-        return Command(north, east, -rate, float(turn.output)), [sample]
+        return place._replace(up=-rate, yaw_rate=float(turn.output)), [sample, *held]
 
 
 YAW_LAWS: Mapping[str, Callable[[], Law]] = {

@@ -4,6 +4,9 @@ One RC channel decides (by default channel 6): low is manual takeover, the middl
 is an emergency landing. The transmitter always wins: a low switch takes over from everything, at once and in
 every state. The emergency landing is final, but for the takeover. A program that starts, or that lost
 control, flies only after the switch has been received in its middle position.
+
+What is final needs confirmation: one wrong report, or a gap that has just become too long, begins no landing.
+A switch at the border between manual and autonomous stays manual.
 """
 
 from __future__ import annotations
@@ -50,7 +53,11 @@ AFTER: Mapping[Reaction, Authority] = {
 LEAST_PULSE, GREATEST_PULSE = 800, 2200
 """Range of valid pulse widths, µs; autopilots report 0 or 65535 for a channel without a signal."""
 CONFIRMED = 2
-"""Reports in a row that begin an emergency landing: a single wrong one must not."""
+"""Reports in a row, of the landing position or without a signal, that count: a single wrong one must not."""
+CONFIRMED_AFTER_S = 0.5
+"""Time for which a loss must last beyond the age at which it begins."""
+HYSTERESIS = 50
+"""Distance in us from the borders of the middle position within which control is not given back."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,10 +66,12 @@ class SwitchSettings:
 
     Attributes:
         channel: RC channel, from 1.
-        manual_below: pulse width below which the transmitter takes over, µs.
+        manual_below: pulse width below which the transmitter takes over, µs. Control is given back from
+            ``HYSTERESIS`` above it.
         landing_above: pulse width above which the emergency landing begins, µs.
-        missing_s: age of the last report from which the transmitter counts as lost, s.
-        silent_s: silence of the autopilot from which telemetry counts as lost, s.
+        missing_s: age of the last report from which the transmitter may be lost, s; it counts as lost
+            ``CONFIRMED_AFTER_S`` later.
+        silent_s: likewise the silence of the autopilot from which telemetry may be lost, s.
         on_rc_loss: reaction to the loss of the transmitter.
         on_telemetry_loss: reaction to the loss of telemetry.
         emergency: who flies the emergency landing.
@@ -80,16 +89,23 @@ class SwitchSettings:
     def __post_init__(self) -> None:
         if not 1 <= self.channel <= 18:
             raise UsageError(f"channel {self.channel} of the safety switch; give one from 1 to 18")
-        if not LEAST_PULSE < self.manual_below < self.landing_above < GREATEST_PULSE:
+        low, high = self.middle
+        if not LEAST_PULSE < self.manual_below < low < high < self.landing_above < GREATEST_PULSE:
             raise UsageError(
                 f"safety switch: manual below {self.manual_below} and landing above {self.landing_above}; "
-                f"give rising pulse widths between {LEAST_PULSE} and {GREATEST_PULSE} us"
+                f"give pulse widths between {LEAST_PULSE} and {GREATEST_PULSE} us, the second more than "
+                f"{2 * HYSTERESIS} us above the first"
             )
         for name in ("missing_s", "silent_s"):
             if isnan(getattr(self, name)) or getattr(self, name) <= 0.0:
                 raise UsageError(f"safety switch: {name}={getattr(self, name)}; give seconds above 0")
         if self.on_telemetry_loss is Reaction.CONTINUE:
             raise UsageError("safety switch: no law can continue without telemetry; give land or release")
+
+    @property
+    def middle(self) -> tuple[int, int]:
+        """Least and greatest pulse width that give control to the program, µs."""
+        return self.manual_below + HYSTERESIS, self.landing_above - HYSTERESIS
 
 
 def parse_reaction(text: str) -> Reaction:
@@ -114,12 +130,14 @@ class SwitchState(NamedTuple):
     Attributes:
         authority: who has control.
         confirmed: reports of the landing position in a row.
+        lost: reports in a row that are late or without a signal.
         why: what led to the authority.
     """
 
     authority: Authority = Authority.MANUAL
     confirmed: int = 0
     why: str = "the switch was not received in its middle position yet"
+    lost: int = 0
 
 
 class Received(NamedTuple):
@@ -151,13 +169,16 @@ def decide(settings: SwitchSettings, state: SwitchState, received: Received) -> 
         state: state after the last look.
         received: the present switch and silences.
     """
-    if received.silent_s > settings.silent_s:
-        return _lost(state, settings.on_telemetry_loss, "telemetry is lost")
-    if received.age_s > settings.missing_s:
-        return _lost(state, settings.on_rc_loss, "the transmitter is lost")
+    late_s = received.silent_s - settings.silent_s
+    if late_s > 0.0:
+        return _lost(state, received, late_s, settings.on_telemetry_loss, "telemetry is lost")
+    late_s = received.age_s - settings.missing_s
+    if late_s > 0.0:
+        return _lost(state, received, late_s, settings.on_rc_loss, "the transmitter is lost")
     if not received.valid:
-        return _lost(state, settings.on_rc_loss, f"channel {settings.channel} has no signal")
-    return _by_position(settings, state, received)
+        what = f"channel {settings.channel} has no signal"
+        return _lost(state, received, 0.0, settings.on_rc_loss, what)
+    return _by_position(settings, state._replace(lost=0), received)
 
 
 def _by_position(settings: SwitchSettings, state: SwitchState, received: Received) -> SwitchState:
@@ -170,13 +191,17 @@ def _by_position(settings: SwitchSettings, state: SwitchState, received: Receive
             why = f"the switch is at {pulse} us: emergency landing"
             return SwitchState(Authority.LANDING, confirmed, why)
         return state._replace(confirmed=confirmed)
-    if state.authority is Authority.MANUAL:
+    low, high = settings.middle
+    if state.authority is Authority.MANUAL and low <= pulse <= high:
         return SwitchState(Authority.AUTONOMOUS, 0, f"the switch is at {pulse} us: autonomous")
     return state._replace(confirmed=0)
 
 
-def _lost(state: SwitchState, reaction: Reaction, why: str) -> SwitchState:
+def _lost(state: SwitchState, received: Received, late_s: float, reaction: Reaction, why: str) -> SwitchState:
     """Return the state after a loss: it ends autonomous flight only, and never begins one."""
     if state.authority is not Authority.AUTONOMOUS or reaction is Reaction.CONTINUE:
         return state._replace(confirmed=0)
+    lost = state.lost + (1 if received.new else 0)
+    if lost < CONFIRMED and late_s < CONFIRMED_AFTER_S:
+        return state._replace(confirmed=0, lost=lost)
     return SwitchState(AFTER[reaction], 0, f"{why}: {reaction.value}")

@@ -7,8 +7,9 @@ gains in the air; only those that are wrong before the flight are an error.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import fields
+from functools import partial
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -112,8 +113,11 @@ class GainsFile:
         self._path, self._manoeuvre = path, manoeuvre
         self._loops = loops_of(manoeuvre)
         self._text = path.read_bytes() if path.is_file() else b""
-        for loop, gains in read_gains(path, self._loops).items():
+        found = read_gains(path, self._loops)
+        for loop, gains in found.items():
             set_gains(manoeuvre, loop, gains)
+        self.stated = frozenset(found)
+        """Loops that the file states."""
         self._due: Ns = 0
 
     def watch(self, drone: Drone) -> Callable[[float], None]:
@@ -156,11 +160,14 @@ class GainParameters:
                 if isfinite(usual):
                     parameter = f"~{loop}/{name}"
                     node.set_parameter(parameter, node.get_parameter(parameter, usual))
-        self._last = self._stated()
-        for loop, found in self._read().items():
+        self._last = self._parameters()
+        changed = {loop: found for loop, found in self._read().items() if found != self._loops[loop]}
+        for loop, found in changed.items():
             set_gains(manoeuvre, loop, found)
+        self.stated = frozenset(changed)
+        """Loops whose parameters were set before."""
 
-    def _stated(self) -> dict[str, dict[str, Any]]:
+    def _parameters(self) -> dict[str, dict[str, Any]]:
         """Return the parameters by loop; a parameter that was deleted keeps its first value."""
         return {
             loop: {
@@ -171,8 +178,9 @@ class GainParameters:
             for loop, gains in self._loops.items()
         }
 
-    def _read(self) -> dict[str, PidGains]:
-        return check_gains(self._last, self._loops, f"parameters of {self._node.name}")
+    def _read(self, loops: Collection[str] | None = None) -> dict[str, PidGains]:
+        stated = {loop: one for loop, one in self._last.items() if loops is None or loop in loops}
+        return check_gains(stated, self._loops, f"parameters of {self._node.name}")
 
     def watch(self, drone: Drone) -> None:
         """Start the task that reads the parameters each second."""
@@ -181,10 +189,11 @@ class GainParameters:
 
     def _follow(self, drone: Drone) -> None:
         while self._open:
-            stated = self._stated()
-            if stated != self._last:
+            stated, before = self._parameters(), self._last
+            if stated != before:
                 self._last = stated
-                _change(self._manoeuvre, drone, self._read, self._node.name)
+                loops = [loop for loop, one in stated.items() if one != before[loop]]
+                _change(self._manoeuvre, drone, partial(self._read, loops), self._node.name)
             sleep(drone.kernel, READ_AGAIN)
 
     def close(self) -> None:

@@ -6,12 +6,12 @@ it. Gains can be changed in flight, see ``gains``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from volery.base.errors import UsageError, choices, did_you_mean
+from volery.base.errors import NotArrived, UsageError, choices, did_you_mean
 from volery.base.time import Ns
 from volery.control.actuation import Actuation, AttitudeSetpoints, RcOverride, VelocitySetpoints
 from volery.control.flight import PERIOD, ControlledFlight
@@ -36,6 +36,8 @@ ACTUATIONS: Mapping[str, Callable[[Drone], Actuation]] = {
 WAYS = tuple(ACTUATIONS)
 RATES = {"rate": "20", "attitude": "50", "rc": "20"}
 """Telemetry that a control loop needs, Hz, unless the address states other rates."""
+SIMULATED_TRANSMITTERS = frozenset({"ardupilot"})
+"""Simulated autopilots that receive a transmitter without being asked to."""
 INFO = 6
 NODE = "volery_go"
 """Node whose parameters are the gains."""
@@ -53,6 +55,7 @@ class GoSettings:
         graph: real ROS graph on which the gains are parameters, ``ros1`` or ``ros2``; empty for none. A
             simulated vehicle then flies in real time, unless the options state a pace.
         period: sample time, ns.
+        experiment: whether the gains are flown as they are, and the end is not judged.
     """
 
     by: str = "setpoints"
@@ -61,6 +64,7 @@ class GoSettings:
     gains: Path | None = None
     graph: str = ""
     period: Ns = PERIOD
+    experiment: bool = False
 
     def __post_init__(self) -> None:
         if self.by not in WAYS:
@@ -70,6 +74,13 @@ class GoSettings:
         if self.graph and self.graph not in GRAPHS:
             hint = did_you_mean(self.graph, GRAPHS)
             raise UsageError(f"no graph {self.graph!r}{hint}; there is {choices(GRAPHS)}")
+
+
+def has_transmitter(url: str) -> bool:
+    """Return whether a vehicle may have a transmitter: a real one, or a simulated one with one."""
+    address = parse(url)
+    simulated = address.transport == "sim"
+    return not simulated or address.driver in SIMULATED_TRANSMITTERS or "transmitter" in address.options
 
 
 def with_rates(url: str, switch: SwitchSettings | None) -> str:
@@ -89,7 +100,7 @@ def with_rates(url: str, switch: SwitchSettings | None) -> str:
     if switch is None:
         del added["rc"]
     elif address.transport == "sim":
-        added["transmitter"] = f"{switch.channel}:{(switch.manual_below + switch.landing_above) // 2}"
+        added["transmitter"] = f"{switch.channel}:{sum(switch.middle) // 2}"
     missing = [f"{name}={value}" for name, value in added.items() if name not in address.options]
     return f"{url}{'&' if '?' in url else '?'}{'&'.join(missing)}" if missing else url
 
@@ -121,6 +132,7 @@ def go(
 
     def mission(drone: Drone) -> None:
         actuation = ACTUATIONS[settings.by](drone)
+        stated = set(gains.stated) if gains is not None else set()
         flight = ControlledFlight(
             drone,
             manoeuvre,
@@ -128,34 +140,38 @@ def go(
             switch=settings.switch,
             period=settings.period,
             height=settings.height,
+            as_stated=lambda loop: settings.experiment or loop in stated,
             on_sample=gains.watch(drone) if gains is not None else lambda _: None,
         )
         stream = drone.kernel.record
         if listener is not None and isinstance(stream, Stream):
             stream.tap(listener)
-        with _gain_parameters(settings.graph, drone, manoeuvre):
+        with _gain_parameters(settings.graph, drone, manoeuvre) as parameters:
+            stated.update(parameters)
             drone.wait_ready()
             if settings.by == "rc":
                 channel = settings.switch.channel if settings.switch is not None else None
                 for line in link_failsafes(drone, channel):
                     drone.kernel.record(Text(drone.kernel.now(), drone.name, INFO, f"{BY_STICKS}: {line}"))
-            flight.run()
+            off = flight.run()
+            if off and not settings.experiment:
+                raise NotArrived(drone.name, "fly under a law", f"it ended {off}; it was landed")
 
     return fly(mission, with_rates(on, settings.switch), options)
 
 
 @contextmanager
-def _gain_parameters(name: str, drone: Drone, manoeuvre: Manoeuvre) -> Iterator[None]:
-    """Let the gains be parameters of a node on the graph *name* while the context lasts."""
+def _gain_parameters(name: str, drone: Drone, manoeuvre: Manoeuvre) -> Iterator[Collection[str]]:
+    """Let the gains be parameters of a node on the graph *name*; yield the loops that were set before."""
     if not name:
-        yield
+        yield ()
         return
     graph = open_graph(drone.kernel, name)
     parameters = None
     try:
         parameters = GainParameters(graph.node(NODE), manoeuvre)
         parameters.watch(drone)
-        yield
+        yield parameters.stated
     finally:
         if parameters is not None:
             parameters.close()

@@ -20,6 +20,7 @@ from volery.control.laws import wrap
 from volery.control.log_signals import read_signals
 from volery.control.manoeuvres import YAW_LAWS, Rotation
 from volery.control.step_response import Signal, StepResponse, step_responses
+from volery.control.vehicle_answer import Answer
 from volery.run.fly import fly
 from volery.run.result import Options
 from volery.vehicles import Drone
@@ -74,6 +75,11 @@ class _Push:
         self._from: float | None = None
         self._over = False
         self.take_off, self.engage = inner.take_off, inner.engage
+
+    @property
+    def answer(self) -> Answer | None:
+        """None: a law that is pushed is not watched."""
+        return None
 
     @property
     def lead(self) -> float:

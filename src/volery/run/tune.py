@@ -214,7 +214,7 @@ def tune(what: str, on: str, settings: GoSettings, options: Options, tell: Tell 
     if what not in LOOPS:
         raise UsageError(f"no loop {what!r}{did_you_mean(what, LOOPS)}; there is {choices(tuple(LOOPS))}")
     loop = LOOPS[what]
-    settings = replace(settings, height=loop.height)
+    settings = replace(settings, height=loop.height, experiment=True)
     tell("relay experiment")
     record = _fly(lambda: loop.experiment(OnOffLaw(loop.relay)), on, settings, options, loop.name)
     times, values, _, errors, outputs = record.T

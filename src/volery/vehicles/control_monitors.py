@@ -15,12 +15,11 @@ from volery.base.frames import Vector
 from volery.base.position import Position
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.vehicles.limits import Bounds, Path
-from volery.vehicles.telemetry import RECENT_CAUSE, STALE_AFTER, Telemetry, describe_state
+from volery.vehicles.telemetry import RECENT_CAUSE, STALE_AFTER, Telemetry, describe_state, is_overturned
 from volery.vehicles.vehicle_clock import Moment
 
 FALLING_M_S = 8.0
 """Sink rate that no autopilot commands by itself, m/s."""
-OVERTURNED_DEG = 70.0
 OVERTURNED_FOR: Ns = 300 * MS
 UNCHECKED_FOR: Ns = S
 """Time without a check after which what was noticed before does not count."""
@@ -81,7 +80,7 @@ class UpsetMonitor:
         if sink > FALLING_M_S:
             return f"it falls at {sink:.0f} m/s"
         roll, pitch, _ = seen.attitude
-        if not (abs(roll) > OVERTURNED_DEG or abs(pitch) > OVERTURNED_DEG):
+        if not is_overturned(seen.attitude):
             self._tilted_since = None
             return ""
         self._tilted_since = now if self._tilted_since is None else self._tilted_since

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from math import hypot, inf, isfinite, nan
+from math import hypot, inf, isfinite, isnan, nan
 from typing import NamedTuple
 
 from volery.base.frames import LocalFrame, Vector
@@ -65,6 +65,8 @@ class Obstacle(NamedTuple):
 
 
 KEPT_TEXTS = 50
+LEARNT_INTERVALS, KNOWN_INTERVALS = 16, 3
+"""Intervals between reports that their mean covers, and fewer than which it is not known."""
 STALE_AFTER: Ns = 2 * S
 """Silence after which the state counts as old."""
 REFRESHED_AFTER: Ns = 2 * S
@@ -109,11 +111,36 @@ def pulse_of(share: float) -> int:
     return MIDDLE_US + round(HALF_US * min(1.0, max(-1.0, share))) if isfinite(share) else 0
 
 
+class ReportPeriod:
+    """Mean time between the reports of a quantity: of all at first, later of about the last sixteen."""
+
+    def __init__(self) -> None:
+        self._last: Ns = -1
+        self._mean = nan
+        self._intervals = 0
+
+    def note(self, now: Ns) -> None:
+        """Note a report at *now* ns."""
+        if self._last >= 0:
+            self._intervals = min(LEARNT_INTERVALS, self._intervals + 1)
+            seconds = (now - self._last) / S
+            self._mean = seconds if isnan(self._mean) else self._mean
+            self._mean += (seconds - self._mean) / self._intervals
+        self._last = now
+
+    @property
+    def seconds(self) -> float:
+        """The mean, s; NaN before three intervals are known."""
+        return self._mean if self._intervals >= KNOWN_INTERVALS else nan
+
+
 class Telemetry:
     """The last reported state of one vehicle, in this project's units.
 
     Attributes:
         changed: notified after each message.
+        position_reports: time between two reports of position and velocity.
+        heading_reports: time between two reports of the heading.
         kind: "drone", "rover", or the autopilot's own term for another kind.
         system: system id, where the protocol has one.
         version: version of the firmware; None where it is not stated, or not yet.
@@ -177,7 +204,8 @@ class Telemetry:
         self._home_at_first: Position | None = None  # as it was at ``home_ns``
         self.home_ns: Ns = -1
         self.velocity = Velocity(nan, nan, nan)
-        self.attitude = Attitude(nan, nan, nan)
+        self._attitude = Attitude(nan, nan, nan)
+        self.position_reports, self.heading_reports = ReportPeriod(), ReportPeriod()
         self.battery = Battery(nan, nan, nan)
         self.thrust = nan
         self.satellites = 0
@@ -222,6 +250,20 @@ class Telemetry:
         if self.position is not None:
             self._position_period = now - self._position_ns
         self.position, self._position_ns = position, now
+        self.position_reports.note(now)
+
+    @property
+    def attitude(self) -> Attitude:
+        """The last reported attitude."""
+        return self._attitude
+
+    @attitude.setter
+    def attitude(self, attitude: Attitude) -> None:
+        if (
+            attitude.heading is not self._attitude.heading
+        ):  # a report of roll and pitch alone keeps the object
+            self.heading_reports.note(self._kernel.now())
+        self._attitude = attitude
 
     @property
     def located(self) -> bool:
@@ -357,8 +399,20 @@ def failsafe_cause(telemetry: Telemetry, now: Ns) -> str:
     return "not stated by the autopilot"
 
 
+OVERTURNED_DEG = 70.0
+"""Roll or pitch beyond which a multirotor has turned over, degrees."""
+
+
+def is_overturned(attitude: Attitude) -> bool:
+    """Return whether a multirotor with this attitude has turned over; an unknown one has not."""
+    return abs(attitude.roll) > OVERTURNED_DEG or abs(attitude.pitch) > OVERTURNED_DEG
+
+
 def describe_state(telemetry: Telemetry) -> str:
-    """Return position, mode and whether it is armed, as last reported."""
+    """Return position, mode, whether it is armed, and whether it has turned over, as last reported."""
     armed = "armed" if telemetry.armed else "disarmed"
     where = f"at {telemetry.position}" if telemetry.position is not None else "position unknown"
-    return f"{where}, mode {telemetry.mode or 'unknown'}, {armed}"
+    lies = ""
+    if telemetry.kind == "drone" and is_overturned(telemetry.attitude):
+        lies = ", upside down" if abs(telemetry.attitude.roll) > 90.0 else ", on its side"
+    return f"{where}, mode {telemetry.mode or 'unknown'}, {armed}{lies}"

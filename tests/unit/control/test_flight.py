@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from rigs.controlled_flights import Watched, fly_watched
-from volery.base.errors import LinkLost, NotArrived, Refused, UsageError
+from volery.base.errors import LinkLost, NotArrived, OffTrack, Refused, UsageError
 from volery.base.time import from_seconds
 from volery.control.actuation import RC_SCALES, Command, RcAxis
 from volery.control.flight import limited_descent
@@ -239,7 +239,9 @@ def test_the_yaw_loops_swing_as_those_of_arducopter(monkeypatch: pytest.MonkeyPa
     """A law on the measured heading alone overshot by 10.3 % on the real one, which swung for 8 s."""
     plain = RC_SCALES["ArduPilot"]._replace(turning=None)
     monkeypatch.setitem(RC_SCALES, "ArduPilot", plain)  # type: ignore[arg-type]  # it is a dict
-    flown = fly_watched(lambda: Rotation([0.0, 90.0], 10.0), [(0.0, 1500)], by="rc", switch=SWITCH)
+    flown = fly_watched(
+        lambda: Rotation([0.0, 90.0], 10.0), [(0.0, 1500)], by="rc", switch=SWITCH, as_stated=True
+    )
     assert 6.0 < overshoot(flown) < 14.0
 
 
@@ -254,6 +256,42 @@ def test_heights() -> None:
     assert [one for one in flown.samples if one.loop == "altitude"][-1].measurement == pytest.approx(
         7.0, abs=0.1
     )
+
+
+@pytest.mark.parametrize("make", [rotation, lambda: Altitude([9.0], 20.0)])
+def test_attitudes_that_an_autopilot_ignores_are_noticed(make, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As ArduCopter from 4.6 on ignores those without all rates: no error, no effect."""
+    monkeypatch.setattr(Drone, "set_attitude", lambda *_, **__: None)
+    flown = fly_watched(make, by="attitude", limit_s=80.0)
+    assert isinstance(flown.error, OffTrack)
+    assert "it does not follow" in str(flown.error)
+    assert "were asked for within 2.5 s, " in str(flown.error)
+    assert landed_gently(flown)
+    assert flown.end.at < 40.0
+
+
+def test_a_landing_law_that_does_not_sink_is_taken_over_by_the_autopilot(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    velocity = Drone.set_velocity
+
+    def keep_height(drone: Drone, north: float, east: float, up: float, turn: float, **more: float) -> None:
+        velocity(drone, north, east, max(0.0, up), turn, **more)
+
+    monkeypatch.setattr(Drone, "set_velocity", keep_height)
+    flown = fly_watched(lambda: Rotation([0.0], 3.0), limit_s=80.0)
+    assert flown.error is None
+    assert any(
+        "the landing law: it does not follow: -2.0 m up" in one and "the autopilot lands it" in one
+        for one in flown.texts
+    )
+    assert landed_gently(flown)
+
+
+def test_a_way_point_that_is_never_held_is_given_up() -> None:
+    flown = fly_watched(lambda: Waypoints([(0.0, 0.0, 4.0)], tolerance=1e-4, hold_s=5.0), limit_s=200.0)
+    assert "way point 1 of 1 was not held within 0.0001 m" in str(flown.error)
+    assert landed_gently(flown)
 
 
 # -- channels and bad input

@@ -60,7 +60,7 @@ def test_the_program_gets_control_only_by_a_fresh_middle_position(settings, sequ
     for one in sequence:
         before, state = state, decide(settings, state, one)
         if state.authority is AUTONOMOUS and before.authority is not AUTONOMOUS:
-            assert 1200 <= one.pulse <= 1700
+            assert 1250 <= one.pulse <= 1650
             assert one.age_s <= settings.missing_s
             assert one.silent_s <= settings.silent_s
 
@@ -94,18 +94,45 @@ def test_the_positions_of_the_thesis():
     ]  # fmt: skip
 
 
-def test_one_wrong_report_does_not_land():
-    assert after(at(1500), at(1900), at(1500)).authority is AUTONOMOUS
-    assert after(at(1500), at(1900), at(1500), at(1900)).authority is AUTONOMOUS
+LATE = Received(1500, 1.05, 0.05, new=False)
+
+
+@pytest.mark.parametrize(
+    "bad", [at(1900), at(0), at(65535), at(2201), LATE, Received(1500, 0.05, 2.05, new=False)]
+)
+def test_one_wrong_report_does_not_land(bad):
+    assert after(at(1500), bad, at(1500)).authority is AUTONOMOUS
+    assert after(at(1500), bad, at(1500), bad, at(1500)).authority is AUTONOMOUS
+
+
+bad_reports = st.sampled_from([at(0), at(65535), at(2201), at(1701), at(2200), LATE])
+
+
+@given(settings_of, st.lists(st.tuples(st.integers(1250, 1650), bad_reports), max_size=40))
+def test_wrong_reports_that_are_never_two_in_a_row_end_nothing(settings, pairs):
+    sequence = [one for pulse, bad in pairs for one in (at(pulse), bad)]
+    assert after(at(1500), *sequence, settings=settings).authority is AUTONOMOUS
+
+
+@given(st.lists(st.integers(1151, 1249), max_size=60))
+def test_a_switch_held_at_the_border_is_taken_over_once(held):
+    state, changes = after(at(1500)), 0
+    for pulse in held:
+        before, state = state, decide(DEFAULT, state, at(pulse))
+        changes += state.authority is not before.authority
+    assert changes <= 1
+    assert state.authority is (MANUAL if any(pulse < 1200 for pulse in held) else AUTONOMOUS)
 
 
 @pytest.mark.parametrize(
     ("reaction", "expected"),
     [(Reaction.LAND, LANDING), (Reaction.RELEASE, MANUAL), (Reaction.CONTINUE, AUTONOMOUS)],
 )
-@pytest.mark.parametrize("lost", [Received(1500, 1.1, 0.0), Received(0, 0.1, 0.0), Received(65535, 0.1, 0.0)])
+@pytest.mark.parametrize(
+    "lost", [[Received(1500, 1.5, 0.0, new=False)], [at(0), at(0)], [at(65535), at(2201)]]
+)
 def test_a_lost_transmitter_has_the_configured_reaction(reaction, expected, lost):
-    state = after(at(1500), lost, settings=SwitchSettings(on_rc_loss=reaction))
+    state = after(at(1500), *lost, settings=SwitchSettings(on_rc_loss=reaction))
     assert state.authority is expected
 
 
@@ -125,6 +152,7 @@ def test_a_switch_that_is_stuck_high_at_the_start_never_flies():
     [
         {"channel": 0},
         {"manual_below": 1800},
+        {"manual_below": 1600},
         {"missing_s": nan},
         {"silent_s": 0.0},
         {"on_telemetry_loss": Reaction.CONTINUE},

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from math import hypot
 from pathlib import Path
 
 import pytest
 
-from volery.base.errors import UsageError
+from volery.base.errors import CapabilityError, NotArrived, OffTrack, UsageError
 from volery.control.log_signals import read_signals
-from volery.control.manoeuvres import Rotation
+from volery.control.manoeuvres import Altitude, Manoeuvre, Rotation, Waypoints
 from volery.control.safety_switch import SwitchSettings
 from volery.run.go import GoSettings, go, with_rates
 from volery.run.result import Options
 from volery.run.thesis_comparison import fly_thesis_comparison
+from volery.trace.events import ControlSample, Event, Text
 
 
 def test_the_telemetry_of_a_loop_is_requested_unless_stated() -> None:
@@ -34,6 +37,86 @@ def test_a_flight_records_its_loops(tmp_path: Path) -> None:
     assert run.error is None
     (yaw,) = (one for one in read_signals(tmp_path / "run") if one.name == "yaw")
     assert abs(yaw.measured[-1] - 45.0) < 2.0
+
+
+STEERED = {
+    "ardupilot": ("setpoints", "attitude", "rc"),
+    "px4": ("setpoints", "attitude", "rc"),
+    "dji": ("setpoints", "attitude"),
+    "paparazzi": ("setpoints",),
+}
+"""Simulated autopilots and their ways of steering."""
+MANOEUVRES: dict[str, Callable[[], Manoeuvre]] = {
+    "altitude": lambda: Altitude([9.0, 6.0], 8.0),
+    "rotation": lambda: Rotation([90.0, 0.0], 8.0),
+    "waypoints": lambda: Waypoints([(6.0, 0.0, 5.0), (6.0, 6.0, 7.0)]),
+}
+
+
+@pytest.mark.parametrize("name", MANOEUVRES)
+@pytest.mark.parametrize(("autopilot", "by"), [(one, by) for one, ways in STEERED.items() for by in ways])
+def test_every_law_ends_within_1_m_on_every_autopilot(autopilot: str, by: str, name: str) -> None:
+    last: dict[str, ControlSample] = {}
+
+    def note(event: Event) -> None:
+        if isinstance(event, ControlSample):
+            last[event.loop] = event
+
+    run = go(MANOEUVRES[name], f"sim:{autopilot}?start=warm", GoSettings(by=by), Options(), listener=note)
+    assert run.ok, run.error
+    assert {"north", "east"} <= set(last)
+    errors = [one.error for one in last.values() if one.unit == "m"]
+    assert hypot(*errors) < 1.0
+
+
+@pytest.mark.parametrize("by", ["attitude", "rc"])
+def test_a_way_of_steering_that_a_vehicle_lacks_is_refused(by: str) -> None:
+    run = go(MANOEUVRES["rotation"], "sim:paparazzi?start=warm", GoSettings(by=by), Options())
+    assert isinstance(run.error, CapabilityError | UsageError)
+    assert "Paparazzi" in str(run.error) or "paparazzi" in str(run.error)
+
+
+def test_gains_that_let_the_error_grow_end_in_a_hold_and_a_landing(tmp_path: Path) -> None:
+    """The gains of a fast vehicle, stated for a slow one."""
+    gains = tmp_path / "gains.toml"
+    gains.write_text("[north]\nkp = 0.9\nki = 0.02\n[east]\nkp = 0.9\n")
+    texts: list[str] = []
+
+    def note(event: Event) -> None:
+        if isinstance(event, Text):
+            texts.append(event.text)
+
+    run = go(
+        lambda: Altitude([8.0], 120.0),
+        "sim:paparazzi?start=warm",
+        GoSettings(gains=gains),
+        Options(out=tmp_path / "run"),
+        listener=note,
+    )
+    assert isinstance(run.error, OffTrack)
+    assert "grew from" in str(run.error)
+    assert "under kp 0.9" in str(run.error)
+    assert "it held and landed" in str(run.error)
+    assert any("holds, then the autopilot lands it" in one for one in texts)
+    assert not run.ok
+
+
+def test_a_flight_that_ends_far_from_its_goal_has_failed() -> None:
+    run = go(lambda: Rotation([170.0], 1.0), "sim:ardupilot?start=warm", GoSettings(), Options())
+    assert isinstance(run.error, NotArrived)
+    assert "degrees from its set-point, beyond 10 degrees" in str(run.error)
+    assert not run.ok
+
+
+def test_reports_that_are_too_rare_for_a_law_are_refused_by_name() -> None:
+    run = go(
+        MANOEUVRES["rotation"],
+        "sim:ardupilot?start=warm&rate=2&attitude=2",
+        GoSettings(by="attitude"),
+        Options(),
+    )
+    assert isinstance(run.error, CapabilityError)
+    assert "ardupilot reports its velocity each 0.50 s" in str(run.error)
 
 
 def test_wrong_settings_are_refused() -> None:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from volery.control.manoeuvres import Manoeuvre
     from volery.control.safety_switch import SwitchSettings
     from volery.run.go import GoSettings
+    from volery.trace.events import Event
 
 commands = Commands("Fly", group="go", summary="Fly under a control law on this side of the link.")
 
@@ -39,12 +40,13 @@ class SwitchOptions:
     """Options of the operator's safety switch."""
 
     switch: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="CHANNEL|none",
-            help="RC channel of the safety switch: below 1200 us manual, to 1700 us autonomous, above land.",
+            help="RC channel of the safety switch: below 1200 us manual, to 1700 us autonomous, above land. "
+            "By default 6; none on a simulated vehicle without a transmitter.",
         ),
-    ] = "6"
+    ] = None
     on_rc_loss: Annotated[
         str, typer.Option(metavar="land|release|continue", help="Reaction to the loss of the transmitter.")
     ] = "land"
@@ -59,22 +61,26 @@ class SwitchOptions:
         ),
     ] = "autopilot"
 
-    def settings(self) -> SwitchSettings | None:
-        """Return the settings of the switch, or None for ``none``.
+    def settings(self, on: str, output: Output) -> SwitchSettings | None:
+        """Return the settings of the switch of the vehicle at *on*, or None to fly without.
 
         Raises:
-            UsageError: an option is wrong.
+            UsageError: an option or the address is wrong.
         """
         from volery.control.safety_switch import SwitchSettings, parse_emergency, parse_reaction
+        from volery.run.go import has_transmitter
 
         rc, telemetry = parse_reaction(self.on_rc_loss), parse_reaction(self.on_telemetry_loss)
         emergency = parse_emergency(self.emergency)
-        if self.switch == "none":
+        switch = self.switch or ("6" if has_transmitter(on) else "none")
+        if self.switch is None and switch == "none":
+            output.note(f"{on} has no transmitter: it flies without a safety switch (--switch none)")
+        if switch == "none":
             return None
-        if not self.switch.isdecimal():
-            raise UsageError(f"--switch {self.switch}: give the number of an RC channel, or none")
+        if not switch.isdecimal():
+            raise UsageError(f"--switch {switch}: give the number of an RC channel, or none")
         return SwitchSettings(
-            channel=int(self.switch), on_rc_loss=rc, on_telemetry_loss=telemetry, emergency=emergency
+            channel=int(switch), on_rc_loss=rc, on_telemetry_loss=telemetry, emergency=emergency
         )
 
 
@@ -101,7 +107,7 @@ class FlightOptions(SwitchOptions):
     speed: Speed = "max"
     out: Out = None
 
-    def flight(self, height: float) -> GoSettings:
+    def flight(self, height: float, output: Output) -> GoSettings:
         """Return the settings of a flight that takes off to *height* m.
 
         Raises:
@@ -110,7 +116,11 @@ class FlightOptions(SwitchOptions):
         from volery.run.go import GoSettings
 
         return GoSettings(
-            by=self.by, switch=self.settings(), height=height, gains=self.gains, graph=self.graph or ""
+            by=self.by,
+            switch=self.settings(self.on, output),
+            height=height,
+            gains=self.gains,
+            graph=self.graph or "",
         )
 
 
@@ -241,9 +251,10 @@ def _go(
     from volery.cli.run_display import run_folder, run_progress, show_outcome
     from volery.run.go import go
     from volery.run.result import Options
+    from volery.trace.events import ControlSample
 
     pace = parse_speed(options.speed)
-    settings = options.flight(height)
+    settings = options.flight(height, output)
     with (
         run_folder(options.out, f"go-{name}") as folder,
         run_progress(output, f"{name} on {options.on}") as show,
@@ -257,7 +268,14 @@ def _go(
             tell=output.note,
             if_killed=options.if_killed,
         )
-        run = go(make, options.on, settings, how)
+        flown: list[Event] = []
+
+        def note_sample(event: Event) -> None:
+            if not flown and isinstance(event, ControlSample):
+                flown.append(event)
+
+        run = go(make, options.on, settings, how, listener=note_sample)
     status = show_outcome(output, run)
-    output.note(f"volery response {run.folder} judges its loops")
+    if flown:
+        output.note(f"volery response {run.folder} judges its loops")
     return status

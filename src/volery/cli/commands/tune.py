@@ -37,7 +37,7 @@ def tune(
     from volery.run.result import Options
     from volery.run.tune import tune as tune_loop
 
-    settings = GoSettings(by=by, switch=switch.settings())
+    settings = GoSettings(by=by, switch=switch.settings(on, output))
     with run_folder(out, f"tune-{loop}") as folder:
         options = Options(fidelity="hardware", seed=seed, out=folder)
         found = tune_loop(loop, on, settings, options, output.note)

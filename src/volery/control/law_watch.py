@@ -1,0 +1,158 @@
+"""What ends a law in flight: an error that grows, and a vehicle that does not follow its commands.
+
+Both look at each sample of a flight and return what is wrong in words. What the vehicle does then is decided
+in ``flight``: it holds, then lands by the autopilot.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from math import copysign, hypot, isfinite, nan
+
+from volery.control.actuation import Command, Measured
+from volery.control.laws import Law, PidLaw, wrap
+from volery.control.manoeuvres import LoopSample
+
+GROWTH_M, GROWTH_DEG = 5.0, 90.0
+"""Growth of an error that ends a law, above the least one since the set-point changed."""
+GROWN_FOR_S = 1.0
+"""Time for which it must last: a position that jumps back is no reason."""
+WITHIN_DEG = 10.0
+"""Error of the heading within which a flight ends where it should."""
+
+WINDOW_S = 5.0
+"""Time within which a command must show an effect. The first half is left to delays and to braking."""
+FOLLOWED = 0.2
+"""Share of what was commanded in the second half that must be seen."""
+LEAST_ASKED = (4.0, 4.0, 1.0, 20.0)
+"""Way north, east and up in m and turn in degrees, in each half, below which nothing is judged. In wind a
+tilted drone drifts until its velocity loop has the tilt; ``ErrorWatch`` bounds that.
+"""
+
+
+class ErrorWatch:
+    """Notices an error that grows, loop by loop.
+
+    Args:
+        laws: laws by loop, whose gains are named.
+    """
+
+    def __init__(self, laws: Mapping[str, Law]) -> None:
+        self._laws = laws
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, after a takeover."""
+        self._least: dict[str, tuple[float, float]] = {}  # set-point and least error since it changed
+        self._grown_s: dict[str, float] = {}
+
+    def check(self, samples: Iterable[LoopSample], sample_s: float) -> str:
+        """Return which error has grown, from what to what and under which gains; empty if none has.
+
+        Args:
+            samples: the loops of one sample.
+            sample_s: time since the last sample, s.
+        """
+        for one in samples:
+            error = abs(float(one.terms.error))
+            if one.unit not in {"m", "deg"} or not isfinite(error):
+                continue
+            goal, least = self._least.get(one.loop, (one.goal, error))
+            least = min(least, error) if goal == one.goal else error
+            self._least[one.loop] = one.goal, least
+            most = least + (GROWTH_M if one.unit == "m" else GROWTH_DEG)
+            grown_s = self._grown_s.get(one.loop, 0.0) + sample_s if error > most else 0.0
+            self._grown_s[one.loop] = grown_s
+            if grown_s >= GROWN_FOR_S:
+                return (
+                    f"the error of {one.loop} grew from {least:.1f} to {error:.1f} {one.unit}, beyond the "
+                    f"limit of {most:.1f} {one.unit}, under {self._law(one.loop)}"
+                )
+        return ""
+
+    def _law(self, loop: str) -> str:
+        law = self._laws.get(loop)
+        if not isinstance(law, PidLaw):
+            return "its law"
+        return f"kp {law.gains.kp:.3g}, ki {law.gains.ki:.3g}, kd {law.gains.kd:.3g}"
+
+
+class FollowWatch:
+    """Notices a vehicle that does not move as it is commanded.
+
+    Judged is a command that has kept its sign for ``WINDOW_S``: what came in the second half of that time,
+    against what was asked for in either half.
+    """
+
+    AXES = ("north", "east", "up", "turn")
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, after a takeover."""
+        self._now_s = 0.0
+        self._asked, self._came = [0.0] * 4, [0.0] * 4
+        self._steady_s = [0.0] * 4
+        self._command = Command()
+        self._last: Measured | None = None
+        self._seen: deque[tuple[float, list[float], list[float]]] = deque()
+
+    def check(self, command: Command, measured: Measured, sample_s: float) -> str:
+        """Return what was asked and what came, if the vehicle does not follow; else an empty text.
+
+        Args:
+            command: command that is applied from now on.
+            measured: what was measured before.
+            sample_s: time since the last sample, s.
+        """
+        self._now_s += sample_s
+        moved = self._motion(measured)
+        for axis, way in enumerate(moved):
+            asked, before = command[axis], self._command[axis]
+            kept = isfinite(way) and asked * before > 0.0
+            self._steady_s[axis] = self._steady_s[axis] + sample_s if kept else 0.0
+            self._asked[axis] += before * sample_s
+            self._came[axis] += way if isfinite(way) else 0.0
+        self._command, self._last = command, measured
+        self._seen.append((self._now_s, list(self._asked), list(self._came)))
+        while self._seen[0][0] < self._now_s - WINDOW_S:
+            self._seen.popleft()
+        return next(filter(None, map(self._judged, range(4))), "")
+
+    def _motion(self, now: Measured) -> tuple[float, float, float, float]:
+        last = self._last or now
+        turned = float(wrap(now.heading - last.heading)) if isfinite(now.heading - last.heading) else nan
+        return now.north - last.north, now.east - last.east, now.up - last.up, turned
+
+    def _judged(self, axis: int) -> str:
+        if self._steady_s[axis] < WINDOW_S:
+            return ""
+        (_, first, _), (_, middle, came_before) = self._seen[0], self._seen[len(self._seen) // 2]
+        asked = min(middle[axis] - first[axis], self._asked[axis] - middle[axis], key=abs)
+        came = self._came[axis] - came_before[axis]
+        unit = "deg" if axis == 3 else "m"
+        if abs(asked) < LEAST_ASKED[axis] or came * copysign(1.0, asked) >= FOLLOWED * abs(asked):
+            return ""
+        return (
+            f"it does not follow: {asked:.1f} {unit} {self.AXES[axis]} were asked for within "
+            f"{WINDOW_S / 2.0:g} s, {came:.1f} {unit} came"
+        )
+
+
+def ended_off(samples: Iterable[LoopSample], accuracy_m: float) -> str:
+    """Return how far from its last set-points a manoeuvre has ended, if that is too far; else an empty text.
+
+    Args:
+        samples: the last sample of each loop.
+        accuracy_m: distance within which it ends where it should, m.
+    """
+    errors = {one.loop: (float(one.terms.error), one.unit) for one in samples}
+    distance = hypot(*(error for error, unit in errors.values() if unit == "m"))
+    turn = max((abs(error) for error, unit in errors.values() if unit == "deg"), default=0.0)
+    if not distance <= accuracy_m:
+        return f"{distance:.1f} m from its set-point, beyond {accuracy_m:g} m"
+    return (
+        "" if turn <= WITHIN_DEG else f"{turn:.0f} degrees from its set-point, beyond {WITHIN_DEG:g} degrees"
+    )
