@@ -151,7 +151,7 @@ def test_hosts_compile_components_in_cpp_and_they_call_each_other(tmp_path: Path
     env = {**os.environ, "ROS_MASTER_URI": roscore.uri, "ROS_IP": "127.0.0.1"}
     reading, writing = os.pipe()
     started = [
-        subprocess.Popen([sys.executable, scripts / name], env=env, stderr=writing)
+        subprocess.Popen([sys.executable, scripts / name], env=env, stdout=writing, stderr=writing)
         for name in ("echoer", "asker")
     ]
     os.close(writing)
@@ -161,9 +161,9 @@ def test_hosts_compile_components_in_cpp_and_they_call_each_other(tmp_path: Path
                 assert "volery:" not in line, line
                 if "the answer is ababab" in line:
                     break
-        for process in started:
-            process.terminate()
-        assert [process.wait(LEAVE_S) for process in started] == [0, 0]
+            for process in started:
+                process.terminate()
+            assert [process.wait(LEAVE_S) for process in started] == [0, 0]
     finally:
         for process in started:
             process.kill()
