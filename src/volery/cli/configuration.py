@@ -4,12 +4,18 @@ The nearest file counts, from the current folder upwards; files are not merged. 
 command, with the names of its options without dashes in front: ``[simulate]`` with ``seed = 3``, and
 ``[calibrate.ros]`` for a command of a group. What stands on the command line wins. Unknown names are refused,
 since a misspelt default would have no effect without a word.
+
+A folder may come from another person. So the values that a command takes from a file are printed, options of
+``NEVER`` are refused, and a file that another user owns or can replace is ignored.
 """
 
 from __future__ import annotations
 
+import os
+import stat
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +28,45 @@ from volery.base.files import read_text
 OWN_FILE, SHARED_FILE = "volery.toml", "pyproject.toml"
 
 
-def read_defaults(application: Callable[[], typer.Typer], folder: Path) -> dict[str, Any]:
-    """Return the defaults for click's ``default_map``; empty where no file states any.
+NAMES_A_PROGRAM = "it chooses what is executed"
+PROTECTS = "it protects people or a vehicle"
+NEVER = {
+    **dict.fromkeys(("python", "mission", "entry", "before", "arg", "flag", "link"), NAMES_A_PROGRAM),
+    **dict.fromkeys(
+        ("ceiling", "fence", "reserve", "if-killed", "max-speed", "max-turn", "height"), PROTECTS
+    ),
+    **dict.fromkeys(("switch", "on-rc-loss", "on-telemetry-loss", "emergency"), PROTECTS),
+    **dict.fromkeys(("enable-control", "signing", "fly"), PROTECTS),
+    **dict.fromkeys(("replace", "remove"), "it overwrites or removes files"),
+}
+"""Options that no file states, with the reason: who writes the folder would decide for who types there."""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """Defaults of a file for click's ``default_map``, and ``notes`` on files that were ignored."""
+
+    file: Path | None = None
+    defaults: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    _tables: dict[str, Any] = field(default_factory=dict)
+
+    def said(self, words: Sequence[str]) -> list[str]:
+        """Return what is printed before the command *words* executes: its values from the file, and notes."""
+        table, name = self._tables, ""
+        for word in words:
+            if not isinstance(below := table.get(word), dict):
+                break
+            table, name = below, f"{name}.{word}" if name else word
+        values = [f"{key} = {value}" for key, value in table.items() if not isinstance(value, dict)]
+        taken = [f"{self.file} [{name}]: {', '.join(values)}"] if name and values else []
+        return [*self.notes, *taken]
+
+
+def read_configuration(application: Callable[[], typer.Typer], folder: Path) -> Configuration:
+    """Return the defaults that the nearest file states; none where no file does.
+
+    A file that another user could have written does not count.
 
     Args:
         application: Returns the application, against which the names in a file are checked.
@@ -32,14 +75,41 @@ def read_defaults(application: Callable[[], typer.Typer], folder: Path) -> dict[
     Raises:
         UsageError: The file cannot be read, or names a command or an option that does not exist.
     """
+    notes: list[str] = []
     for place in (folder, *folder.parents):
         for name in (OWN_FILE, SHARED_FILE):
             file = place / name
-            if file.is_file():
-                stated = _tables(file)
-                if stated is not None:
-                    return _of_group(typer.main.get_group(application()), stated, f"{file}: ")
-    return {}
+            if not file.is_file():
+                continue
+            foreign = _foreign(file)
+            if foreign and name == OWN_FILE:
+                notes.append(f"{file} is ignored: {foreign}")
+                continue
+            stated = _tables(file)
+            if stated is None:
+                continue
+            if foreign:
+                notes.append(f"{file} is ignored: {foreign}")
+                continue
+            defaults = _of_group(typer.main.get_group(application()), stated, f"{file}: ")
+            return Configuration(file, defaults, tuple(notes), stated)
+    return Configuration(notes=tuple(notes))
+
+
+ROOT = 0
+"""User who can write every file."""
+
+
+def _foreign(file: Path) -> str:
+    """Return why another user could have written *file*; empty if only this one and root can."""
+    for place, what in ((file, "it"), (file.parent, "its folder")):
+        state = place.stat()
+        if state.st_uid not in (os.getuid(), ROOT):
+            return f"{what} belongs to another user"
+        own_group = state.st_gid == os.getgid()
+        if state.st_mode & stat.S_IWOTH or (state.st_mode & stat.S_IWGRP and not own_group):
+            return f"other users can write {'to ' * (what != 'it')}{what}"
+    return ""
 
 
 def _tables(file: Path) -> dict[str, Any] | None:
@@ -83,6 +153,8 @@ def _of_command(command: Any, table: dict[str, Any], where: str) -> dict[str, An
     }
     found: dict[str, Any] = {}
     for name, value in table.items():
+        if name in options and name in NEVER:
+            raise UsageError(f"{where}{name}: give --{name} on the command line only: {NEVER[name]}")
         option = options.get(name)
         if option is None or option.name is None:
             raise UsageError(f"{where}there is no option --{name}{did_you_mean(name, options)}")

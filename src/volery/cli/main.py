@@ -11,7 +11,7 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from pkgutil import iter_modules
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -20,7 +20,7 @@ from volery.base.garbage import seldom_collected
 from volery.base.process import outlive_output
 from volery.cli import commands
 from volery.cli.command import BAD_INPUT, FAILED, SECTIONS, Commands
-from volery.cli.configuration import read_defaults
+from volery.cli.configuration import Configuration, read_configuration
 from volery.cli.console import Output
 
 INFORMATION = frozenset({"-h", "--help", "--version"})
@@ -86,15 +86,18 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     atexit.register(gc.freeze)  # at its end Python looks for garbage in all that exists; nothing needs it
     command = typer.main.get_command(application(next(iter(sys.argv[1:]), "")))
-    defaults: dict[str, Any] = {}
+    configuration = Configuration()
     try:
-        defaults = read_defaults(application, Path.cwd())
+        configuration = read_configuration(application, Path.cwd())
     except (UsageError, OSError) as error:
         Output().complain(f"volery: {error}")
         if not INFORMATION.intersection(sys.argv[1:]) and sys.argv[1:]:
             raise SystemExit(BAD_INPUT) from None
+    if not INFORMATION.intersection(sys.argv[1:]):
+        for line in configuration.said(sys.argv[1:]):
+            Output().note(line)
     try:
-        command(prog_name="volery", default_map=defaults)
+        command(prog_name="volery", default_map=configuration.defaults)
     finally:
         sys.stdout.flush()
         if printed is not None and printed.problem:
