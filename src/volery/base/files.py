@@ -69,6 +69,11 @@ def replace_text(path: Path, text: str) -> None:
         raise
 
 
+def one_line(text: str) -> str:
+    """Return *text* as a line or a comment of a file can hold it: line ends and controls become spaces."""
+    return "".join(one if one.isprintable() else " " for one in text)
+
+
 def read_text(path: Path) -> str:
     """Return the text of a regular file in UTF-8.
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import escape, quoteattr
 
+from volery.base.files import one_line
 from volery.deploy.content import MODEL_FOLDER, Bridged, Computer, Hosted
 from volery.model.system import System
 
@@ -29,24 +30,19 @@ AUTOPILOT_USB = (
 """Vendor and product of USB devices that are often an autopilot, as udev lists them."""
 
 
-def comment(text: str) -> str:
-    """Return *text* in one line, for comments of YAML, AADL and the like: controls become spaces."""
-    return "".join(one if one.isprintable() else " " for one in text)
-
-
 def unit_value(text: str) -> str:
     """Return *text* for a line of a systemd unit: no specifier, and no backslash that joins lines."""
-    return comment(text).replace("%", "%%").replace("\\", "/")
+    return one_line(text).replace("%", "%%").replace("\\", "/")
 
 
 def xml_text(text: str) -> str:
     """Return *text* for the content of an XML element, without the controls that XML forbids."""
-    return escape(comment(text))
+    return escape(one_line(text))
 
 
 def markdown(text: str) -> str:
     """Return *text* for a line or a table of Markdown, without markup of its own."""
-    return re.sub(r"([\\`*_{}\[\]<>()#|~!])", r"\\\1", comment(text))
+    return re.sub(r"([\\`*_{}\[\]<>()#|~!])", r"\\\1", one_line(text))
 
 
 def host_script(hosted: Hosted, system: System, graph: str, model: str) -> str:
@@ -124,7 +120,7 @@ if __name__ == "__main__":
 def parameter_files(computer: Computer) -> Iterator[tuple[Path, str]]:
     """Yield the parameters of each hosted component, as YAML that may be edited on the computer."""
     for one in computer.hosted:
-        head = f"# parameters of {comment(one.instance.name)}; what is changed here wins over the model\n"
+        head = f"# parameters of {one_line(one.instance.name)}; what is changed here wins over the model\n"
         lines = [f"{json.dumps(name)}: {_yaml(value)}\n" for name, value in one.instance.parameters.items()]
         yield Path("config") / f"{one.executable}.yaml", head + ("".join(lines) or "{}\n")
 

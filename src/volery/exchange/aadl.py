@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from volery.base import units
+from volery.base.files import one_line
 from volery.base.time import Ns
 from volery.base.units import QuantityError
 from volery.exchange.notes import (
@@ -62,7 +63,7 @@ def aadl_text(tree: Mapping[str, Any]) -> tuple[str, tuple[Note, ...]]:
     note_rest(unmapped, tree, (*_MAPPED, *_ALSO))
     name = identifier(str(tree.get("name", "model")))
     lines = [
-        f"-- {tree.get('description') or tree.get('name', '')}",
+        f"-- {one_line(str(tree.get('description') or tree.get('name', '')))}",
         f"package {name}",
         "public",
         *_indented(_interfaces(tree)),
@@ -163,7 +164,7 @@ def _thread(name: str, active: Mapping[str, Any], stated: Mapping[str, Any]) -> 
             both = f"{time_text(units.read_ns(best))} .. {time_text(units.read_ns(worst))}"
             properties.append(f"  Compute_Execution_Time => {both};")
     except QuantityError as error:
-        properties.append(f"  -- {error}")
+        properties.append(f"  -- {one_line(str(error))}")
     if "priority" in active:
         properties.append(f"  Priority => {active['priority']};")
     yield from (f"thread {name}", "properties", *properties, f"end {name};", "")

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import replace as changed
 from pathlib import Path, PurePath
+from typing import Any
 
 from volery.base.errors import Location, ModelError, UsageError, choices
 from volery.base.files import read_bytes, write_text
@@ -52,7 +54,58 @@ def read_uml(
         data = read_bytes(source, MOST_BYTES)
     except OSError as error:
         raise ModelError(f"cannot read it: {error.strerror or error}", "", Location(str(source), 0)) from None
-    return import_uml(data, str(source), _rebase(source.parent, folder), catalogue, processors)
+    rebase = _rebase(source.parent, folder)
+    imported = import_uml(data, str(source), rebase, catalogue, processors)
+    tree = _moved(imported.tree, rebase)
+    outside = _outside(tree)
+    if not outside:
+        return changed(imported, tree=tree)
+    tree["files_from"] = list(dict.fromkeys([*tree.get("files_from", []), *outside]))
+    what = f"its files are in {choices(outside).replace(' or ', ' and ')}, which `files_from` allows now"
+    return changed(imported, tree=tree, notes=(*imported.notes, Note(what, Location(str(source), 0))))
+
+
+def _moved(tree: Mapping[str, Any], rebase: Rebase) -> dict[str, Any]:
+    """Return a model with its paths, except those of components, as another folder needs them."""
+    made = dict(tree)
+    environment, platform = made.get("environment"), made.get("platform")
+    if isinstance(environment, dict) and isinstance(environment.get("world"), str):
+        made["environment"] = environment | {"world": rebase(environment["world"])}
+    if isinstance(platform, dict) and platform.get("catalogues"):
+        stated = platform["catalogues"]
+        listed = stated if isinstance(stated, list) else [stated]
+        made["platform"] = platform | {"catalogues": [rebase(str(one)) for one in listed]}
+    for section in ("scenarios", "allocations"):
+        made |= {section: {name: _moved_changes(one, rebase) for name, one in made.get(section, {}).items()}}
+        if not made[section]:
+            del made[section]
+    if made.get("files_from"):
+        stated = made["files_from"]
+        made["files_from"] = [rebase(str(one)) for one in (stated if isinstance(stated, list) else [stated])]
+    return made
+
+
+def _moved_changes(variant: Any, rebase: Rebase) -> Any:
+    """Return a scenario or an allocation whose changes name files as another folder needs them."""
+    changes = variant.get("set") if isinstance(variant, dict) else None
+    if not isinstance(changes, dict):
+        return variant
+    moved = {key: rebase(one) for key, one in changes.items() if key == _WORLD and isinstance(one, str)}
+    return variant | {"set": changes | moved}
+
+
+_WORLD = "environment.world"
+
+
+def _outside(tree: Mapping[str, Any]) -> list[str]:
+    """Return the folders of files outside the model's folder that ``files_from`` does not name."""
+    components = (tree.get("components") or {}).values()
+    named = [str(one.get("path") or "") for one in components if isinstance(one, dict)]
+    world = (tree.get("environment") or {}).get("world")
+    named += [world] if isinstance(world, str) else []
+    allowed = [PurePath(one) for one in tree.get("files_from", [])]
+    folders = {PurePath(one).parent: None for one in named if PurePath(one).parts[:1] == ("..",)}
+    return [one.as_posix() for one in folders if not any(one.is_relative_to(other) for other in allowed)]
 
 
 def uml_model(
@@ -117,7 +170,8 @@ def export_model(model: Path, target: Path, vocabulary: Vocabulary) -> tuple[Not
     tree = read_tree(file).plain()
     if target.suffix == ".uml":
         base = read_uml(target, file.parent, vocabulary.processors) if target.exists() else None
-        text, notes = export_uml(tree, str(target), _rebase(file.parent, target.parent), base)
+        rebase = _rebase(file.parent, target.parent)
+        text, notes = export_uml(_moved(tree, rebase), str(target), rebase, base)
     else:
         text, notes = (aadl_text if target.suffix == ".aadl" else sysml_text)(tree)
     _write(target, text)

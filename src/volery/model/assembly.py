@@ -213,6 +213,9 @@ def read_tree(file: FilePath) -> Node:
 
 def _read_files(file: FilePath) -> tuple[Assembly, Problems]:
     """Read *file* and the files that it includes, as one tree."""
+    if file.suffix == ".uml":
+        what = f"this is UML: `volery model import {file} --out model.yaml` makes the model of it that runs"
+        raise ModelError(what, "", Location(str(file), 1), rules.NOT_A_MODEL.code)
     root, text = _read_mapping(file, str(file), "a model is a mapping that starts with `volery: 1`")
     made = Assembly(root, (Source(file.name, text),))
     problems = Problems(root.locate)

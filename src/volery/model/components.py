@@ -415,7 +415,7 @@ class _File(Syntax):
             there = sorted(found.name for found in file.parent.glob("*") if found.is_file())
             beside = f"; in that folder there is {', '.join(there[:8])}" if there else ""
             what = f"there is no file {node.value!r} beside the model{beside}"
-            reading.problems.add(path, what, rule=rules.MISSING_FILE)
+            reading.problems.warn(path, what, rules.UNWRITTEN_CODE)
         return node.value
 
     def schema(self, definitions: Schema) -> Schema:

@@ -313,6 +313,13 @@ CODE_MISMATCH = _rule(
     "Change the class, or the model.",
 )
 
+UNWRITTEN_CODE = _warning(
+    "V705",
+    "unwritten-code",
+    "A component whose file is not there: everything but a run works without it.",
+    "Correct the path, or write the file; without `path`, stated times run.",
+)
+
 # -- models of other tools
 
 NOT_MAPPED = _warning(

@@ -1,6 +1,6 @@
-"""From a file to a checked ``System``: ``load``, ``check``, and ``check_ready`` for one fidelity.
+"""From a file to a checked ``System``: ``load``; ``gaps`` and ``check_code`` say what a run lacks.
 
-``load`` gives one allocation and one scenario; ``check`` tries them all. A model is read in one pass over its
+``load`` gives one allocation and one scenario. A model is read in one pass over its
 tree; here, what concerns several sections is checked and put together.
 """
 
@@ -34,21 +34,33 @@ FIDELITIES = ("times", "code", "firmware", "hardware")
 """Constant times · real component code · real autopilot firmware in the loop · real vehicles."""
 
 
-def check_ready(system: System, fidelity: str, vocabulary: Vocabulary) -> None:
-    """Check that *system* can run at *fidelity* (``times`` or ``code``).
+def check_code(system: System) -> None:
+    """Check that the files of all components are there, as a run needs them.
 
     Raises:
-        ModelError: what is missing; all of it at once (``CollectedModelError``).
+        ModelError: A file is missing; all of them at once (``CollectedModelError``).
     """
-    found = list(gaps(system, fidelity, vocabulary))
+    found = list(_unwritten(system))
     if len(found) == 1:
         raise found[0]
     if found:
         raise CollectedModelError(found)
 
 
+def _unwritten(system: System) -> Iterator[ModelError]:
+    for component in {one.component.name: one.component for one in system.instances}.values():
+        if component.path and not system.file_of(component).exists():
+            what = (
+                f"there is no file {component.path!r}: a run needs its code. Write it, or remove `path` to "
+                "run with the times that the model states (--fidelity times)"
+            )
+            at = f"components.{component.name}.path"
+            yield ModelError(what, at, component.where, rules.UNWRITTEN_CODE.code)
+
+
 def gaps(system: System, fidelity: str, vocabulary: Vocabulary) -> Iterator[ModelError]:
     """Yield what is missing, component by component, in the order of the model."""
+    yield from _unwritten(system)
     used = {instance.component.name: instance.component for instance in system.instances}
     for component in used.values():
         if fidelity == "code" and not component.path:

@@ -204,8 +204,51 @@ def test_a_uml_file_is_checked_with_its_own_lines(tmp_path):
     component = 'name="Patrol" isActive'
     line = next(n for n, one in enumerate(spoilt.splitlines(), 1) if component in one)
     result = run("model", "check", str(file))
-    assert result.exit_code == BAD_INPUT
+    assert result.exit_code == OK
     assert f"starter.uml:{line}: components.Patrol.path: there is no file" in text(result)
+    simulated = run("simulate", str(file))
+    assert simulated.exit_code == BAD_INPUT
+    assert f"volery model import {file} --out model.yaml" in text(simulated)
+
+
+def test_a_model_without_its_code_is_analysed_drawn_shown_compared_and_exported(tmp_path):
+    folder = tmp_path / "model"
+    assert run("new", str(folder)).exit_code == OK
+    for file in (folder / "components").iterdir():
+        file.unlink()
+    for words in (
+        ("check",), ("analyse",), ("draw", "--to", str(tmp_path / "pictures")), ("show",),
+        ("diff", str(folder)), ("export", "--to", str(tmp_path / "m.uml")),
+        ("export", "--to", str(tmp_path / "m.aadl")),
+    ):  # fmt: skip
+        result = run("model", words[0], str(folder), *words[1:])
+        assert result.exit_code == OK, (words, text(result))
+    result = run("simulate", str(folder), "--fidelity", "times")
+    assert result.exit_code == BAD_INPUT
+    assert "2 things are wrong" in text(result)
+    assert "a run needs its code. Write it, or remove `path` to run with the times" in text(result)
+    model = folder / "model.yaml"
+    model.write_text("".join(one for one in model.open() if "path: components" not in one))
+    result = run(
+        "simulate", str(folder), "--fidelity", "times", "--set", "run.duration=1 s", "--record", "none"
+    )
+    assert "a run needs" not in text(result)
+
+
+@pytest.mark.parametrize("name", ["delivery", "starter"])
+def test_a_model_goes_to_another_folder_as_uml_and_comes_back(tmp_path, name):
+    files, back = tmp_path / "uml", tmp_path / "back"
+    files.mkdir()
+    back.mkdir()
+    uml = files / "m.uml"
+    assert run("model", "export", str(example(name)), "--to", str(uml)).exit_code == OK
+    made = run("model", "import", str(uml), "--out", str(back / "model.yaml"))
+    assert "which `files_from` allows now" in text(made)
+    result = run("model", "check", str(back))
+    assert result.exit_code == OK, text(result)
+    assert "no file" not in text(result)
+    compared = run("model", "diff", str(example(name)), str(back))
+    assert compared.exit_code == OK, text(compared)
 
 
 def test_an_import_says_what_it_made_and_what_did_not_map(tmp_path):
@@ -216,7 +259,10 @@ def test_an_import_says_what_it_made_and_what_did_not_map(tmp_path):
     uml = tmp_path / "starter.uml"
     assert run("model", "export", str(example("starter")), "--to", str(uml), "--quiet").output == ""
     result = run("model", "import", str(uml), "--out", str(tmp_path / "m.yaml"), "--json")
-    assert json.loads(result.stdout) == {"model": str(tmp_path / "m.yaml"), "notes": []}
+    made = json.loads(result.stdout)
+    assert made["model"] == str(tmp_path / "m.yaml")
+    [note] = made["notes"]
+    assert "which `files_from` allows now" in note
     result = run("model", "import", str(uml), "--processor", "x=y", "--out", str(tmp_path / "n.yaml"))
     assert "--processor x=y: NAME=KIND is expected; the kinds are generic-host" in text(result)
 

@@ -78,3 +78,9 @@ def test_what_has_no_place_is_listed(tmp_path):
         line.startswith("provenance of quantities: platform.processors.onboard.frequency") for line in listed
     )
     assert any("drone_1.battery" in line for line in listed)
+
+
+def test_a_name_stays_in_its_comment():
+    text, _ = aadl_text({"name": "x\nend x; system mark end mark;\u2028y", "components": {}})
+    assert text.splitlines()[0] == "-- x end x; system mark end mark; y"
+    assert not any(line.startswith(("end x;", "system mark")) for line in text.splitlines())

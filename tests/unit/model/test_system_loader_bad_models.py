@@ -171,12 +171,6 @@ SPOILT = {
         "platform.networks.radio.between",
         ["a processor stands here twice"],
     ),
-    "missing component file": (
-        ("path: code/planner.py", "path: code/planer.py"),
-        "planer.py",
-        "components.RouteGenerator.path",
-        ["there is no file 'code/planer.py' beside the model", "planner.py"],
-    ),
     "unknown interface": (
         ("provides: {paths: Routing}", "provides: {paths: Rooting}"),
         "Rooting",

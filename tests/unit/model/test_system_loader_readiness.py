@@ -3,7 +3,11 @@
 import pytest
 
 from volery.base.errors import ModelError
-from volery.model.system_loader import check_ready, gaps
+from volery.model.system_loader import check_code, gaps
+
+
+def missing(workshop):
+    return [str(gap) for gap in gaps(workshop.load(), "code", workshop.vocabulary)]
 
 
 def test_times_needs_a_figure_at_each_kind_of_processor(workshop):
@@ -20,20 +24,30 @@ def test_a_figure_at_another_processor_is_named(workshop):
 
 
 def test_code_needs_files(workshop):
-    check_ready(workshop.load(), "code", workshop.vocabulary)
+    assert missing(workshop) == []
     workshop.change("    path: code/planner.py\n", "")
-    with pytest.raises(
-        ModelError, match=r"components.RouteGenerator: it has no code: fidelity `code` needs a `path`"
-    ):
-        check_ready(workshop.load(), "code", workshop.vocabulary)
+    [said] = missing(workshop)
+    assert "components.RouteGenerator: it has no code: fidelity `code` needs a `path`" in said
+    check_code(workshop.load())  # a run has its stated times
+
+
+def test_a_file_that_is_not_written_yet_keeps_a_model_from_running_only(workshop):
+    workshop.change("code/planner.py", "code/planer.py")
+    system = workshop.load()
+    [warning] = [one for one in system.warnings if one.rule.code == "V705"]
+    assert "there is no file 'code/planer.py' beside the model" in warning.what
+    assert "planner.py" in warning.what
+    assert warning.where.line == workshop.line_of("planer.py")
+    with pytest.raises(ModelError, match=r"a run needs its code. Write it, or remove `path`"):
+        check_code(system)
+    assert any("a run needs its code" in one for one in missing(workshop))
 
 
 def test_languages_that_do_not_run_yet_are_named(workshop):
     workshop.change("language: rospy", "language: roscpp")
-    with pytest.raises(ModelError, match="roscpp components do not run yet; python or rospy do"):
-        check_ready(workshop.load(), "code", workshop.vocabulary)
+    assert any("roscpp components do not run yet; python or rospy do" in one for one in missing(workshop))
 
 
 def test_components_without_instances_do_not_matter(workshop):
     workshop.change("  Requester:", "  Unused: {language: c++}\n  Requester:")
-    check_ready(workshop.load(), "code", workshop.vocabulary)
+    assert missing(workshop) == []

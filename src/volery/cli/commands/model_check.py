@@ -86,11 +86,14 @@ def _show(output: Output, checked: CheckedModel) -> None:
     system = checked.system
     if system is not None and not checked.errors:
         output.show(_summary(system), _instances(system), *_readiness(checked.missing))
-    for one in checked.findings:
-        if one.rule.level == "warning":
-            output.show(Text(f"⚠ {_line(one)}", style="yellow"))
-    for one, reason in checked.suppressed:
-        output.show(Text(f"· suppressed: {_line(one)} ({reason})", style="dim"))
+    said = [
+        Text(f"⚠ {_line(one)}", style="yellow") for one in checked.findings if one.rule.level == "warning"
+    ]
+    said += [
+        Text(f"· suppressed: {_line(one)} ({reason})", style="dim") for one, reason in checked.suppressed
+    ]
+    for line in () if output.quiet else said:
+        output.results.print(line, soft_wrap=True)  # editors read the place from its beginning
 
 
 def _line(one: Finding) -> str:

@@ -66,8 +66,9 @@ class Import:
     file: XmiFile
     tree: dict[str, Any] = field(default_factory=dict)
     keys: dict[str, Element] = field(default_factory=dict)
-    notes: list[Note] = field(default_factory=list)
+    notes: dict[Note, None] = field(default_factory=dict)  # an ordered set
     names: dict[Element, str] = field(default_factory=dict)
+    _numbers: dict[str, int] = field(default_factory=dict)
     _parts: dict[Element, list[Element]] = field(default_factory=dict)
     _links: dict[Element, list[Element]] | None = None
     _specifications: dict[Element, Element] | None = None
@@ -76,9 +77,7 @@ class Import:
         """Record what could not be imported from *element*."""
         name = element.get("name") or local(element)
         place = f"{name} ({xmi_id(element)})" if xmi_id(element) else name
-        made = Note(what, self.file.where(element), place)
-        if made not in self.notes:
-            self.notes.append(made)
+        self.notes[Note(what, self.file.where(element), place)] = None
 
     def section(self, *path: str) -> dict[str, Any]:
         """Return the mapping at *path* in the tree; it is made if it is missing."""
@@ -92,9 +91,10 @@ class Import:
         if element not in self.names:
             written = str(element.get("name", ""))
             made = identifier(written) or identifier(uml_type(element)) or "unnamed"
-            number, base = 2, made
+            base, number = made, self._numbers.get(made, 2)
             while made in taken:
                 made, number = f"{base}_{number}", number + 1
+                self._numbers[base] = number
             if identifier(written) != written:
                 self.note(element, f"{written!r} is no name in a model; it is {made!r} there")
             elif made != written:

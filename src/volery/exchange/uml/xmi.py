@@ -17,6 +17,8 @@ from lxml import etree
 
 from volery.base.errors import Location, ModelError
 
+MOST_ELEMENTS = 200_000
+"""Most elements of a file that is read: a bound of the time, too."""
 MOST_BYTES = 32 << 20
 """Largest .uml file that is read. The complete profile of S3D with its history has 2.6 MB."""
 
@@ -92,7 +94,7 @@ class XmiFile:
         self.applied: dict[Element, list[Application]] = {}
         self.bases: dict[Element, Element] = {}
         self.strange: list[Element] = []
-        self.dangling: list[tuple[Element, str]] = []
+        self.dangling: dict[tuple[Element, str], None] = {}  # an ordered set
         for element in root:
             if isinstance(element.tag, str) and element is not self.model:
                 self._index(element)
@@ -118,7 +120,7 @@ class XmiFile:
         for _, target in bases:
             found = self.ids.get(target)
             if found is None:
-                self.dangling.append((element, target))
+                self.dangling[element, target] = None
                 continue
             self.bases[element] = found
             known = self.applied.setdefault(found, [])
@@ -176,8 +178,8 @@ class XmiFile:
             if target in self.ids:
                 one = self.ids[target]
                 found.append(self.bases.get(one, one))
-            elif (element, target) not in self.dangling:
-                self.dangling.append((element, target))
+            else:
+                self.dangling[element, target] = None
         return found
 
     def reference(self, element: Element, feature: str) -> Element | None:
@@ -279,6 +281,9 @@ def parse(data: bytes, name: str) -> XmiFile:
         raise ModelError(f"this is not XML: {error.msg}", "", Location(name, line)) from None
     if root.getroottree().docinfo.doctype:  # in an encoding in which the search above finds nothing
         raise ModelError("a document type is declared; models have none", "", Location(name, 1))
+    count = sum(1 for _ in root.iter(etree.Element))
+    if count > MOST_ELEMENTS:
+        raise ModelError(f"{count} elements; {MOST_ELEMENTS} are read at most", "", Location(name, 1))
     return XmiFile(_model_root(root, name), name)
 
 

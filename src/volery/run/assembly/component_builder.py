@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,6 +29,7 @@ from volery.model.components import VEHICLE_INTERFACES, Signature
 from volery.model.instances import Connection, TargetKind
 from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
+from volery.model.system_loader import check_code
 from volery.ros.client_libraries.importable_modules import importable_modules
 from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
@@ -209,7 +210,12 @@ class Builder:
         self._instances: dict[str, Instance] = {}
 
     def build(self, fidelity: str, seed: int, traces: Path | None = None) -> BuiltComponents:
-        """Load every file, create every instance, connect every port."""
+        """Load every file, create every instance, connect every port.
+
+        Raises:
+            ModelError: A file is missing or does not fit its component.
+        """
+        check_code(replace(self._system, instances=self._models))
         steps = StepCounter(libraries=library_table()) if fidelity == "code" else None
         for model in self._models:
             if model.component.path and model.component.language in PYTHON_ROS:

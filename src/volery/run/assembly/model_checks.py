@@ -77,7 +77,9 @@ def _faults(system: System, languages: frozenset[str]) -> Iterator[ModelError]:
     loader = Loader({**virtual_modules(kernel, seed=0), **modules})
     for instance in system.instances:
         component = instance.component
-        if not component.path or component.language not in languages:
+        if component.language not in languages or not component.path:
+            continue
+        if not system.file_of(component).exists():  # it is a warning of the model
             continue
         try:
             if is_cpp(component):
