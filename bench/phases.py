@@ -38,7 +38,7 @@ SENSORS = {"px4": "sih", "paparazzi": "rtk"}
 """The sensors nearest to those of the simulator that was recorded: SIH's noise is larger than that of the
 default ones, the receiver of NPS has none."""
 
-VERSIONS = {"ardupilot": "4.5"}
+VERSIONS = {"ardupilot": "4.5", "px4": "1.14"}
 """The version that was recorded, of an autopilot that is simulated in several."""
 
 FLIGHTS = {"px4": 360, "paparazzi": 8}

@@ -127,6 +127,17 @@ NEWER_MESSAGES = (
 )
 """Messages of MAVLink's ``common`` dialect that pymavlink does not define yet."""
 
+NEWER_FIELDS: Mapping[str, tuple[FieldDefinition, ...]] = {
+    "MISSION_ACK": (FieldDefinition("uint32_t", "opaque_id"),),
+    "MISSION_COUNT": (FieldDefinition("uint32_t", "opaque_id"),),
+    "MISSION_CURRENT": (
+        FieldDefinition("uint32_t", "mission_id"),
+        FieldDefinition("uint32_t", "fence_id"),
+        FieldDefinition("uint32_t", "rally_points_id"),
+    ),
+}
+"""Extension fields, single values, that pymavlink's definition of a message does not have yet."""
+
 
 # -- message types
 
@@ -158,14 +169,21 @@ class MessageType:
     def __init__(self, definition: Any) -> None:
         self.name: str = definition.msgname
         self.id: int = definition.id
-        self.field_names: tuple[str, ...] = tuple(definition.fieldnames)
+        known = set(definition.fieldnames)
+        newer = [field for field in NEWER_FIELDS.get(self.name, ()) if field.name not in known]
+        self.field_names: tuple[str, ...] = (*definition.fieldnames, *(field.name for field in newer))
         self._extra = bytes([definition.crc_extra])
-        self._struct: struct.Struct = definition.unpacker
+        codes = "".join(_CODES[field.type] for field in newer)
+        self._struct: struct.Struct = struct.Struct(definition.unpacker.format + codes)
         self.size: int = self._struct.size
         types = dict(zip(definition.fieldnames, definition.fieldtypes, strict=True))
+        types |= {field.name: field.type for field in newer}
         self._fields = tuple(
             _Field(name, length, types[name] == "char")
-            for name, length in zip(definition.ordered_fieldnames, definition.array_lengths, strict=True)
+            for name, length in (
+                *zip(definition.ordered_fieldnames, definition.array_lengths, strict=True),
+                *((field.name, 0) for field in newer),
+            )
         )
         self._names = tuple(field.name for field in self._fields)
         self._known = frozenset(self._names)

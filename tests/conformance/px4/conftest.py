@@ -17,7 +17,7 @@ from volery.simulation.autopilots.px4 import FIRMWARE
 class Bench(Station):
     """One vehicle, one ground station on one link, whose heartbeat it hears."""
 
-    firmware = FIRMWARE
+    firmware = FIRMWARE.of_version("1.14")  # the recorded one
     home = LocalFrame(45.4671160, -73.7578370, 32.34)
     looks_per_second = 50
 

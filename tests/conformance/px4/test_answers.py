@@ -264,7 +264,7 @@ def test_a_reposition_beyond_the_geofence_is_accepted_and_not_flown(bench: Any) 
     assert rig.command_int(192, param1=-1, param2=1, **there) == ACCEPTED
     rig.run(0.3)
     assert rig.texts(since)[:2] == [
-        "Maximum distance from home reached\t",
+        "Maximum distance from home reached (100.00000)\t",
         "Reposition is outside geofence\t",
     ]
     assert rig.events(since)[:2] == [0x0115F1B8, 0x01CDEBC4]
@@ -546,6 +546,7 @@ def test_a_mission_that_is_started_names_what_has_armed(bench: Any) -> None:
     latitude, longitude, _ = rig.vehicle.estimate.geodetic
     item = MissionItem(22, 3, x=round(latitude * 1e7), y=round(longitude * 1e7), z=10.0)
     rig.vehicle.mission.replace([item])
+    rig.run(0.2)  # examined
     rig.command(300)
     rig.run(0.5)
     assert "Armed by mission start\t" in rig.texts()

@@ -23,7 +23,7 @@ def test_a_critical_battery_holds_and_then_acts(action: int, mode: str, bench: A
     rig.flight.drain_battery(0.06)
     rig.run(1.0)
     assert rig.vehicle.mode.name == LOITER
-    assert "Critical battery level\t" in rig.texts(since)
+    assert "Preflight Fail: low battery\t" in rig.texts(since)
     rig.run(5.5)
     assert rig.vehicle.mode.name == mode
     assert rig.latest["HEARTBEAT"]["system_status"] == 5
@@ -40,7 +40,7 @@ def test_a_battery_that_falls_further_does_not_hold_a_second_time(bench: Any) ->
     for _ in range(30):
         rig.run(0.1)
         seen.add(rig.vehicle.mode.name)
-    assert "Emergency battery level\t" in rig.texts(since)
+    assert rig.texts(since).count("Preflight Fail: low battery\t") == 1
     assert seen == {LAND}
 
 
@@ -50,7 +50,7 @@ def test_a_battery_that_only_warns(bench: Any) -> None:
     rig.flight.drain_battery(0.06)
     rig.run(8.0)
     assert rig.vehicle.mode.name == LOITER
-    assert "Critical battery level\t" in rig.texts(since)
+    assert "Preflight Fail: low battery\t" in rig.texts(since)
 
 
 def test_without_a_position_it_sinks_level_and_reports_land(bench: Any) -> None:
@@ -155,7 +155,7 @@ def test_outside_its_geofence_it_does_what_gf_action_says(action: int, mode: str
     rig.offboard(x=30.0, y=0.0, z=-9.0)
     rig.run_until(lambda: rig.ned[0] > 12.5, within=10.0)
     rig.run(0.2)
-    assert "Maximum distance from home reached\t" in rig.texts()
+    assert "Maximum distance from home reached (12.00000)\t" in rig.texts()
     rig.run(6.5)
     assert rig.vehicle.mode.name == ("OFFBOARD" if action == 1 else mode)
 

@@ -321,7 +321,7 @@ class MavlinkEndpoint:
                 handler(self._vehicle, fields, frame.system)
 
     def _is_addressed(self, frame: Frame) -> bool:
-        fields, strict = frame.fields, self.firmware.commands.wrong_target is not None
+        fields, strict = frame.fields, self.firmware.commands.checks_component
         system, component = fields.get("target_system", BROADCAST), fields.get("target_component", BROADCAST)
         if strict and frame.name in COMMANDS and system != self._vehicle.system:
             return False

@@ -182,9 +182,9 @@ class CommandPolicy:
     """Number of the command that acknowledges SET_MODE."""
     answer_delay: Ns = 5 * MS
     wrong_target: int | None = None
-    """MAV_RESULT of a command for another system or component; ``None``: no answer, and the component is
-    ignored.
-    """
+    """MAV_RESULT of a command for another system or component; ``None``: no answer."""
+    checks_component: bool = False
+    """Whether a message for another component is not handled; else the component is ignored."""
     accepts: Callable[[Vehicle, str, int], bool] = _always
     """Whether a message, by its name and the system that sends it, is handled at all."""
     private_links: Callable[[Vehicle], frozenset[int]] | None = None
@@ -222,6 +222,10 @@ class MissionPolicy:
     """Called after such a list has changed, with its MAV_MISSION_TYPE."""
     writes_parts: bool = False
     """Whether MISSION_WRITE_PARTIAL_LIST replaces a part of the mission."""
+    list_id: Callable[[Vehicle, int], int] | None = None
+    """Return the checksum of a list by its MAV_MISSION_TYPE; ``None``: acknowledgements carry none."""
+    item_refused: VehicleAction = do_nothing
+    """Called when an uploaded item is refused."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -385,6 +385,7 @@ class MissionService:
             stored = convert(upload.kind, item)
         if isinstance(stored, int):
             self._drop_upload()
+            self._firmware.missions.item_refused(self._vehicle)
             self._acknowledge(upload.peer, stored, upload.kind)
             return
         upload.items.append(stored)
@@ -423,7 +424,7 @@ class MissionService:
             self._acknowledge(peer, MISSION_UNSUPPORTED, kind)
             return
         count = len(self._vehicle.mission) if kind == MISSION else len(self._points(kind))
-        peer.answer("MISSION_COUNT", count=count, mission_type=kind)
+        peer.answer("MISSION_COUNT", count=count, mission_type=kind, **self._id_of(kind))
 
     def on_request_int(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle MISSION_REQUEST_INT."""
@@ -512,4 +513,9 @@ class MissionService:
             self._request_item()
 
     def _acknowledge(self, peer: Peer, result: int, kind: int = MISSION) -> None:
-        peer.answer("MISSION_ACK", type=result, mission_type=kind)
+        peer.answer("MISSION_ACK", type=result, mission_type=kind, **self._id_of(kind))
+
+    def _id_of(self, kind: int) -> dict[str, int]:
+        """Return the field that identifies a list, where the firmware sends one."""
+        list_id = self._firmware.missions.list_id
+        return {} if list_id is None else {"opaque_id": list_id(self._vehicle, kind)}

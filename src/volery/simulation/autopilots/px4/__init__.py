@@ -1,11 +1,12 @@
-"""Simulated PX4 1.14.0, multirotor and rover.
+"""Simulated PX4, multirotor and rover, in the versions that ``versions`` lists.
 
 The multirotor follows recordings of the firmware's own simulator.
 """
 
 from volery.simulation.autopilots.autopilot import DefaultLink, FirmwareFamily
-from volery.simulation.autopilots.px4.airframes import COPTER, ROVER
+from volery.simulation.autopilots.px4.airframes import copter, rover
 from volery.simulation.autopilots.px4.firmware import ONBOARD, STATION
+from volery.simulation.autopilots.px4.versions import VERSIONS
 
 DEFAULT_LINKS = (
     DefaultLink("udp://127.0.0.1:14540?from=14580", ONBOARD),
@@ -13,7 +14,11 @@ DEFAULT_LINKS = (
 )
 """Addresses of the firmware's own simulator: for onboard programs and for ground stations."""
 
-FIRMWARE = FirmwareFamily("px4", {"multirotor": COPTER, "rover": ROVER}, default_links=DEFAULT_LINKS)
+_KINDS = {
+    name: {"multirotor": copter(version), "rover": rover(version)} for name, version in VERSIONS.items()
+}
+
+FIRMWARE = FirmwareFamily("px4", _KINDS[[*_KINDS][-1]], default_links=DEFAULT_LINKS, versions=_KINDS)
 """Entry point of the firmware, by kind of vehicle."""
 
 __all__ = ["FIRMWARE"]

@@ -1,4 +1,4 @@
-"""PX4 1.14.0 on a multirotor and on a rover: parameters, tuning and modes of each, composed as firmwares.
+"""PX4 on a multirotor and on a rover: parameters, tuning and modes of each, composed as firmwares.
 
 Parameters that do not change the behaviour are only stored, listed and read back. There is no recording of a
 rover: what it shares with the multirotor is recorded, its driving is assumed.
@@ -9,12 +9,13 @@ from __future__ import annotations
 import struct
 from collections.abc import Mapping
 from functools import cache, partial
-from math import hypot, isfinite, radians
+from math import ceil, hypot, isfinite, radians
 from types import MappingProxyType
 
 from volery.base.elementary import atan2
 from volery.base.frames import Vector
 from volery.base.time import MS, S
+from volery.simulation.autopilots.autopilot import Firmware
 from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter, Parameters, Tuning, load
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.guided_flight import Turn
@@ -44,8 +45,9 @@ from volery.simulation.autopilots.px4.flight_modes import (
     TakeOff,
 )
 from volery.simulation.autopilots.px4.follow_target import FollowTarget
-from volery.simulation.autopilots.px4.modes import INFO, commander_of
+from volery.simulation.autopilots.px4.modes import CRITICAL, INFO, commander_of
 from volery.simulation.autopilots.px4.offboard import AttitudeTarget, Offboard, OffboardTarget
+from volery.simulation.autopilots.px4.versions import Version
 from volery.simulation.autopilots.vehicle_state import ArmingTimes, Manoeuvre, ParameterTable, Vehicle
 
 _SHARED = {
@@ -184,6 +186,9 @@ def report_return_stage(vehicle: Vehicle, stage: str, amsl: float, above: float)
         amsl: Altitude of the stage [m AMSL].
         above: The same above the destination [m].
     """
+    if commander_of(vehicle).version.short_return:
+        _report_short_return(vehicle, stage, amsl, above)
+        return
     log = commander_of(vehicle).log
     figures = struct.pack("<iB", int(amsl), max(0, min(255, int(above))))
     heights = f"{int(amsl)} m ({int(above)} m above destination)\t"
@@ -207,21 +212,36 @@ def report_return_stage(vehicle: Vehicle, stage: str, amsl: float, above: float)
         log.send(event_interface.RETURN_LAND)
 
 
+def _report_short_return(vehicle: Vehicle, stage: str, amsl: float, above: float) -> None:
+    """Report how high a return begins, and that it lands: no other stages, as newer versions."""
+    log = commander_of(vehicle).log
+    if stage == "climb":
+        heights = ceil(amsl), ceil(above)
+        vehicle.send_text(INFO, "RTL: start return at {} m ({} m above destination)\t".format(*heights))
+        log.send(event_interface.RETURN_CLIMB, struct.pack("<ii", *heights))
+    elif stage == "land":
+        vehicle.send_text(INFO, "RTL: land at destination\t")
+        log.send(event_interface.RETURN_LAND)
+
+
 QUADROTOR = 2
 """MAV_TYPE."""
 
 
 def _take_off(vehicle: Vehicle) -> Manoeuvre:
-    """Create the take-off to the commanded altitude, at least MIS_TAKEOFF_ALT above the vehicle."""
+    """Create the take-off to the commanded altitude, or to MIS_TAKEOFF_ALT above the vehicle."""
     commander = commander_of(vehicle)
     here = vehicle.estimate.geodetic[2]
     least = vehicle.parameters["MIS_TAKEOFF_ALT"]
     amsl = commander.takeoff_amsl
-    if amsl is None or amsl < here + least:
+    if amsl is None or (commander.version.least_takeoff and amsl < here + least):
         amsl = here + least
         commander.minimum_height = least
         if vehicle.armed:
             commander.report_minimum_height()
+    elif amsl < here:
+        amsl = here
+        vehicle.send_text(CRITICAL, "Already higher than takeoff altitude\t")
     return TakeOff(vehicle, vehicle.estimate.origin[2] - amsl)
 
 
@@ -247,6 +267,7 @@ COPTER_MODES = modes.mode_table(
         modes.RTL: lambda vehicle: Return(vehicle, report_return_stage),
         modes.LAND: Descent,
         modes.FOLLOW: FollowTarget,
+        modes.TERMINATION: Manoeuvre,
     },
     flies=True,
 )
@@ -277,14 +298,18 @@ LANDED_AFTER = 2 * S
 """PX4's landed detector passes three states, each for LNDMC_TRIG_TIME; the first second is that of the
 flight stack's detector. Logged of seven landings: 3.0 s."""
 
-COPTER = px4_firmware(
-    kind="multirotor",
-    modes=COPTER_MODES,
-    arming=ArmingTimes(spool_up=1 * S, abandoned_after=1500 * MS, landed_after=LANDED_AFTER),
-    parameters=ParameterTable(copter_parameters, copter_tuning, own_parameters, COPTER_SUPPORTED),
-    on_step=_on_step,
-    endpoint=partial(MavlinkEndpoint, px4_mavlink(QUADROTOR, commands.COPTER_COMMANDS)),
-)
+
+def copter(version: Version) -> Firmware:
+    """Return one version of the firmware for a multirotor."""
+    return px4_firmware(
+        kind="multirotor",
+        modes=COPTER_MODES,
+        arming=ArmingTimes(spool_up=1 * S, abandoned_after=1500 * MS, landed_after=LANDED_AFTER),
+        parameters=ParameterTable(copter_parameters, copter_tuning, own_parameters, COPTER_SUPPORTED),
+        on_step=_on_step,
+        endpoint=partial(MavlinkEndpoint, px4_mavlink(QUADROTOR, commands.COPTER_COMMANDS, version)),
+        version=version,
+    )
 
 
 GROUND_ROVER = 10
@@ -403,6 +428,7 @@ ROVER_MODES = modes.mode_table(
         ),
         modes.RTL: ReturnRover,
         modes.LAND: Stand,
+        modes.TERMINATION: Stand,
     },
     flies=False,
 )
@@ -418,10 +444,13 @@ def rover_parameters() -> tuple[Parameter, ...]:
     return (*shared, *ASSUMED)
 
 
-ROVER = px4_firmware(
-    kind="rover",
-    modes=ROVER_MODES,
-    parameters=ParameterTable(rover_parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
-    on_step=on_step,
-    endpoint=partial(MavlinkEndpoint, px4_mavlink(GROUND_ROVER, ROVER_COMMANDS)),
-)
+def rover(version: Version) -> Firmware:
+    """Return one version of the firmware for a rover."""
+    return px4_firmware(
+        kind="rover",
+        modes=ROVER_MODES,
+        parameters=ParameterTable(rover_parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
+        on_step=on_step,
+        endpoint=partial(MavlinkEndpoint, px4_mavlink(GROUND_ROVER, ROVER_COMMANDS, version)),
+        version=version,
+    )

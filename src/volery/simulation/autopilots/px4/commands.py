@@ -47,6 +47,10 @@ GRIPPER_ACTIONS = (0, 1)
 MOTOR_TEST, CALIBRATION, ACTUATOR_TEST = 209, 241, 310
 
 CUSTOM_MODE_ENABLED = 1
+
+MISSION_PLANNER = 190
+"""MAV_COMP_ID_MISSIONPLANNER: the component to which the refusal of a mode is explained."""
+
 CHANGE_MODE = 1
 """MAV_DO_REPOSITION_FLAGS."""
 
@@ -68,7 +72,21 @@ def on_set_mode(vehicle: Vehicle, command: Command) -> int:
     main, sub = to_integer(command.param2), to_integer(command.param3)
     if not 0 <= main <= 255 or not 0 <= sub <= 255:
         return ACCEPTED if not vehicle.armed else UNSUPPORTED
-    return commander_of(vehicle).request_mode(modes.custom_mode(main, sub))
+    commander = commander_of(vehicle)
+    result = commander.request_mode(
+        modes.custom_mode(main, sub), says_why=command.sender[1] == MISSION_PLANNER
+    )
+    if not commander.version.mode_acknowledged_twice:
+        return result
+    system, component = command.sender
+    fields = {
+        "command": DO_SET_MODE,
+        "result": result,
+        "target_system": system,
+        "target_component": component,
+    }
+    vehicle.output.send_event("COMMAND_ACK", fields)
+    return ACCEPTED
 
 
 def set_mode(vehicle: Vehicle, _base_mode: int, number: int) -> int:
@@ -79,11 +97,10 @@ def set_mode(vehicle: Vehicle, _base_mode: int, number: int) -> int:
 
 def on_arm(vehicle: Vehicle, command: Command) -> int:
     """Handle COMPONENT_ARM_DISARM."""
-    force = to_integer(command.param2) == FORCE
     if command.param1 == 1.0:
-        return commander_of(vehicle).arm(force=force)
+        return commander_of(vehicle).arm()
     if command.param1 == 0.0:
-        return commander_of(vehicle).disarm(force)
+        return commander_of(vehicle).disarm(force=to_integer(command.param2) == FORCE)
     return UNSUPPORTED
 
 
@@ -211,15 +228,21 @@ def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
         return DENIED
     if commander.request_mode(modes.MISSION) != ACCEPTED:
         return DENIED
-    return ACCEPTED if commander.arm(force=False, for_mission=True) == ACCEPTED else DENIED
+    return ACCEPTED if commander.arm(for_mission=True) == ACCEPTED else DENIED
 
 
 def on_terminate(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_FLIGHTTERMINATION: stop the motors."""
-    if not isfinite(command.param1) or command.param1 <= 0.5:
-        return TEMPORARILY_REJECTED
-    if vehicle.armed:
-        commander_of(vehicle).finish_disarming("termination", event_interface.BY_COMMAND)
+    commander = commander_of(vehicle)
+    asked = isfinite(command.param1) and command.param1 > 0.5
+    if commander.version.terminates_as_mode:
+        if not asked or not vehicle.armed:
+            return DENIED
+        commander.terminate()
+    elif asked:
+        commander.stop_motors()
+    else:
+        commander.release_motors()
     return ACCEPTED
 
 
@@ -356,10 +379,6 @@ COPTER_COMMANDS: Mapping[int, Handler] = {
 """Commands of a multirotor. Unsupported are among others NAV_LOITER_UNLIM, CONDITION_YAW, 193 and 92."""
 
 
-FROM_JOYSTICK = (1, 2, 3)
-"""Values of COM_RC_IN_MODE with which MANUAL_CONTROL counts."""
-
-
 @runtime_checkable
 class OffboardManoeuvre(Protocol):
     """A manoeuvre of the mode OFFBOARD."""
@@ -386,7 +405,8 @@ def on_event_request(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> 
 def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle MANUAL_CONTROL."""
     given = deflection(fields)
-    enabled = round(vehicle.parameters["COM_RC_IN_MODE"]) in FROM_JOYSTICK
+    sources = commander_of(vehicle).version.joystick_sources
+    enabled = round(vehicle.parameters["COM_RC_IN_MODE"]) in sources
     if given is None or not enabled or fields["target"] not in (0, vehicle.system):
         return
     commander = commander_of(vehicle)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections import deque
+from collections.abc import Mapping
 from itertools import islice
 from typing import Any, NamedTuple
 
@@ -43,7 +44,7 @@ MINIMUM_TAKEOFF = Event(0x01DBF722, 0x66)
 FAILSAFE = Event(0x01DEDBD0, 0x42)
 FAILSAFE_HOLD = Event(0x01D11DF6, 0x42)
 FAILSAFE_AFTER_HOLD = Event(0x0194CA8A, 0x42)
-FENCE_DISTANCE = Event(0x0115F1B8, 0x44)
+FENCE_DISTANCE = Event(0x0115F1B8, 0x42)
 REPOSITION_OUTSIDE = Event(0x01CDEBC4, 0x33)
 STICKS_LOST = Event(0x0155CD44, 0x62)
 STICKS_BACK = Event(0x010AE2BD, 0x66)
@@ -61,6 +62,13 @@ NO_OFFBOARD_SIGNAL = Event(0x012F1DC7, 0x33)
 NO_STICKS = Event(0x0106ED29, 0x44)
 MODE_NOT_ARMABLE = Event(0x011C8F61, 0x66)
 NO_HOME = Event(0x01013630, 0x66)
+ITEM_INVALID = Event(0x01FEB270, 0x33)
+MISSION_OUTSIDE = Event(0x012B352D, 0x63)
+MISSION_BEGINS = Event(0x01EE01B1, 0x66)
+MISSION_ENDED = Event(0x014762F6, 0x66)
+MISSION_ENDED_LANDED = Event(0x01771204, 0x66)
+ARMING_DENIED = Event(0x0102089D, 0x62)
+FENCE_HEIGHT = Event(0x018EFA75, 0x42)
 STILL_STARTING = Event(0x0167C97B, 0x66)
 SENSORS_SUMMARY = Event(0x011D3727, 0x88)
 
@@ -80,21 +88,30 @@ KEPT_EVENTS = 20
 
 
 class EventLog:
-    """Numbered events of one vehicle."""
+    """Numbered events of one vehicle.
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    Args:
+        vehicle: The vehicle.
+        replaced: What the version of the firmware sends instead of an event; ``None``: nothing.
+    """
+
+    def __init__(self, vehicle: Vehicle, replaced: Mapping[Event, Event | None]) -> None:
         self._vehicle = vehicle
+        self._replaced = replaced
         self.latest = FIRST_SEQUENCE
         self._kept: deque[dict[str, Any]] = deque(maxlen=KEPT_EVENTS)
 
     def send(self, event: Event, arguments: bytes = b"") -> None:
-        """Send an event on all links."""
+        """Send an event on all links, or what the version sends instead of it."""
+        sent = self._replaced.get(event, event)
+        if sent is None:
+            return
         self.latest = (self.latest + 1) % 65_536
         fields = {
-            "id": event.id,
+            "id": sent.id,
             "event_time_boot_ms": boot_ms(self._vehicle),
             "sequence": self.latest,
-            "log_levels": event.levels,
+            "log_levels": sent.levels,
             "arguments": tuple(arguments),
         }
         self._kept.append(fields)

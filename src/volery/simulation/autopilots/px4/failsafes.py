@@ -3,7 +3,6 @@
 A failsafe replaces only one of lower rank. Most actions are preceded by a hold of COM_FAIL_ACT_T, in which
 the pilot may react.
 
-The geofence is distance and height from home, and uploaded polygons and circles; rally points are stored.
 Observed with GF_MAX_HOR_DIST and GF_ACTION 3: a DO_REPOSITION beyond the limit is acknowledged as accepted,
 AUTO.LOITER is entered, and the vehicle stays where it is; two texts and two events say why. What a breach in
 flight does follows the firmware's documentation.
@@ -12,15 +11,11 @@ flight does follows the firmware's documentation.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
-from math import dist
 
 from volery.base.frames import Vector
 from volery.base.time import MS, Ns, S, from_seconds, to_seconds
-from volery.simulation.autopilots.mavlink.microservices import FENCE, MISSION_UNSUPPORTED, RALLY
-from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.px4 import event_interface, modes
+from volery.simulation.autopilots.px4.geofence import TOO_FAR, TOO_HIGH, fence_breach
 from volery.simulation.autopilots.px4.modes import (
     BATTERY_CRITICAL,
     BATTERY_EMERGENCY,
@@ -37,97 +32,43 @@ from volery.simulation.autopilots.px4.modes import (
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
-POLYGON_INSIDE, POLYGON_OUTSIDE, CIRCLE_INSIDE, CIRCLE_OUTSIDE, RALLY_POINT = 5001, 5002, 5003, 5004, 5100
-"""MAV_CMD of fence and rally points; the vehicle must stay inside or outside."""
-
-BREACHED = "Geofence violation\t"
-TOO_FAR, TOO_HIGH = "Maximum distance from home reached\t", "Maximum altitude above home reached\t"
 OUTSIDE = "Reposition is outside geofence\t"
-
-
-def fence_breach(vehicle: Vehicle, point: Vector) -> str:
-    """Return the text about a point that is outside the geofence, or an empty text.
-
-    Args:
-        vehicle: The vehicle; without a home position nothing is outside.
-        point: North, east, down about the estimator's origin [m].
-    """
-    farthest, highest = vehicle.parameters["GF_MAX_HOR_DIST"], vehicle.parameters["GF_MAX_VER_DIST"]
-    if vehicle.home is None:
-        return ""
-    if farthest > 0.0 and dist(point[:2], vehicle.home.ned[:2]) > farthest:
-        return TOO_FAR
-    if highest > 0.0 and vehicle.home.ned[2] - point[2] > highest:
-        return TOO_HIGH
-    return "" if _within_points(vehicle, point) else BREACHED
-
-
-def stored_fence_point(kind: int, item: MissionItem) -> MissionItem | int:
-    """Return a point of the fence or a rally point as sent, or the MAV_MISSION_RESULT that refuses it."""
-    known = {FENCE: range(POLYGON_INSIDE, CIRCLE_OUTSIDE + 1), RALLY: (RALLY_POINT,)}
-    return item if item.command in known.get(kind, ()) else MISSION_UNSUPPORTED
-
-
-def _within_points(vehicle: Vehicle, point: Vector) -> bool:
-    """Return whether a point is in one area of the uploaded fence to stay in, and in none to avoid."""
-    if not vehicle.points.get(FENCE):
-        return True
-    kept_in: list[bool] = []
-    for command, corners, radius in _areas(vehicle):
-        if command in (CIRCLE_INSIDE, CIRCLE_OUTSIDE):
-            inside = dist(point[:2], corners[0][:2]) <= radius
-        else:
-            inside = _in_polygon(point, corners)
-        if command in (POLYGON_INSIDE, CIRCLE_INSIDE):
-            kept_in.append(inside)
-        elif inside:
-            return False
-    return any(kept_in) or not kept_in
-
-
-def _areas(vehicle: Vehicle) -> Iterator[tuple[int, Sequence[Vector], float]]:
-    """Yield command, corners or centre, and radius [m] of each area; corners follow each other."""
-    items = vehicle.points.get(FENCE, [])
-    place = 0
-    while place < len(items):
-        item = items[place]
-        circle = item.command in (CIRCLE_INSIDE, CIRCLE_OUTSIDE)
-        count = 1 if circle else max(1, round(item.param1))
-        corners = [
-            vehicle.point(one.frame, one.x / 1e7, one.y / 1e7, one.z) for one in items[place : place + count]
-        ]
-        yield item.command, corners, item.param1
-        place += count
-
-
-def _in_polygon(point: Vector, corners: Sequence[Vector]) -> bool:
-    """Return whether a point is in a polygon, by the number of edges north of it."""
-    inside = False
-    for (north, east, _), (to_north, to_east, _) in pairwise((*corners, corners[0])):
-        if (east > point[1]) != (to_east > point[1]):
-            crossing = north + (point[1] - east) / (to_east - east) * (to_north - north)
-            inside ^= point[0] < crossing
-    return inside
 
 
 def fence_admits(vehicle: Vehicle, point: Vector) -> bool:
     """Return whether a reposition may go to that point, and report where it may not.
 
-    Without GF_ACTION there is no geofence.
+    A geofence that does not act (GF_ACTION 0), or only warns (1), admits every point.
     """
-    said = fence_breach(vehicle, point) if vehicle.parameters["GF_ACTION"] else ""
-    if not said:
+    acts = round(vehicle.parameters["GF_ACTION"]) not in (0, WARN)
+    beyond = fence_breach(vehicle, point) if acts else ""
+    if not beyond:
         return True
-    vehicle.send_text(CRITICAL, said)
-    if said == TOO_FAR:
-        commander_of(vehicle).log.send(event_interface.FENCE_DISTANCE)
+    if commander_of(vehicle).version.warns_of_destinations:
+        _report_breach(vehicle, beyond)
     vehicle.send_text(CRITICAL, OUTSIDE)
     commander_of(vehicle).log.send(event_interface.REPOSITION_OUTSIDE)
     return False
 
 
-WARNING = 4
-"""MAV_SEVERITY."""
+def _report_breach(vehicle: Vehicle, beyond: str) -> None:
+    """Say which limit of the geofence was reached."""
+    farthest, highest, fence = commander_of(vehicle).version.fence_texts
+    log = commander_of(vehicle).log
+    if beyond == TOO_FAR:
+        limit = vehicle.parameters["GF_MAX_HOR_DIST"]
+        vehicle.send_text(CRITICAL, farthest.format(limit))
+        log.send(event_interface.FENCE_DISTANCE, event_interface.float_argument(limit))
+    elif beyond == TOO_HIGH:
+        limit = vehicle.parameters["GF_MAX_VER_DIST"]
+        vehicle.send_text(CRITICAL, highest.format(limit))
+        log.send(event_interface.FENCE_HEIGHT, event_interface.float_argument(limit))
+    elif fence:
+        vehicle.send_text(CRITICAL, fence)
+
+
+WARN = 1
+"""GF_ACTION that only warns."""
 
 HOLD, RETURN, LAND, TERMINATE, DISARM = 1, 2, 3, 5, 6
 """Values of NAV_RCL_ACT and NAV_DLL_ACT."""
@@ -182,9 +123,12 @@ def on_step(vehicle: Vehicle) -> None:
     _detect_stick_loss(commander, now)
     _detect_ground(commander, now)
     _forget_ended_cause(commander)
-    if vehicle.armed:
+    commander.examine_mission()
+    if commander.home_correction is not None and vehicle.flies:
+        commander.home_correction.step(commander.lifted_at if vehicle.armed else NEVER)
+    if vehicle.armed and not commander.terminated:
         _check_failsafes(commander, passed)
-    if vehicle.armed:
+    if vehicle.armed and not commander.terminated:
         _disarm_automatically(commander, now)
     commander.report()
 
@@ -315,7 +259,7 @@ def _hold_first(commander: Commander, name: str, number: int) -> None:
         commander.begin_failsafe(name, number)
         return
     seconds = max(1, round(left))
-    vehicle.send_text(CRITICAL, f"Failsafe activated, entering Hold for {seconds} seconds\t")
+    vehicle.send_text(CRITICAL, commander.version.hold_words.format(seconds))
     commander.log.send(event_interface.FAILSAFE_HOLD, struct.pack("<HHBBBB", 0, 3, 6, seconds, 0, 1))
     commander.begin_failsafe(name, modes.LOITER)
     commander.hold_until = vehicle.kernel.now() + from_seconds(left)
@@ -383,12 +327,15 @@ def _check_geofence(commander: Commander) -> None:
     """React to a vehicle outside of the geofence, as GF_ACTION states."""
     vehicle = commander.vehicle
     action = round(vehicle.parameters["GF_ACTION"])
-    said = fence_breach(vehicle, vehicle.estimate.position) if action else ""
-    if not said or _outranked(commander, OUTSIDE_FENCE):
+    beyond = fence_breach(vehicle, vehicle.estimate.position) if action else ""
+    if not beyond or _outranked(commander, OUTSIDE_FENCE):
         return
-    _report_once(vehicle, CRITICAL, said)
+    if beyond not in vehicle.reports.sent_once:
+        vehicle.reports.sent_once.add(beyond)
+        _report_breach(vehicle, beyond)
     if action == FENCE_TERMINATE:
-        commander.finish_disarming("failsafe", event_interface.BY_COMMAND)
+        vehicle.send_text(CRITICAL, "Failsafe activated\t")
+        commander.terminate()
     elif action in FENCE_ACTIONS and commander.requested not in (modes.RTL, modes.LAND):
         _act(commander, OUTSIDE_FENCE, FENCE_ACTIONS[action])
 
@@ -396,7 +343,10 @@ def _check_geofence(commander: Commander) -> None:
 def _act(commander: Commander, name: str, action: int) -> None:
     if action in (TERMINATE, DISARM):
         commander.vehicle.send_text(CRITICAL, "Failsafe activated\t")
-        commander.finish_disarming("failsafe", event_interface.BY_COMMAND)
+        if action == TERMINATE:
+            commander.terminate()
+        else:
+            commander.finish_disarming("failsafe", event_interface.BY_COMMAND)
         return
     number = ACTIONS.get(action, modes.RTL)
     if number == modes.LOITER:
@@ -415,17 +365,17 @@ def _battery_below(commander: Commander, level: str) -> bool:
 
 def _check_battery(commander: Commander) -> None:
     vehicle, left = commander.vehicle, commander.vehicle.estimate.battery_left
-    action = round(vehicle.parameters["COM_LOW_BAT_ACT"])
+    action, words = round(vehicle.parameters["COM_LOW_BAT_ACT"]), commander.version.battery_words
     if left < vehicle.parameters[EMERGENCY]:
-        _report_once(vehicle, CRITICAL, "Emergency battery level\t")
+        _report_once(vehicle, *words[2])
         if action and not _outranked(commander, BATTERY_EMERGENCY):
             _react_to_battery(commander, BATTERY_EMERGENCY, modes.LAND)
     elif left < vehicle.parameters[CRITICALLY_LOW]:
-        _report_once(vehicle, CRITICAL, "Critical battery level\t")
+        _report_once(vehicle, *words[1])
         if action and not _outranked(commander, BATTERY_CRITICAL):
             _react_to_battery(commander, BATTERY_CRITICAL, modes.LAND if action == 2 else modes.RTL)
     elif left < vehicle.parameters[LOW]:
-        _report_once(vehicle, WARNING, "Low battery level\t")
+        _report_once(vehicle, *words[0])
 
 
 def _react_to_battery(commander: Commander, name: str, number: int) -> None:

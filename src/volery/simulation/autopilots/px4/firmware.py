@@ -25,10 +25,11 @@ from volery.simulation.autopilots.mavlink.firmware import (
 )
 from volery.simulation.autopilots.mavlink.log_service import LogPolicy
 from volery.simulation.autopilots.mavlink.messages import DENIED, FAILED, Handler
-from volery.simulation.autopilots.px4 import failsafes, files, mission, telemetry, ulog
+from volery.simulation.autopilots.px4 import files, geofence, mission, telemetry, ulog
 from volery.simulation.autopilots.px4.commands import DO_SET_MODE, MESSAGE_HANDLERS, set_mode
 from volery.simulation.autopilots.px4.follow_target import on_follow_target
 from volery.simulation.autopilots.px4.modes import LOITER, READY_AFTER, Commander, commander_of
+from volery.simulation.autopilots.px4.versions import Version
 from volery.simulation.autopilots.vehicle_state import (
     ArmingTimes,
     Mode,
@@ -99,7 +100,6 @@ USES: Mapping[str, Mapping[str, Ns]] = {
                 "ALTITUDE",
                 "ATTITUDE_TARGET",
                 "DISTANCE_SENSOR",
-                "MISSION_CURRENT",
                 "POSITION_TARGET_GLOBAL_INT",
                 "POSITION_TARGET_LOCAL_NED",
                 "SERVO_OUTPUT_RAW",
@@ -125,7 +125,6 @@ USES: Mapping[str, Mapping[str, Ns]] = {
                 "POSITION_TARGET_LOCAL_NED",
                 "SERVO_OUTPUT_RAW",
             ),
-            10.0: ("MISSION_CURRENT",),
             4.0: ("VFR_HUD",),
             2.0: ("ORBIT_EXECUTION_STATUS",),
             1.0: (
@@ -195,14 +194,19 @@ PARAMETERS = ParameterPolicy(
 """Recorded: 877 parameters in 0.85 s."""
 
 
-def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmware:
-    """Return the MAVLink rules of a vehicle of that MAV_TYPE with these commands."""
+def _link_uses(version: Version) -> Mapping[str, Mapping[str, Ns]]:
+    """Return the streams of each use of a link."""
+    return {use: {**rates, "MISSION_CURRENT": version.mission_period} for use, rates in USES.items()}
+
+
+def px4_mavlink(mav_type: int, commands: Mapping[int, Handler], version: Version) -> MavlinkFirmware:
+    """Return the MAVLink rules of one version, for a vehicle of that MAV_TYPE with these commands."""
     return MavlinkFirmware(
         start=LinkStart(heartbeat_from=FIRST_HEARTBEAT),
         telemetry=TelemetryPolicy(
             messages={**BUILDERS, "HEARTBEAT": partial(telemetry.heartbeat, kind=mav_type)},
             message_order=ORDER,
-            link_uses=USES,
+            link_uses=_link_uses(version),
             refuse_interval=lambda _vehicle, _message: FAILED,
             unknown_message=DENIED,
             nothing_to_send=DENIED,
@@ -218,7 +222,8 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
             set_mode=set_mode,
             set_mode_ack=DO_SET_MODE,
             answer_delay=6 * MS,
-            wrong_target=FAILED,
+            wrong_target=version.wrong_target,
+            checks_component=True,
             reads_nan=True,
         ),
         missions=MissionPolicy(
@@ -232,8 +237,10 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler]) -> MavlinkFirmwa
                 gives_up=mission.give_up,
             ),
             stored_item=mission.stored_item,
-            stored_point=failsafes.stored_fence_point,
+            stored_point=geofence.stored_fence_point,
             names_lists=False,
+            list_id=telemetry.list_id if version.plan_ids else None,
+            item_refused=mission.report_refused_item,
         ),
         parameters=PARAMETERS,
         texts=TEXTS,
@@ -247,14 +254,16 @@ ROVER_ARMING = ArmingTimes()
 
 
 def px4_firmware(
+    *,
     kind: str,
     modes: Mapping[int, Mode],
     parameters: ParameterTable,
     endpoint: Callable[[Vehicle], MavlinkEndpoint],
     on_step: VehicleAction,
+    version: Version,
     arming: ArmingTimes = ROVER_ARMING,
 ) -> Firmware:
-    """Return the firmware of one kind of vehicle: the shared rules, and the arguments."""
+    """Return one version for one kind of vehicle: the shared rules, and the arguments."""
     return Firmware(
         name="px4",
         kind=kind,
@@ -265,7 +274,7 @@ def px4_firmware(
             arming=arming,
             parameters=parameters,
             rc=RcDefaults((1500,) * 4 + (0,) * 12, throttle_centred=True),
-            firmware_state=Commander,
+            firmware_state=partial(Commander, version=version),
         ),
         boot=BootSequence(EVENTS, stand_on_ground, on_position),
         periodic=PeriodicWork(on_step=on_step, failsafe_ticks=1),

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from itertools import takewhile
+
 from volery.base.frames import Vector
-from volery.base.time import MS, Ns, from_seconds
+from volery.base.time import from_seconds
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
     FOREVER,
     Leg,
@@ -41,18 +43,18 @@ UNSUPPORTED_FRAME, UNSUPPORTED = 2, 3
 
 MISSION_FRAME = 2
 
-FLOWN = frozenset({WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, RETURN, LAND, TAKEOFF, DELAY, JUMP, CHANGE_SPEED})
-KEPT = frozenset({SET_HOME, 115, 195, 197, 201, 203, 205, 206, 211, 214, 530, 1000, 2000, 2001, 2500, 2501})
-"""Items that are stored and read back without effect: cameras, mounts, regions of interest, grippers,
-headings.
-"""
+ROI_LOCATION, ROI_NONE, ROI = 195, 197, 201
+FLOWN = frozenset(
+    {WAYPOINT, LOITER_UNLIMITED, LOITER_TIME, RETURN, LAND, TAKEOFF, DELAY, JUMP, CHANGE_SPEED}
+    | {SET_HOME, ROI, ROI_LOCATION, ROI_NONE}
+)
+NO_DEVICE = frozenset({203, 205, 206, 211, 214, 530, 1000, 2000, 2001, 2500, 2501})
+"""Items for cameras, mounts and grippers: stored, read back and passed; the original has none either."""
 
 FRAMES = (GLOBAL, GLOBAL_INT, GLOBAL_RELATIVE, GLOBAL_RELATIVE_INT, MISSION_FRAME)
 
 REACHED_AGAIN = 10
 """Number of repetitions of MISSION_ITEM_REACHED."""
-REACHED_EVERY: Ns = 100 * MS
-"""Interval of the repetitions."""
 
 
 def request_message(number: int) -> str:
@@ -62,9 +64,15 @@ def request_message(number: int) -> str:
 
 def stored_item(item: MissionItem) -> MissionItem | int:
     """Return an item as sent, or the MAV_MISSION_RESULT that refuses it."""
-    if item.command not in FLOWN | KEPT:
+    if item.command not in FLOWN | NO_DEVICE:
         return UNSUPPORTED
     return item if item.frame in FRAMES else UNSUPPORTED_FRAME
+
+
+def report_refused_item(vehicle: Vehicle) -> None:
+    """Report that an uploaded item is refused."""
+    vehicle.send_text(CRITICAL, "IGN MISSION_ITEM: Invalid item\t")
+    commander_of(vehicle).log.send(event_interface.ITEM_INVALID)
 
 
 def give_up(vehicle: Vehicle) -> None:
@@ -76,6 +84,9 @@ def give_up(vehicle: Vehicle) -> None:
 def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
     """Send MISSION_ITEM_REACHED with its repetitions, which the next item that is reached ends."""
     commander, began = commander_of(vehicle), vehicle.kernel.now()
+    if commander.version.counts_actions:
+        following = vehicle.mission.items[index + 1 :]
+        index += sum(1 for _ in takewhile(lambda one: one.command == RETURN or not one.navigates, following))
     commander.reached = index, began
 
     def send() -> None:
@@ -84,20 +95,37 @@ def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
 
     send()
     for again in range(1, REACHED_AGAIN + 1):
-        vehicle.kernel.call_at(began + again * REACHED_EVERY, send)
+        vehicle.kernel.call_at(began + again * commander.version.mission_period, send)
 
 
-def item_begins(vehicle: Vehicle, _index: int, item: MissionItem) -> None:
-    """Report the height of a take-off."""
+def item_begins(vehicle: Vehicle, index: int, item: MissionItem) -> None:
+    """Report that a mission begins, and the height of a take-off."""
+    version = commander_of(vehicle).version
+    if index == 0 and version.mission_words:
+        vehicle.send_text(INFO, "Executing Mission\t")
+        commander_of(vehicle).log.send(event_interface.MISSION_BEGINS)
     if item.command == TAKEOFF and vehicle.home is not None:
         above = vehicle.home.ned[2] - point_height(vehicle, item)
-        vehicle.send_text(INFO, f"Takeoff to {above:.1f} meters above home\t")
+        begins = "Climb" if version.mission_words else "Takeoff"
+        vehicle.send_text(INFO, f"{begins} to {above:.1f} meters above home\t")
         commander_of(vehicle).log.send(event_interface.MISSION_TAKEOFF, event_interface.float_argument(above))
 
 
 def ended(vehicle: Vehicle) -> None:
     """Enter AUTO.LOITER after the mission."""
+    _finish(vehicle)
     vehicle.kernel.call_at(vehicle.kernel.now(), lambda: _loiter(vehicle))
+
+
+def _finish(vehicle: Vehicle) -> None:
+    """Note and report that the mission has ended."""
+    commander = commander_of(vehicle)
+    commander.mission_finished = True
+    if commander.version.mission_words:
+        vehicle.send_text(INFO, f"Mission finished, {'landed' if vehicle.landed else 'loitering'}\t")
+        commander.log.send(
+            event_interface.MISSION_ENDED_LANDED if vehicle.landed else event_interface.MISSION_ENDED
+        )
 
 
 def _loiter(vehicle: Vehicle) -> None:
@@ -109,11 +137,19 @@ def act(vehicle: Vehicle, item: MissionItem) -> None:
     """Execute an item that does not navigate."""
     if item.command == CHANGE_SPEED and item.param2 > 0.0:
         vehicle.commanded.speed = item.param2
+    elif item.command in (ROI, ROI_LOCATION):
+        vehicle.commanded.look_at = item_point(vehicle, item)
+    elif item.command == ROI_NONE:
+        vehicle.commanded.look_at = None
+    elif item.command == SET_HOME:
+        here = item.param1 == 1.0
+        latitude, longitude, amsl = (
+            vehicle.estimate.geodetic if here else vehicle.flight.from_ned(item_point(vehicle, item))
+        )
+        vehicle.set_home(latitude, longitude, amsl, by_user=True)
 
 
-MISSION_RULES = MissionRules(
-    first_item=0, reports_actions=True, item_begins=item_begins, item_done=item_done, act=act, ended=ended
-)
+MISSION_RULES = MissionRules(first_item=0, item_begins=item_begins, item_done=item_done, act=act, ended=ended)
 
 
 class ReturnFromMission(Manoeuvre):
@@ -126,6 +162,7 @@ class ReturnFromMission(Manoeuvre):
 
     def _change(self) -> None:
         if self.vehicle.armed and self.vehicle.mode.number == modes.MISSION:
+            _finish(self.vehicle)
             on_return(self.vehicle, _NO_COMMAND)
 
 

@@ -7,19 +7,24 @@ the others only when the user requests a mode, moves the sticks or disarms.
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import dist
 
 from volery.base.frames import Vector
-from volery.base.time import MS, Ns
+from volery.base.time import MS, Ns, S
 from volery.kernel.api import Handle
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import item_point
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, TEMPORARILY_REJECTED, UNSUPPORTED
+from volery.simulation.autopilots.mavlink.microservices import FENCE
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.px4 import event_interface
+from volery.simulation.autopilots.px4.geofence import fence_breach
+from volery.simulation.autopilots.px4.home_correction import HomeCorrection
 from volery.simulation.autopilots.px4.offboard import Joystick, SetpointStream
 from volery.simulation.autopilots.px4.position_control import PositionLoops
+from volery.simulation.autopilots.px4.versions import ALTITUDE_CRUISE, EXTERNAL, POSITION_SLOW, Version
 from volery.simulation.autopilots.state_groups import NEVER, Home
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
 
@@ -47,23 +52,7 @@ MANUAL, ALTCTL, POSCTL = custom_mode(1), custom_mode(2), custom_mode(3)
 ORBIT, ACRO, OFFBOARD, STABILIZE = custom_mode(3, 1), custom_mode(5), custom_mode(6), custom_mode(7)
 TAKEOFF, LOITER, MISSION = custom_mode(4, 2), custom_mode(4, 3), custom_mode(4, 4)
 RTL, LAND, FOLLOW = custom_mode(4, 5), custom_mode(4, 6), custom_mode(4, 8)
-
-WORDS: Mapping[int, str] = {
-    MANUAL: "MANUAL",
-    ALTCTL: "ALTCTL",
-    POSCTL: "POSCTL",
-    ORBIT: "ORBIT",
-    ACRO: "ACRO",
-    OFFBOARD: "OFFBOARD",
-    STABILIZE: "STAB",
-    TAKEOFF: "AUTO_TAKEOFF",
-    LOITER: "AUTO_LOITER",
-    MISSION: "AUTO_MISSION",
-    RTL: "AUTO_RTL",
-    LAND: "AUTO_LAND",
-    FOLLOW: "AUTO_FOLLOW_TARGET",
-}
-"""Names of modes in refusals: OFFBOARD as recorded, the others as in the firmware's status."""
+TERMINATION = custom_mode(10)
 
 NEEDS_STICKS = frozenset({MANUAL, ALTCTL, POSCTL, ACRO, STABILIZE})
 """Modes that cannot be armed, or entered in flight, without MANUAL_CONTROL."""
@@ -85,6 +74,7 @@ _MODES = (
     Mode(RTL, "AUTO.RTL", AUTO_BITS, Manoeuvre, needs_position=True, armable=False),
     Mode(LAND, "AUTO.LAND", AUTO_BITS, Manoeuvre, armable=False),
     Mode(FOLLOW, "AUTO.FOLLOW", OFFBOARD_BITS, Manoeuvre, needs_position=True, armable=False),
+    Mode(TERMINATION, "TERMINATION", CUSTOM, Manoeuvre, armable=False),
 )
 """What the kinds of vehicles share of each mode, without its manoeuvre."""
 
@@ -134,6 +124,8 @@ HOME_CHECK_FROM: Ns = 10_000 * MS
 
 REPORT_FROM: Ns = 2_084 * MS
 REPORT_EVERY: Ns = 2_000 * MS
+REFUSALS_EVERY: Ns = S
+"""Time after the report of a refused mode for which others are refused without a report."""
 
 RETURN_CHECKED_EVERY: Ns = 2_000 * MS
 """Period at which the destination of a return is taken from the home position, while no return is flown."""
@@ -157,18 +149,27 @@ end.
 
 
 class Commander:
-    """State that only PX4 keeps about a vehicle (``Vehicle.firmware_state``)."""
+    """State that only PX4 keeps about a vehicle (``Vehicle.firmware_state``).
 
-    def __init__(self, vehicle: Vehicle) -> None:
+    Args:
+        vehicle: The vehicle.
+        version: Version of the firmware.
+    """
+
+    def __init__(self, vehicle: Vehicle, version: Version) -> None:
         self.vehicle = vehicle
+        self.version = version
         self.reset()
 
     def reset(self) -> None:
         """Reset to the state after a boot."""
+        self._forget_mission()
+        self._refused_at: Ns = NEVER
         self.joystick = Joystick()
         self.stream = SetpointStream()
         self.control = PositionLoops(self.vehicle)
-        self.log = event_interface.EventLog(self.vehicle)
+        self.log = event_interface.EventLog(self.vehicle, self.version.events)
+        self.home_correction = HomeCorrection(self.vehicle) if self.version.corrects_home else None
         self.requested = LOITER
         """Mode that the user requested."""
         self.after_disarming = LOITER
@@ -186,15 +187,12 @@ class Commander:
         """Height [m] to which the next take-off was raised, or 0."""
         self.orbit: tuple[Vector, float, float] | None = None
         """Centre, radius [m] and speed [m/s] of a circle."""
+        self.terminated = False
+        """Whether the motors are stopped until a boot, or in 1.14 until a command."""
         self.hold_delay_left = -1.0
         """Remaining hold before a failsafe acts [s]; negative: all of COM_FAIL_ACT_T."""
         self.hold_until: Ns = NEVER
         self.after_hold = 0
-        self._examined: list[MissionItem] = []
-        """Mission that was examined last."""
-        self._feasible = False
-        self.reached: tuple[int, Ns] | None = None
-        """Mission item that was reached last, and when."""
         self.calibration: list[Handle] = []
         """Steps of the calibration in hand that are still to come."""
         self.station_seen: Ns = NEVER
@@ -213,6 +211,19 @@ class Commander:
         self.return_to: Home | None = None
         """Destination of a return: the home position as of the last check."""
         self._return_checked: Ns = NEVER
+
+    def _forget_mission(self) -> None:
+        """Reset what is known of the mission, which is examined anew."""
+        self._examined: tuple[list[MissionItem], list[MissionItem] | None] | None = None
+        """Mission and fence that were examined last."""
+        self.has_mission = False
+        """Whether there is a mission that was found feasible when it was examined: at the first tick after it
+        or the fence arrived.
+        """
+        self.mission_finished = False
+        """Whether the mission, a take-off or a landing has ended since the mission arrived."""
+        self.reached: tuple[int, Ns] | None = None
+        """Mission item that was reached last, and when."""
 
     # -- state
 
@@ -242,13 +253,26 @@ class Commander:
         """Whether arming needs a mission on board (COM_ARM_MIS_REQ)."""
         return self.vehicle.parameters["COM_ARM_MIS_REQ"] != 0.0
 
-    @property
-    def has_mission(self) -> bool:
-        """Whether there is a mission, and its first waypoint was near when it was examined (MIS_DIST_1WP)."""
-        items = self.vehicle.mission.items
-        if items is not self._examined:
-            self._examined, self._feasible = items, bool(items) and self._first_is_near(items)
-        return self._feasible
+    def examine_mission(self) -> None:
+        """Examine the mission, if it or the uploaded fence is another one."""
+        vehicle = self.vehicle
+        items, fence = vehicle.mission.items, vehicle.points.get(FENCE)
+        if self._examined is not None and items is self._examined[0] and fence is self._examined[1]:
+            return
+        if self._examined is None or items is not self._examined[0]:
+            self.mission_finished, self.reached = False, None
+        self._examined = items, fence
+        self.has_mission = bool(items) and self._first_is_near(items) and self._is_within(items)
+
+    def _is_within(self, items: list[MissionItem]) -> bool:
+        """Return whether a mission is within the fence, whatever GF_ACTION is, and say what is not."""
+        vehicle = self.vehicle
+        for place, item in enumerate(items, start=1):
+            if item.has_place and item.navigates and fence_breach(vehicle, item_point(vehicle, item)):
+                vehicle.send_text(CRITICAL, f"Geofence violation for waypoint {place}\t")
+                self.log.send(event_interface.MISSION_OUTSIDE, struct.pack("<h", place))
+                return False
+        return True
 
     def _first_is_near(self, items: list[MissionItem]) -> bool:
         vehicle = self.vehicle
@@ -278,6 +302,8 @@ class Commander:
         """Return whether the requirements of a mode are met."""
         vehicle = self.vehicle
         mode = vehicle.rules.modes[number]
+        if vehicle.mode.number == TERMINATION:
+            return False
         if mode.needs_position and not vehicle.has_position:
             return False
         if number in NEEDS_STICKS and not self.has_sticks:
@@ -288,21 +314,41 @@ class Commander:
 
     # -- modes
 
-    def request_mode(self, number: int) -> int:
+    def request_mode(self, number: int, *, says_why: bool = True) -> int:
         """Enter a mode on request of the user, and return a MAV_RESULT.
 
-        A disarmed vehicle accepts every mode.
+        A disarmed vehicle accepts every mode. A terminated one stays so.
+
+        Args:
+            number: ``custom_mode``.
+            says_why: Whether a text and an event report a refusal.
         """
         vehicle = self.vehicle
-        if number not in vehicle.rules.modes:
-            return ACCEPTED if not vehicle.armed else UNSUPPORTED
-        if vehicle.armed and not self.can_fly(number):
-            vehicle.send_text(CRITICAL, f"Switching to {WORDS[number]} is currently not available\t")
-            group = OFFBOARD_IN_EVENTS if number == OFFBOARD else POSITION_IN_EVENTS
-            self.log.send(event_interface.MODE_REFUSED, bytes((0, 0, group, 0, 7)))
+        known = number in vehicle.rules.modes and number != TERMINATION
+        refused = main_and_sub(number) in self.version.refused_modes
+        if vehicle.mode.number == TERMINATION:
             return TEMPORARILY_REJECTED
+        if not vehicle.armed and not known:
+            return ACCEPTED
+        if vehicle.armed and (refused or (known and not self.can_fly(number))):
+            if says_why:
+                self._report_refusal(number)
+            return TEMPORARILY_REJECTED
+        if not known:
+            return UNSUPPORTED
         self._accept_mode(number)
         return ACCEPTED
+
+    def _report_refusal(self, number: int) -> None:
+        """Report that a mode is not available, at most once a second."""
+        now = self.vehicle.kernel.now()
+        if self._refused_at != NEVER and now - self._refused_at <= REFUSALS_EVERY:
+            return
+        self._refused_at = now
+        asked = main_and_sub(number)
+        words = f"Switching to {self.version.words[asked]} is currently not available\t"
+        self.vehicle.send_text(CRITICAL, words)
+        self.log.send(event_interface.MODE_REFUSED, bytes((0, 0, *asked, MODES_IN_EVENTS[asked])))
 
     def _accept_mode(self, number: int) -> None:
         vehicle = self.vehicle
@@ -364,26 +410,27 @@ class Commander:
 
     # -- arming
 
-    def arm(self, *, force: bool, for_mission: bool = False) -> int:
-        """Arm by command, and return a MAV_RESULT.
+    def arm(self, *, for_mission: bool = False) -> int:
+        """Arm by command, and return a MAV_RESULT. No command from outside skips the checks.
 
         Reasons of a refusal appear in events, except for the throttle.
 
         Args:
-            force: Skip the checks.
             for_mission: The command is MISSION_START.
         """
         vehicle = self.vehicle
         if vehicle.armed:
             return ACCEPTED
-        if not force:
-            if self._throttle_is_high():
-                vehicle.send_text(CRITICAL, "Arming denied: throttle above center\t")
-                self.log.send(event_interface.THROTTLE_HIGH)
-                return TEMPORARILY_REJECTED
-            if not self.armable:
-                vehicle.arming.refused_at = vehicle.kernel.now()
-                return TEMPORARILY_REJECTED
+        if self._throttle_is_high():
+            vehicle.send_text(CRITICAL, "Arming denied: throttle above center\t")
+            self.log.send(event_interface.THROTTLE_HIGH)
+            return TEMPORARILY_REJECTED
+        if not self.armable:
+            vehicle.arming.refused_at = vehicle.kernel.now()
+            if self.version.says_failing_checks:
+                vehicle.send_text(CRITICAL, "Arming denied: Resolve system health failures first\t")
+                self.log.send(event_interface.ARMING_DENIED)
+            return TEMPORARILY_REJECTED
         if vehicle.has_position and not (vehicle.home and vehicle.home.by_user):
             vehicle.set_home_here()
         self.joystick.lost_when_armed = not self.has_sticks
@@ -402,7 +449,8 @@ class Commander:
     def report_minimum_height(self) -> None:
         """Report once that a take-off was raised to the minimum height."""
         if self.minimum_height and self.requested == TAKEOFF:
-            self.vehicle.send_text(INFO, f"Using minimum takeoff altitude: {self.minimum_height:.2f} m\t")
+            words = self.version.takeoff_words.format(self.minimum_height)
+            self.vehicle.send_text(INFO, f"{words}\t")
             self.log.send(
                 event_interface.MINIMUM_TAKEOFF, event_interface.float_argument(self.minimum_height)
             )
@@ -412,9 +460,14 @@ class Commander:
     def armable(self) -> bool:
         """Whether the checks allow arming in the requested mode (COM_ARM_WO_GPS included)."""
         mode = self.vehicle.rules.modes[self.requested]
-        if not mode.armable or not self.can_fly(self.requested):
+        if self.terminated or not mode.armable or not self.can_fly(self.requested):
             return False
         if self.mission_required and not self.has_mission:
+            return False
+        vehicle = self.vehicle
+        if vehicle.estimate.battery_left < vehicle.parameters["BAT_CRIT_THR"]:
+            return False
+        if vehicle.parameters["GF_ACTION"] and fence_breach(vehicle, vehicle.estimate.position):
             return False
         if self.ready:
             return True
@@ -427,13 +480,32 @@ class Commander:
         by_thrust = self.vehicle.flies and self.requested in (MANUAL, STABILIZE, ACRO)
         return self.joystick.now.throttle > (THROTTLE_HIGH - 1.0 if by_thrust else THROTTLE_HIGH)
 
+    def stop_motors(self) -> None:
+        """Stop the motors, armed or not; the vehicle stays armed and cannot be armed again."""
+        self.terminated = True
+        if self.vehicle.switches.motors_stopped_at == NEVER:
+            self.vehicle.switches.motors_stopped_at = self.vehicle.kernel.now()
+        self.vehicle.run_manoeuvre()
+
+    def release_motors(self) -> None:
+        """Let the motors turn again."""
+        self.terminated = False
+        self.vehicle.switches.motors_stopped_at = NEVER
+
+    def terminate(self) -> None:
+        """Enter the mode TERMINATION, which nothing leaves, and stop the motors."""
+        self.end_failsafe()
+        self.requested = self.after_disarming = TERMINATION
+        self._fly(TERMINATION)
+        self.stop_motors()
+
     def disarm(self, force: bool) -> int:
         """Disarm by command, and return a MAV_RESULT."""
         vehicle = self.vehicle
         if not vehicle.armed:
             return ACCEPTED
         if vehicle.flies and not vehicle.landed and not force:
-            vehicle.send_text(CRITICAL, "Disarming denied! Not landed\t")
+            vehicle.send_text(CRITICAL, self.version.not_landed)
             self.log.send(event_interface.DISARM_REFUSED)
             return TEMPORARILY_REJECTED
         self.finish_disarming("external command", event_interface.BY_COMMAND)
@@ -442,6 +514,8 @@ class Commander:
     def finish_disarming(self, words: str, reason: bytes) -> None:
         """Disarm, report the reason, and return to an armable mode."""
         vehicle = self.vehicle
+        if self.flying or self.took_off:
+            self.mission_finished = self.mission_finished or vehicle.mode.number in (RTL, LAND)
         vehicle.disarm()
         vehicle.send_text(INFO, f"Disarmed by {words}\t")
         self.log.send(event_interface.DISARMED, reason)
@@ -476,8 +550,25 @@ class Commander:
                 self.log.send(event, arguments)
 
 
-OFFBOARD_IN_EVENTS, POSITION_IN_EVENTS = 6, 3
-"""Numbers of the requested mode in events, as far as recorded."""
+MODES_IN_EVENTS: Mapping[tuple[int, int], int] = {
+    (1, 0): 0,
+    (2, 0): 1,
+    (3, 0): 2,
+    (4, 4): 3,
+    (4, 3): 4,
+    (4, 5): 5,
+    (5, 0): 6,
+    (6, 0): 7,
+    (7, 0): 8,
+    POSITION_SLOW: 9,
+    (4, 2): 10,
+    (4, 6): 11,
+    (4, 8): 12,
+    (3, 1): 14,
+    **{mode: 16 + place for place, mode in enumerate(EXTERNAL)},
+    ALTITUDE_CRUISE: 24,
+}
+"""``navigation_mode_t`` of the event interface, by main mode and sub-mode."""
 
 
 def commander_of(vehicle: Vehicle) -> Commander:

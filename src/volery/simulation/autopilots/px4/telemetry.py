@@ -6,6 +6,7 @@ A builder returns None while the firmware does not send its message.
 from __future__ import annotations
 
 from math import degrees, hypot, nan
+from zlib import crc32
 
 from volery.base.elementary import atan2
 from volery.base.frames import euler_to_quaternion, quaternion_to_euler
@@ -21,6 +22,7 @@ from volery.simulation.autopilots.mavlink.messages import (
     to_uint16,
     to_uint32,
 )
+from volery.simulation.autopilots.mavlink.microservices import FENCE, MISSION, RALLY
 from volery.simulation.autopilots.px4 import modes
 from volery.simulation.autopilots.px4.flight_modes import Orbit
 from volery.simulation.autopilots.px4.modes import ATTITUDE_AFTER, commander_of
@@ -309,7 +311,7 @@ def orbit_status(vehicle: Vehicle) -> Fields | None:
 ARMED = 128
 """MAV_MODE_FLAG_SAFETY_ARMED."""
 
-STANDBY, ACTIVE, CRITICAL = 3, 4, 5
+STANDBY, ACTIVE, CRITICAL, TERMINATED = 3, 4, 5, 8
 """MAV_STATE."""
 
 ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
@@ -322,13 +324,9 @@ NO_CURRENT = -100
 PRESENT, ENABLED, HEALTHY, PREARM, GPS = 35_651_629, 35_717_165, 572_555_327, 1 << 28, 1 << 5
 """Sensor bits of SYS_STATUS as recorded; the pre-arm check is a separate bit."""
 
-CAPABILITIES = 60_671
-"""MAV_PROTOCOL_CAPABILITY bits, as recorded."""
+OS_VERSION = 101_854_463
+"""Kernel of the recorded machine."""
 
-VERSION, OS_VERSION = 17_694_975, 101_854_463
-"""1.14.0, official release, as recorded, and the kernel of the recorded machine."""
-
-GIT_HASH = (0, 0, 0, 114, 221, 65, 197, 184)
 UID = 5_283_920_058_631_409_231
 
 WITH_POSITION, WITHOUT_POSITION = 831, 1
@@ -341,9 +339,13 @@ def heartbeat(vehicle: Vehicle, kind: int) -> Fields:
     base = mode.base_mode
     if mode.number == modes.OFFBOARD and commander.stream.target is None:
         base = modes.CUSTOM
-    state = ACTIVE if vehicle.armed else STANDBY
+    state = ACTIVE
+    if not vehicle.armed:
+        state = STANDBY if commander.armable else commander.version.unready_state
     if vehicle.armed and (commander.failsafe or commander.taken_over):
         state = CRITICAL
+    if commander.terminated:
+        state = TERMINATED
     return {
         "type": kind,
         "autopilot": 12,
@@ -421,9 +423,12 @@ def estimator_status(vehicle: Vehicle) -> Fields:
     """Return ESTIMATOR_STATUS."""
     estimate = vehicle.estimate
     plane, height, _, _ = estimate.sigmas
+    flags = WITH_POSITION if vehicle.has_position else WITHOUT_POSITION
+    if not vehicle.armed and vehicle.landed:
+        flags |= commander_of(vehicle).version.at_rest
     return {
         "time_usec": boot_us(vehicle),
-        "flags": WITH_POSITION if vehicle.has_position else WITHOUT_POSITION,
+        "flags": flags,
         "vel_ratio": 0.06,
         "pos_horiz_ratio": min(1.0, estimate.gps_innovation * estimate.gps_innovation / 25.0),
         "pos_vert_ratio": 0.035,
@@ -448,9 +453,44 @@ def vibration(vehicle: Vehicle) -> Fields:
 
 
 def mission_current(vehicle: Vehicle) -> Fields | None:
-    """Return MISSION_CURRENT while there is a mission."""
-    plan = vehicle.mission
-    return {"seq": plan.current} if len(plan) else None
+    """Return MISSION_CURRENT; 1.14 sends it while there is a mission, and the current item only."""
+    plan, commander = vehicle.mission, commander_of(vehicle)
+    if not commander.version.mission_state:
+        return {"seq": plan.current} if len(plan) else None
+    active = vehicle.mode.number in (modes.MISSION, modes.TAKEOFF, modes.LAND)
+    if not commander.has_mission:
+        state = NO_MISSION
+    elif commander.mission_finished:
+        state = COMPLETE
+    elif active:
+        state = UNDER_WAY
+    else:
+        state = NOT_STARTED if commander.reached is None else PAUSED
+    return {
+        "seq": plan.current,
+        "total": len(plan) or NO_ITEMS,
+        "mission_state": state,
+        "mission_mode": IN_MISSION if active else SUSPENDED,
+        "mission_id": list_id(vehicle, MISSION),
+        "fence_id": list_id(vehicle, FENCE),
+        "rally_points_id": list_id(vehicle, RALLY),
+    }
+
+
+def list_id(vehicle: Vehicle, kind: int) -> int:
+    """Return the checksum of a list on board by its MAV_MISSION_TYPE; 0 of an empty one.
+
+    The firmware's has other values; clients compare it only with what it was before.
+    """
+    items = vehicle.mission.items if kind == MISSION else vehicle.points.get(kind, [])
+    return crc32(repr(items).encode()) if items else 0
+
+
+NO_ITEMS = 65_535
+NO_MISSION, NOT_STARTED, UNDER_WAY, PAUSED, COMPLETE = 1, 2, 3, 4, 5
+"""MISSION_STATE."""
+IN_MISSION, SUSPENDED = 1, 2
+"""``mission_mode``: PX4 counts a take-off and a landing as flying the mission."""
 
 
 def ping(vehicle: Vehicle) -> Fields:
@@ -470,13 +510,14 @@ def event_sequence(vehicle: Vehicle) -> Fields:
 
 def autopilot_version(vehicle: Vehicle) -> Fields:
     """Return AUTOPILOT_VERSION."""
+    version = commander_of(vehicle).version
     return {
-        "capabilities": CAPABILITIES,
-        "flight_sw_version": VERSION,
-        "middleware_sw_version": VERSION,
+        "capabilities": version.capabilities,
+        "flight_sw_version": version.software,
+        "middleware_sw_version": version.software,
         "os_sw_version": OS_VERSION,
         "board_version": 1,
-        "flight_custom_version": GIT_HASH,
-        "middleware_custom_version": GIT_HASH,
+        "flight_custom_version": version.git_hash,
+        "middleware_custom_version": version.git_hash,
         "uid": UID + vehicle.system - 1,
     }
