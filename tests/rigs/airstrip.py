@@ -36,6 +36,8 @@ class Airstrip:
     """One simulated vehicle, its driver, and a second station that plays the pilot."""
 
     firmware: str
+    version = ""
+    """Version of that firmware; the newest if empty."""
     opener: Any
 
     def __init__(
@@ -51,7 +53,7 @@ class Airstrip:
         self.kernel = VirtualKernel(record=self.events.append)
         body = Multirotor() if kind is Drone else Rover()
         _, (self.flight,) = make_world(self.kernel.now, [body], seed=7, frame=FRAME)
-        firmware = dialects.load(self.firmware)
+        firmware = dialects.load(self.firmware).of_version(self.version)
         self.autopilot = Autopilot(
             self.kernel,
             self.flight,

@@ -100,10 +100,11 @@ def item_done(vehicle: Vehicle, index: int, _item: MissionItem) -> None:
 
 def item_begins(vehicle: Vehicle, index: int, item: MissionItem) -> None:
     """Report that a mission begins, and the height of a take-off."""
-    version = commander_of(vehicle).version
+    commander = commander_of(vehicle)
+    commander.mission_finished, version = False, commander.version
     if index == 0 and version.mission_words:
         vehicle.send_text(INFO, "Executing Mission\t")
-        commander_of(vehicle).log.send(event_interface.MISSION_BEGINS)
+        commander.log.send(event_interface.MISSION_BEGINS)
     if item.command == TAKEOFF and vehicle.home is not None:
         above = vehicle.home.ned[2] - point_height(vehicle, item)
         begins = "Climb" if version.mission_words else "Takeoff"

@@ -83,6 +83,11 @@ HOME_TAKEN_UP_AFTER: Ns = 2500 * MS
 REPEATED_FOR: Ns = 1500 * MS
 """MISSION_ITEM_REACHED was repeated eleven times, for a second."""
 
+EXAMINED_IN = 300 * MS
+"""Time in which PX4 examines a mission that was just uploaded: before, it refuses AUTO.MISSION in flight
+(recorded 8 ms after the upload; its checks run at 10 Hz).
+"""
+
 OUTSIDE = "outside geofence"
 """Words of the text with which PX4 refuses a target beyond its own geofence, although it acknowledges it."""
 
@@ -449,7 +454,7 @@ class PX4(MavlinkDriver):
         rewind = Step(
             ask="prepare the mission",
             send=self._backend.rewind_mission,
-            done=lambda _: not repeats or self._kernel.now() - began >= REPEATED_FOR,
+            done=lambda _: self._kernel.now() - began >= (REPEATED_FOR if repeats else EXAMINED_IN),
             within=5 * S,
         )
         return (

@@ -23,6 +23,7 @@ class Field(Airstrip):
     """A simulated PX4, its driver, and a pilot."""
 
     firmware = "px4"
+    version = "1.14"  # whose home stands still
     opener = staticmethod(open_driver)
 
     def pilot_chooses(self, mode: str, after_s: float = 0.0) -> None:
@@ -49,6 +50,27 @@ def test_a_square() -> None:
     assert [one.operation for one in flown] == ["takeoff", "goto", "goto"]
     assert all(one.outcome == "ok" for one in (*flown, landed))
     assert all(one.estimate_horizontal <= 0.6 and one.estimate_vertical <= 0.3 for one in flown)
+    assert not field.vehicle.telemetry.armed
+
+
+class Today(Field):
+    version = "1.17"
+
+
+@pytest.mark.parametrize("field_of", [Field, Today])
+def test_both_versions_fly_a_mission_twice_and_a_goal_and_return(field_of: type[Field]) -> None:
+    field = field_of()
+
+    def flight(drone: Drone) -> None:
+        drone.takeoff(8)
+        drone.upload_mission([Waypoint(at(0, 10, 8)), Waypoint(at(0, 25, 8))])
+        for _ in range(2):
+            drone.start_mission(within=120)
+        drone.goto(at(20, 25, 8))
+        drone.return_home()
+
+    field.fly(flight)
+    assert all(one.outcome == "ok" for one in field.operations())
     assert not field.vehicle.telemetry.armed
 
 
