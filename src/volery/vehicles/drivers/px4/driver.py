@@ -138,14 +138,18 @@ class PX4(MavlinkDriver):
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
         """Enter Hold, wait until ready, arm, climb and level; PX4 disarms itself 10 s after arming."""
 
+        top = nan  # m AMSL, since home may move meanwhile
+
         def risen(seen: Telemetry) -> bool:
-            enough = max(height - TAKEOFF_SHORT_M, height / 2.0)
-            return seen.flying and seen.mode == HOLD and seen.above_home >= enough
+            enough = top - min(TAKEOFF_SHORT_M, height / 2.0)
+            return seen.flying and seen.mode == HOLD and self._here("rise").altitude.metres >= enough
 
         def send() -> None:
+            nonlocal top
             self._lifted_at = self._here("take off")
             self._note_commanded(modes.TAKEOFF)
-            self._backend.takeoff(self._amsl(AboveHome(height)))
+            top = self._amsl(AboveHome(height))
+            self._backend.takeoff(top)
 
         def level() -> Position:
             over = self._lifted_at or self._here("take off")

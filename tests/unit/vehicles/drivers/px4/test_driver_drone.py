@@ -566,6 +566,18 @@ def test_it_flies_by_heights_above_a_home_whose_altitude_is_corrected_all_the_ti
     assert returned - began[0] < S
 
 
+def test_a_take_off_ends_although_home_rises_meanwhile(bench: Make) -> None:
+    at = bench()
+    at.autopilot.version = PX4_1_17
+
+    def mission(drone: Any) -> float:
+        at.after(5, lambda: setattr(at.autopilot, "home_up", 1.9))
+        drone.takeoff(5)
+        return float(drone.altitude.metres)
+
+    assert at.fly(mission) == pytest.approx(5.0, abs=0.3)
+
+
 def test_a_home_that_was_just_moved_is_waited_for_and_one_that_moves_on_is_not(bench: Make) -> None:
     at = bench()
     at.autopilot.version = PX4_1_17
