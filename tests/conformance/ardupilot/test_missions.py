@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from rigs.station import TARGET
+
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, INVALID_SEQUENCE = 0, 1, 2, 3, 13
 WAYPOINT, LOITER_TIME, LAND, TAKEOFF, DELAY, JUMP, SPEED = 16, 19, 21, 22, 93, 177, 178
 HERE = {"latitude": -35.363261, "longitude": 149.165230}
@@ -415,3 +417,24 @@ def test_items_without_effect_do_not_refuse_the_mission(command: int, bench: Any
     rig.send("MISSION_REQUEST_INT", target_system=1, target_component=1, seq=1)
     rig.run(0.05)
     assert rig.latest["MISSION_ITEM_INT"]["command"] == command
+
+
+def test_the_fields_of_a_camera_item_are_no_degrees(bench: Any) -> None:
+    """MISSION_ITEM of DO_DIGICAM_CONTROL: 1 for a picture, 7 as its number, in any frame."""
+    rig = bench()
+    rig.run(0.5)
+    for frame in (0, 2, 3):
+        rig.send("MISSION_COUNT", **TARGET, count=2)
+        rig.run(0.1)
+        rig.send("MISSION_ITEM", **TARGET, seq=0, command=16, x=47.0, y=8.0)
+        rig.run(0.1)
+        rig.send("MISSION_ITEM", **TARGET, seq=1, command=203, frame=frame, x=1.0, y=7.0)
+        rig.run(0.1)
+        assert (rig.vehicle.mission[0].x, rig.vehicle.mission[1].x, rig.vehicle.mission[1].y) == (
+            470_000_000,
+            1,
+            7,
+        )
+        rig.send("MISSION_REQUEST", **TARGET, seq=1)
+        rig.run(0.1)
+        assert (rig.latest["MISSION_ITEM"]["x"], rig.latest["MISSION_ITEM"]["y"]) == (1.0, 7.0)

@@ -219,3 +219,34 @@ def test_satellites_and_motors_fail_by_parameter(bench: Any) -> None:
     set_to(rig, "SIM_ENGINE_MUL", 0.0)
     rig.run(3.0)
     assert rig.flight.truth().position[2] < 3.0
+
+
+@pytest.mark.parametrize("kind", ["copter", "rover"])
+def test_what_has_no_effect_is_refused(kind: str, bench: Any) -> None:
+    """Each parameter is set to another value: only those that change what the vehicle does keep it."""
+    rig = bench(kind)
+    rig.run(0.5)
+    kept = set()
+    table = rig.autopilot.firmware.rules.parameters
+    for name, *_ in table.defaults():
+        now = rig.vehicle.parameters[name]
+        rig.send("PARAM_SET", **TARGET, param_id=name, param_value=0.0 if now else 1.0, param_type=9)
+        rig.run(0.006)
+        if rig.vehicle.parameters[name] != now:
+            kept.add(name)
+            rig.vehicle.parameters.set(name, now)
+    assert kept == set(table.supported)
+
+
+def test_a_command_without_effect_is_refused(bench: Any) -> None:
+    rig = bench()
+    rig.run(0.5)
+    for given in ((42424, 0), (42425, 0), (241, 0), (241, 0, 0, 0, 0, 1), (245, 0)):
+        assert rig.command(*given) != 0
+    assert rig.command(241, 1) == rig.command(241, 0, 0, 1) == 0
+    set_to(rig, "RTL_ALT", 3000.0)
+    assert rig.command(245, 2) == 0
+    assert rig.texts()[-1] == "All parameters reset, reboot board"
+    assert rig.vehicle.parameters["RTL_ALT"] == 3000.0
+    rig.command(246, 1)
+    assert rig.vehicle.parameters["RTL_ALT"] == 1500.0

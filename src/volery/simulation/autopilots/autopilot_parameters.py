@@ -172,6 +172,11 @@ class Parameters:
         value = self._shown_values[name] if name in self._own else self._values[name]
         return parameter if parameter.value == value else parameter._replace(value=value)
 
+    def reset(self) -> None:
+        """Set all parameters to their defaults."""
+        for one in self._order:
+            self.set(one.name, one.value)
+
     def set(self, name: str, value: float) -> Parameter | None:
         """Set a parameter and return it, rounded to its type.
 

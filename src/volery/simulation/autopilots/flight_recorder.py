@@ -14,6 +14,8 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 
 EACH = 2
 """One tick of the autopilot in so many is recorded."""
+MOST_SAMPLES, MOST_LOGS = 18_000, 8
+"""Samples of a log, an hour: a longer flight goes on in another one. Logs that are kept; the oldest go."""
 _SAMPLE = Struct(f"{len(LogSample._fields)}d")
 
 
@@ -32,10 +34,11 @@ class FlightRecorder:
     def on_tick(self) -> None:
         """Record a sample if one is due; called at each tick of the autopilot."""
         vehicle = self._vehicle
+        if self._open is not None and (not vehicle.armed or len(self._open.extras) >= MOST_SAMPLES):
+            vehicle.logs.append(self._open)
+            del vehicle.logs[:-MOST_LOGS]
+            self._open = None
         if not vehicle.armed:
-            if self._open is not None:
-                vehicle.logs.append(self._open)
-                self._open = None
             return
         if self._open is None:
             self._open = self._begin()

@@ -19,6 +19,19 @@ GLOBAL, LOCAL_NED, GLOBAL_RELATIVE, GLOBAL_INT, GLOBAL_RELATIVE_INT = 0, 1, 3, 5
 LOCAL_OFFSET_NED, BODY_NED, BODY_OFFSET_NED, GLOBAL_TERRAIN, GLOBAL_TERRAIN_INT = 7, 8, 9, 10, 11
 
 
+MISSION_FRAME = 2
+"""MAV_FRAME of an item without a place."""
+_DIGICAM = (202, 203)
+
+
+def coordinate_scale(command: int, frame: int) -> float:
+    """Return what a float x or y of MISSION_ITEM is multiplied by: 1e7 for degrees, 1 without a place.
+
+    The commands of a camera are sent with any frame, and mean other numbers by both fields.
+    """
+    return 1.0 if frame == MISSION_FRAME or command in _DIGICAM else 1e7
+
+
 class MissionItem(NamedTuple):
     """One mission item.
 

@@ -417,6 +417,8 @@ class ReportState:
     """Uptime at which operating hours were last stored [ns]."""
     contacts: int = 0
     """Number of touch-downs reported."""
+    parameters_erased: bool = False
+    """Whether the parameters have their defaults from the next boot on."""
     item_reached: int | None = None
     """Number of an action that was reported instead of the waypoint before it."""
     high_latency: bool = False

@@ -17,7 +17,9 @@ from volery.simulation.autopilots.ardupilot.modes import (
     CRITICAL,
     FORCE,
     INFO,
+    NOTICE,
     SKIP_CHECKS,
+    WARNING,
     arm,
     change_mode,
     disarm,
@@ -334,9 +336,37 @@ def on_jump_to_tag(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED if place is not None and vehicle.choose_item(place) else FAILED
 
 
-def on_calibration(vehicle: Vehicle, _command: Command) -> int:
-    """Handle PREFLIGHT_CALIBRATION, PREFLIGHT_STORAGE and those of the compass: no effect while disarmed."""
-    return FAILED if vehicle.armed else ACCEPTED
+KEPT_CALIBRATION = 76.0
+"""Value that makes the calibration in force count as valid."""
+ERASE = 2.0
+
+
+def on_calibration(vehicle: Vehicle, command: Command) -> int:
+    """Handle PREFLIGHT_CALIBRATION: of gyroscopes and barometer, for which nothing has to be moved."""
+    if vehicle.armed:
+        vehicle.send_text(NOTICE, "Disarm to allow calibration")
+        return FAILED
+    if command.param1 == 1.0:
+        return ACCEPTED
+    if command.param3 == 1.0:
+        vehicle.send_text(INFO, "Updating barometer calibration")
+        vehicle.send_text(INFO, "Barometer calibration complete")
+        return ACCEPTED
+    return ACCEPTED if KEPT_CALIBRATION in (command.fifth, command.param2) else UNSUPPORTED
+
+
+def on_storage(vehicle: Vehicle, command: Command) -> int:
+    """Handle PREFLIGHT_STORAGE: 2 erases the parameters, which have their defaults from the next boot on."""
+    if command.param1 != ERASE:
+        return DENIED
+    vehicle.reports.parameters_erased = True
+    vehicle.send_text(WARNING, "All parameters reset, reboot board")
+    return ACCEPTED
+
+
+def on_compass_calibration(_vehicle: Vehicle, _command: Command) -> int:
+    """Refuse the commands that begin and accept a calibration of the compass: it would have no effect."""
+    return FAILED
 
 
 def on_reboot(vehicle: Vehicle, command: Command) -> int:
@@ -345,6 +375,8 @@ def on_reboot(vehicle: Vehicle, command: Command) -> int:
         return UNSUPPORTED
     if vehicle.armed and command.y != 20_190_226.0:
         return FAILED
+    if vehicle.reports.parameters_erased:
+        vehicle.parameters.reset()
     vehicle.parameters.set("STAT_BOOTCNT", vehicle.parameters["STAT_BOOTCNT"] + 1.0)
     vehicle.output.after_reply(vehicle.restart)
     return ACCEPTED
@@ -414,7 +446,7 @@ def shared_commands(
         SET_MISSION_CURRENT: on_set_current,
         FLIGHT_TERMINATION: partial(on_termination, words=words[1]),
         CALIBRATION: on_calibration,
-        STORAGE: on_calibration,
+        STORAGE: on_storage,
         REBOOT: on_reboot,
         RUN_PREARM_CHECKS: partial(on_prearm_checks, problems=prearm),
         payload.SET_SERVO: payload.on_set_servo,
@@ -428,9 +460,9 @@ def shared_commands(
         **CAMERA_COMMANDS,
         payload.GRIPPER: payload.on_gripper,
         DO_SPRAYER: on_sprayer,
-        START_MAG_CAL: on_calibration,
-        ACCEPT_MAG_CAL: on_calibration,
-        CANCEL_MAG_CAL: on_calibration,
+        START_MAG_CAL: on_compass_calibration,
+        ACCEPT_MAG_CAL: on_compass_calibration,
+        CANCEL_MAG_CAL: lambda _vehicle, _command: ACCEPTED,
         FENCE_ENABLE: on_fence_enable,
         BATTERY_RESET: on_battery_reset,
         SET_SOURCES: on_set_sources,

@@ -391,7 +391,7 @@ def ardupilot_mavlink(
             writes_parts=True,
         ),
         parameters=ParameterPolicy(
-            refuses=lambda name: name.startswith("SIM_") and name not in effective,
+            refuses=lambda name: name not in effective,
             reports_missing=version.reports_missing_parameters,
         ),
         logs=LogPolicy(partial(dataflash.encode, version=version), first=1, while_armed=False),

@@ -71,6 +71,7 @@ from volery.simulation.autopilots.onboard_mission import (
     LOITER_TO_ALTITUDE,
     LOITER_TURNS,
     LOITER_UNLIMITED,
+    MISSION_FRAME,
     PAYLOAD_PLACE,
     RETURN,
     SET_HOME,
@@ -156,8 +157,6 @@ STORED_FRAMES = {
     GLOBAL_TERRAIN_INT: GLOBAL_TERRAIN,
 }
 """The frame that is read back for the frame that was sent."""
-
-MISSION_FRAME = 2
 
 
 def stored_item(item: MissionItem) -> MissionItem | int:

@@ -208,6 +208,10 @@ class Setpoint:
         )
 
 
+LEAST_RESISTANCE = 1e-6
+"""Resistance of a battery whose voltage does not depend on its load [ohm]."""
+
+
 class Flight:
     """One vehicle: read its estimate and give set-points. Every change has effect from the next grid step."""
 
@@ -397,7 +401,8 @@ class Flight:
         battery = self.spec.battery
         cells, resistance = float(battery.cells), battery.resistance_ohm
         if volts is not None:
-            cells, resistance = max(0.0, volts) / cell_voltage(self.estimate().battery_left), 0.0
+            cells = max(0.0, volts) / cell_voltage(self.estimate().battery_left)
+            resistance = LEAST_RESISTANCE
         self._world.set_input(self._body, P_CELLS, cells)
         self._world.set_input(self._body, P_RESISTANCE, resistance)
 

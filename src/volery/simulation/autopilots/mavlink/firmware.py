@@ -59,7 +59,7 @@ class ParameterPolicy(NamedTuple):
     typed: bool = False
     """Whether a PARAM_SET with another type than the parameter's is ignored."""
     refuses: Callable[[str], bool] = _never
-    """Whether a parameter of that name cannot be set: the value stays and a text says so."""
+    """Whether a parameter of that name has no effect and keeps its value; a text says so."""
     reports_missing: bool = False
     """Whether PARAM_ERROR answers what asks for a parameter that does not exist or cannot have a value."""
     checksum: str = ""

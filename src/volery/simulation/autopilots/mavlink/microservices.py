@@ -9,13 +9,14 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 from zlib import crc32
 
 from volery.base.time import MS, US, Ns
 from volery.kernel.api import Handle
 from volery.links.mavlink_messages import from_bytewise, message_type_of, to_bytewise
-from volery.simulation.autopilots.autopilot_parameters import Parameter
+from volery.simulation.autopilots.autopilot_parameters import Parameter, quantised
 from volery.simulation.autopilots.mavlink.channel import MavlinkChannel, Peer
 from volery.simulation.autopilots.mavlink.firmware import MavlinkFirmware, ParameterPolicy
 from volery.simulation.autopilots.mavlink.messages import (
@@ -27,7 +28,7 @@ from volery.simulation.autopilots.mavlink.messages import (
     from_int,
     from_long,
 )
-from volery.simulation.autopilots.onboard_mission import MissionItem
+from volery.simulation.autopilots.onboard_mission import MissionItem, coordinate_scale
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 # --- commands ---
@@ -218,14 +219,14 @@ class ParameterService:
             self._report(peer, fields, DOES_NOT_EXIST)
         if found is None or (self._policy.typed and kind != found.type):
             return
-        if self._policy.refuses(name):
+        value = from_bytewise(found.type, value) if self._policy.bytewise else value
+        changes = isfinite(value) and quantised(found.type, value) != found.value
+        if changes and self._policy.refuses(name):
             self._vehicle.send_text(4, f"Param write denied ({name})")
             self._report(peer, fields, PERMISSION_DENIED)
             self._vehicle.output.parameter_changed(name)
             return
-        if not self._vehicle.set_parameter(
-            name, from_bytewise(found.type, value) if self._policy.bytewise else value
-        ):
+        if not self._vehicle.set_parameter(name, value):
             self._report(peer, fields, VALUE_OUT_OF_RANGE)
 
     def _send_value(self, peer: Peer, name: str, index: int) -> None:
@@ -248,6 +249,10 @@ MAX_ITEMS = 724
 REQUEST_INT = "MISSION_REQUEST_INT"
 GUIDED_ITEM = 2
 """``current`` of an item outside of a mission: a destination for now."""
+
+
+def _to_int32(value: float) -> int:
+    return min(2**31 - 1, max(-(2**31), round(finite(value))))
 
 
 @dataclass
@@ -348,7 +353,8 @@ class MissionService:
 
     def on_item(self, peer: Peer, fields: dict[str, Any]) -> None:
         """Handle MISSION_ITEM, whose coordinates are degrees."""
-        self._on_item(peer, fields, round(finite(fields["x"]) * 1e7), round(finite(fields["y"]) * 1e7))
+        scale = coordinate_scale(fields["command"], fields["frame"])
+        self._on_item(peer, fields, _to_int32(fields["x"] * scale), _to_int32(fields["y"] * scale))
 
     def _on_item(self, peer: Peer, fields: dict[str, Any], x: int, y: int) -> None:
         item = MissionItem(
@@ -436,7 +442,8 @@ class MissionService:
         """Handle MISSION_REQUEST; the answer is in degrees."""
         item = self._requested(peer, fields)
         if item is not None:
-            self._send_item(peer, "MISSION_ITEM", fields, item, (item.x / 1e7, item.y / 1e7))
+            scale = coordinate_scale(item.command, item.frame)
+            self._send_item(peer, "MISSION_ITEM", fields, item, (item.x / scale, item.y / scale))
 
     def _points(self, kind: int) -> list[MissionItem]:
         """Return the points of the fence, or the rally points."""

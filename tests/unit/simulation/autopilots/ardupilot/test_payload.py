@@ -39,7 +39,7 @@ def test_a_mission_grabs_releases_and_switches(station: Any) -> None:
     assert rig.command(400, 1) == ACCEPTED
     rig.run(4.0)
     said = [text for text in rig.texts() if "ripper" in text]
-    assert said == ["Gripper load grabbing", "Gripper Grabbed", "Gripper load grabbed"]
+    assert said == ["Mission: 1 Gripper", "Gripper load grabbing", "Gripper Grabbed", "Gripper load grabbed"]
     assert rig.command(400, 0) == ACCEPTED
     rig.listed(RELAY, param1=0.0, param2=1.0)
     assert rig.command(400, 1) == ACCEPTED
@@ -55,7 +55,7 @@ def test_without_a_gripper_a_mission_still_reports_the_item(station: Any) -> Non
     assert rig.command(176, 1, AUTO) == ACCEPTED
     assert rig.command(400, 1) == ACCEPTED
     rig.run(4.0)
-    assert [text for text in rig.texts() if "Gripper" in text] == ["Gripper Released"]
+    assert [text for text in rig.texts() if "Gripper" in text] == ["Mission: 1 Gripper", "Gripper Released"]
 
 
 def test_a_switch_moves_the_gripper(station: Any) -> None:

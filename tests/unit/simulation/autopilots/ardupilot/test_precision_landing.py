@@ -10,6 +10,7 @@ import pytest
 from volery.base.frames import world_to_body
 from volery.base.time import MS
 from volery.simulation.autopilots.ardupilot import dataflash
+from volery.simulation.autopilots.ardupilot.versions import V4_5
 
 ARM, MODE, TAKEOFF, AUX = 400, 176, 22, 218
 GUIDED, LOITER, RTL, LAND = 4, 5, 6, 9
@@ -130,7 +131,7 @@ def test_a_simulated_beacon_is_seen_by_the_range_finder_and_logged(kind: int, fl
     rig.run_until(lambda: not rig.vehicle.armed)
     rig.run(0.5)
     assert from_target(rig, 4.0, 0.0) < 0.6  # the parameters are single precision
-    assert b"\xa3\x95" + bytes([dataflash.PL.number]) in dataflash.encode(rig.vehicle.logs[0])
+    assert b"\xa3\x95" + bytes([dataflash.PL.number]) in dataflash.encode(rig.vehicle.logs[0], V4_5)
 
 
 def test_without_precision_landing_the_message_means_nothing(flying: Any) -> None:

@@ -11,6 +11,7 @@ from pymavlink import DFReader
 
 from volery.simulation.autopilots.ardupilot.dataflash import encode
 from volery.simulation.autopilots.ardupilot.proximity import edges
+from volery.simulation.autopilots.ardupilot.versions import V4_5
 
 ARM, REQUEST, PREARM = 400, 512, 401
 BY_MESSAGES = {"PRX1_TYPE": 2, "ARMING_CHECK": 1}
@@ -234,7 +235,7 @@ def test_the_log_on_board_has_the_distances(station: Any, tmp_path: Path) -> Non
     assert rig.command(ARM, 0.0) == 0
     rig.run(0.3)
     file = tmp_path / "1.bin"
-    file.write_bytes(encode(rig.vehicle.logs[0]))
+    file.write_bytes(encode(rig.vehicle.logs[0], V4_5))
     found: dict[str, Any] = {}
     log = DFReader.DFReader_binary(str(file))
     while (message := log.recv_msg()) is not None:
