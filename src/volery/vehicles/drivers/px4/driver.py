@@ -137,7 +137,6 @@ class PX4(MavlinkDriver):
 
     def takeoff(self, height: float, within: Ns) -> Sequence[Step]:
         """Enter Hold, wait until ready, arm, climb and level; PX4 disarms itself 10 s after arming."""
-
         top = nan  # m AMSL, since home may move meanwhile
 
         def risen(seen: Telemetry) -> bool:
