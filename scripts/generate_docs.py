@@ -41,6 +41,7 @@ from volery.testing.driver_checks import GROUPS
 from volery.testing.driver_conformance import chosen
 from volery.testing.fault_trials import BREAKS_M_S, NEAR_M, PHASES, UPRIGHT_DEG, most_lean
 from volery.testing.fault_trials import FAULTS as TRIALS
+from volery.vehicles.tried_versions import OPERATIONS, TABLE
 
 ROOT = Path(__file__).parent.parent
 REFERENCE = ROOT / "docs" / "reference"
@@ -330,6 +331,35 @@ def _title(name: str) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.removesuffix("Text")).capitalize()
 
 
+def versions() -> str:
+    """Which versions of each firmware were tried, and how."""
+    lines = [
+        "# Versions of firmware\n",
+        "Which versions each driver was tried with, and how what is said about them is known:",
+        "**flown** on unmodified firmware in its own simulator, **read** in its sources or in the",
+        "definitions of its protocol, **reported** by others, or not tried (–).",
+        "`volery doctor --vehicle URL` and the first line of a connection name the row.",
+        "What a message means in which version stands in `drivers/px4/versions.py` and",
+        "`drivers/ardupilot/versions.py`; a version that no rule covers is flown by the newest rules,",
+        "with a warning.\n",
+        f"| firmware | source | date | {' | '.join(OPERATIONS)} | |",
+        f"|---|---|---|{'---|' * len(OPERATIONS)}---|",
+    ]
+    for row in TABLE:
+        known = " | ".join(one.value for one in row.known)
+        lines.append(
+            f"| {row.autopilot}: {row.version} | {row.commit} | {row.date} | {known} | {row.remark} |"
+        )
+    lines += [
+        "\nThe five-line mission is `examples/mission.py`; single operations are those of the",
+        "[vehicle API](../vehicle-api.md); attitude set-points are `set_attitude` without a heading;",
+        "plans are missions, fences and rally points, up and down; conformance is",
+        "`volery conformance --fly`. Figures:",
+        "[tried on real firmware](../real-firmware.md).",
+    ]
+    return "\n".join(lines) + "\n"
+
+
 def faults() -> str:
     """Return the catalogue of faults, and the results of the fault trials."""
     definitions = schema()["$defs"]
@@ -473,6 +503,7 @@ def pages() -> dict[Path, str]:
         "faults.md": MADE + faults(),
         "model.md": MADE + model(),
         "rules.md": MADE + rules(),
+        "versions.md": MADE + versions(),
         "model.schema.json": json.dumps(schema(), indent=2, ensure_ascii=False) + "\n",
     }
     return {

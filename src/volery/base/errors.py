@@ -129,7 +129,7 @@ class ControlLost(VehicleError):
 
 
 class OffTrack(VehicleError):
-    """The autopilot does not keep the vehicle on its commanded path, or at its commanded place."""
+    """The autopilot does not keep the vehicle on its path or at its place, or does not follow set-points."""
 
 
 class ObstacleNear(VehicleError):

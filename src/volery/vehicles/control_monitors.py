@@ -1,4 +1,4 @@
-"""Monitors of control in flight: upset, thrust at its limit, and the distance from the commanded path.
+"""Monitors of control in flight: upset, thrust at its limit, distance from the path, and no effect at all.
 
 They need only what autopilots report. They return the error that ends an operation; what the vehicle does
 then is in ``escalation``. Each has its counterpart in the safety tests of the MRS UAV System (Baca et al.,
@@ -8,7 +8,9 @@ what the autopilot leaves of a command.
 
 from __future__ import annotations
 
-from math import dist, hypot, isfinite
+from collections.abc import Sequence
+from math import dist, hypot, isfinite, nan
+from typing import NamedTuple
 
 from volery.base.errors import ControlLost, OffTrack, ThrustSaturated
 from volery.base.frames import Vector
@@ -216,6 +218,178 @@ class TrackMonitor:
             self.follow(None)
             return True
         return False
+
+
+FOLLOWS_WITHIN: Ns = 3 * S
+"""Time in which set-points must show an effect: heavy vehicles begin to move within two seconds."""
+AT_MOST: Ns = 10 * S
+"""Time after which what was asked for, too little to judge, is forgotten."""
+ASKED_M, ASKED_M_S, ASKED_DEG, ASKED_DEG_S = 1.5, 0.4, 30.0, 10.0
+"""Way and turn, and their rates, from which an effect must show: a law that holds a place asks for less."""
+ASKED_LEAN_DEG, ASKED_THRUST = 3.0, 0.35
+"""Mean lean, and distance of the thrust from 0.5, from which an effect must show."""
+EFFECT_SHARE, EFFECT_M, EFFECT_DEG, EFFECT_CLIMB_M = 0.1, 0.5, 5.0, 0.3
+"""What counts as an effect: this share of what was asked for, or this way, turn or climb, in any direction: a
+vehicle that is still busy with the set-point before follows.
+"""
+
+
+class Demand(NamedTuple):
+    """A set-point of a stream; NaN for what it does not state.
+
+    Args:
+        velocity: north, east and up, m/s.
+        acceleration: likewise, m/s².
+        roll: degrees, right positive.
+        pitch: degrees, nose up positive.
+        heading: degrees clockwise from north.
+        yaw_rate: degrees/s, clockwise positive.
+        thrust: 0..1, about 0.5 in hover.
+    """
+
+    velocity: Vector | None = None
+    acceleration: Vector | None = None
+    roll: float = nan
+    pitch: float = nan
+    heading: float = nan
+    yaw_rate: float = nan
+    thrust: float = nan
+
+
+class FollowMonitor:
+    """Notices a vehicle that does nothing of what a stream of set-points asks for.
+
+    It sums up what is asked for over time, and what comes of it: way, turn, lean and climb. A control loop
+    that asks for this and then that asks for nothing in the sum. A vehicle that shows an effect in any of
+    these follows; how well is not judged. Firmware ignores what it does not take without a word:
+    ArduCopter from 4.6 on a single body rate, others a set-point beyond their own fence.
+
+    Args:
+        telemetry: telemetry of the vehicle.
+    """
+
+    def __init__(self, telemetry: Telemetry) -> None:
+        self._telemetry = telemetry
+        self._demand: Demand | None = None
+        self._lasting: Ns = 0
+        self._asked_at = self._began = self._summed = telemetry.moment()
+        self._begin()
+
+    def ask(self, demand: Demand, lasting: Ns) -> None:
+        """Note the set-point that is streamed from now on, for *lasting* ns or until the next one."""
+        self._sum()
+        if self._demand is None:
+            self._begin()
+        self._demand, self._lasting, self._asked_at = demand, lasting, self._telemetry.moment()
+
+    def stop(self) -> None:
+        """Note that no set-points are streamed any more."""
+        self._demand = None
+
+    def check(self, operation: str, now: Ns) -> OffTrack | None:
+        """Return the error that must end the operation, or ``None``; as ``UpsetMonitor.check``."""
+        seen = self._telemetry
+        self._sum()
+        if self._demand is None:
+            return None
+        age = seen.elapsed(self._began)
+        if seen.stale or not (seen.flying and seen.armed) or age > AT_MOST:
+            self._begin()
+            return None
+        if age < FOLLOWS_WITHIN:
+            return None
+        judged = self._judged()
+        if not judged:
+            return None
+        if any(follows for follows, _ in judged):
+            self._begin()
+            return None
+        said = "; ".join(words for _, words in judged)
+        return OffTrack(
+            seen.name,
+            operation,
+            f"it does not follow its set-points: in {to_seconds(age):.0f} s {said}; {describe_state(seen)}; "
+            f"its firmware may not take them, or its own fence keeps it",
+        )
+
+    def _begin(self) -> None:
+        seen = self._telemetry
+        self._began = self._summed = seen.moment()
+        self._speed: Vector = (0.0, 0.0, 0.0)  # that accelerations have asked for
+        self._way: Vector = (0.0, 0.0, 0.0)
+        self._turn = self._thrust = 0.0
+        self._lean = (0.0, 0.0)
+        self._moved = self._turned = self._leant = self._climbed = 0.0
+        self._heading = seen.attitude.heading
+        self._off = nan  # of a heading that is asked for, at the beginning
+
+    def _sum(self) -> None:
+        """Add what was asked for since the last time, and what came."""
+        demand, seen = self._demand, self._telemetry
+        if demand is None:
+            return
+        if seen.elapsed(self._asked_at) > self._lasting:
+            self._demand = None
+            return
+        passed = to_seconds(seen.elapsed(self._summed))
+        self._summed = seen.moment()
+        self._sum_what_came(passed)
+        if demand.acceleration is not None:
+            self._speed = _plus(self._speed, demand.acceleration, passed)
+            self._way = _plus(self._way, self._speed, passed)
+        elif demand.velocity is not None:
+            self._way = _plus(self._way, demand.velocity, passed)
+        if isfinite(demand.yaw_rate):
+            self._turn += demand.yaw_rate * passed
+        if isfinite(demand.heading) and not isfinite(self._off):
+            self._off = _wrapped(demand.heading - self._heading)
+        if isfinite(demand.roll) and isfinite(seen.attitude.roll):
+            self._lean = self._lean[0] + demand.roll * passed, self._lean[1] + demand.pitch * passed
+        if isfinite(demand.thrust) and abs(demand.thrust - 0.5) >= ASKED_THRUST:
+            self._thrust += (demand.thrust - 0.5) * passed
+
+    def _sum_what_came(self, passed: float) -> None:
+        roll, pitch, heading = self._telemetry.attitude
+        speed = hypot(*self._telemetry.velocity)
+        if isfinite(speed):
+            self._moved += speed * passed
+            self._climbed += abs(self._telemetry.velocity.up) * passed
+        if isfinite(heading):
+            self._turned += abs(_wrapped(heading - self._heading)) if isfinite(self._heading) else 0.0
+            self._heading = heading
+        if isfinite(roll) and isfinite(pitch):
+            self._leant += hypot(roll, pitch) * passed
+
+    def _judged(self) -> list[tuple[bool, str]]:
+        """Return of each that enough was asked for whether it shows an effect, and the two in words."""
+        seconds = to_seconds(self._telemetry.elapsed(self._began))
+        found: list[tuple[bool, str]] = []
+        way = hypot(*self._way)
+        if way >= max(ASKED_M, ASKED_M_S * seconds):
+            follows = self._moved > min(EFFECT_M, EFFECT_SHARE * way)
+            found.append((follows, f"{way:.1f} m were asked for and {self._moved:.1f} m came"))
+        off = abs(self._off) if isfinite(self._off) else 0.0
+        turn = max(abs(self._turn), off)
+        if off >= ASKED_DEG or turn >= max(ASKED_DEG, ASKED_DEG_S * seconds):
+            words = f"a turn of {turn:.0f} degrees was asked for and {self._turned:.1f} came"
+            found.append((self._turned > EFFECT_DEG, words))
+        lean, leant = hypot(*self._lean) / seconds, self._leant / seconds
+        if lean >= ASKED_LEAN_DEG:
+            words = f"a lean of {lean:.1f} degrees was asked for and {leant:.1f} came"
+            found.append((leant > EFFECT_SHARE * lean, words))
+        if abs(self._thrust) >= ASKED_THRUST * seconds / 2.0:
+            what = "climb" if self._thrust > 0.0 else "descent"
+            words = f"a {what} by thrust was asked for and {self._climbed:.1f} m came"
+            found.append((self._climbed > EFFECT_CLIMB_M, words))
+        return found
+
+
+def _plus(one: Vector, other: Sequence[float], factor: float) -> Vector:
+    return one[0] + other[0] * factor, one[1] + other[1] * factor, one[2] + other[2] * factor
+
+
+def _wrapped(degrees: float) -> float:
+    return (degrees + 180.0) % 360.0 - 180.0
 
 
 def _distance(here: Vector, path: Path) -> float:

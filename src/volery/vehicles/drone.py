@@ -9,6 +9,7 @@ from volery.base.frames import LocalFrame
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S, from_seconds
 from volery.vehicles.bounded_vehicle import path_timeout, travel_timeout
+from volery.vehicles.control_monitors import Demand
 from volery.vehicles.driver import Acceleration, AttitudeTarget, Capability, ManualControl
 from volery.vehicles.executor import LANDING, NO_GOAL, RESTARTS, STREAM, TO_SAFETY, TRAVEL, TURN, Goal
 from volery.vehicles.limits import height_violation
@@ -191,6 +192,7 @@ class Drone(Vehicle):
             lambda: self._driver.velocity(velocity, yaw_rate, from_seconds(lasting)),
             policy=STREAM,
         )
+        self._note_streamed(Demand(velocity=velocity, yaw_rate=yaw_rate), lasting)
 
     def set_acceleration(
         self,
@@ -228,6 +230,7 @@ class Drone(Vehicle):
             lambda: self._driver.acceleration(Acceleration(north, east, up), yaw_rate, from_seconds(lasting)),
             policy=STREAM,
         )
+        self._note_streamed(Demand(acceleration=(north, east, up), yaw_rate=yaw_rate), lasting)
 
     def set_attitude(
         self,
@@ -274,6 +277,9 @@ class Drone(Vehicle):
             lambda: self._driver.attitude(target, from_seconds(lasting)),
             policy=STREAM,
         )
+        turning = yaw_rate if heading is None else nan
+        asked_for = Demand(roll=roll, pitch=pitch, heading=target.heading, yaw_rate=turning, thrust=thrust)
+        self._note_streamed(asked_for, lasting)
 
     def set_heading(self, degrees: float) -> None:
         """Turn in place.
@@ -447,6 +453,11 @@ class Drone(Vehicle):
     def _check_lasting(self, call: str, lasting: float) -> None:
         if lasting <= 0.0:
             raise UsageError(f"{self.name}: {call}: lasting is in seconds, above 0")
+
+    def _note_streamed(self, demand: Demand, lasting: float) -> None:
+        """Note what is streamed from now on: a drone that does nothing of it does not follow."""
+        with self.kernel.guard:
+            self._flight_monitor.following.ask(demand, from_seconds(lasting))
 
     def _check_way(self, asked: str, velocity: Velocity, lasting: float) -> None:
         """Raise ``OutOfBounds`` if *lasting* seconds at *velocity* lead out of the bounds."""

@@ -72,6 +72,7 @@ class OperationPolicy:
         manual: keep the age of the last manual control.
         to_safety: brings the vehicle to safety, so it aborts the operation of another task.
         on_track: the vehicle must stay near the straight path to its goal.
+        streams: set-points are streamed, which the vehicle must follow.
         holds_place: the vehicle stays where it is.
         unmonitored: nothing ends it: it lands, stops the motors or gives the vehicle to a pilot.
         ignored: bounds that are not monitored.
@@ -85,6 +86,7 @@ class OperationPolicy:
     manual: bool = False
     to_safety: bool = False
     on_track: bool = False
+    streams: bool = False
     holds_place: bool = False
     unmonitored: bool = False
     ignored: frozenset[str] = frozenset()
@@ -95,7 +97,7 @@ UNGUARDED = OperationPolicy(manual=True, needs_control=False)
 TURN = OperationPolicy(bounded=True)
 TRAVEL = OperationPolicy(bounded=True, travels=True, on_track=True)
 FLY_MISSION = OperationPolicy(bounded=True, travels=True, ignored=frozenset({FLOOR}))
-STREAM = OperationPolicy(bounded=True, travels=True, goes_on=True, recorded=False)
+STREAM = OperationPolicy(bounded=True, travels=True, goes_on=True, streams=True, recorded=False)
 MANUAL = OperationPolicy(bounded=True, goes_on=True, manual=True)
 IN_PLACE = OperationPolicy(holds_place=True)
 """Of a drone between two calls."""

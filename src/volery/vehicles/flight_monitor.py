@@ -1,8 +1,8 @@
 """All monitors of one vehicle as one check, which runs five times a second, also between two calls.
 
 Which of them count depends on the policy of the operation. The first error in this order ends it: control is
-lost, the battery is low, the thrust is at its limit, an obstacle is near, the vehicle is off its track, out
-of its bounds, or has lost its position.
+lost, the battery is low, the thrust is at its limit, an obstacle is near, the vehicle is off its track, does
+not follow its set-points, is out of its bounds, or has lost its position.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.trace.events import Text
 from volery.vehicles.battery_monitor import BatteryMonitor
-from volery.vehicles.control_monitors import ThrustMonitor, TrackMonitor, UpsetMonitor
+from volery.vehicles.control_monitors import FollowMonitor, ThrustMonitor, TrackMonitor, UpsetMonitor
 from volery.vehicles.escalation import SINKING_M_S
 from volery.vehicles.executor import NO_GOAL, Check, Goal, OperationPolicy
 from volery.vehicles.limits import Bounds, BoundsMonitor, Limits, Path
@@ -37,6 +37,7 @@ class FlightMonitor:
     Attributes:
         battery: judges the battery, also before an operation.
         upset: notices a loss of control, also before an operation.
+        following: notices a stream of set-points that has no effect.
     """
 
     def __init__(self, kernel: Kernel, telemetry: Telemetry) -> None:
@@ -44,6 +45,7 @@ class FlightMonitor:
         self._telemetry = telemetry
         self.battery = BatteryMonitor(telemetry)
         self.upset = UpsetMonitor(telemetry)
+        self.following = FollowMonitor(telemetry)
         self._thrust = ThrustMonitor(telemetry)
         self._track = TrackMonitor(telemetry)
         self._obstacles = ObstacleMonitor(telemetry)
@@ -74,6 +76,8 @@ class FlightMonitor:
             self._track.stay(bounds)
         else:
             self._track.follow(None)
+        if not policy.streams:
+            self.following.stop()
         follows = policy.on_track and seen.kind == "drone"
 
         def check(operation: str, now: Ns) -> VehicleError | None:
@@ -91,7 +95,16 @@ class FlightMonitor:
             thrust = self._thrust.check(operation, now) if seen.flying or policy.travels else None
             upset = self.upset.check(operation, now)
             obstacle = self._obstacles.check(operation, now, limits.clearance if policy.bounded else 0.0)
-            return upset or battery or thrust or obstacle or off_track or monitor.check(operation, now)
+            ignored = self.following.check(operation, now)
+            return (
+                upset
+                or battery
+                or thrust
+                or obstacle
+                or off_track
+                or ignored
+                or monitor.check(operation, now)
+            )
 
         return check
 

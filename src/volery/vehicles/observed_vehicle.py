@@ -30,6 +30,7 @@ FIRST_MESSAGE_WITHIN_S = 10.0
 LINK_RETURN_S = 30.0
 """How long the end of a program waits for a lost link."""
 
+VERSION_WITHIN: Ns = 3 * S
 SAID_AFTER: Ns = 5 * S
 SAID_AGAIN_AFTER: Ns = 15 * S
 """Times after which a wait for a position is reported."""
@@ -208,6 +209,12 @@ class ObservedVehicle:
         if telemetry.kind != self.kind:
             raise CapabilityError(f"{self.name} is a {telemetry.kind}, not a {self.kind}")
         self._record_link_loss_reaction()
+
+    def wait_for_version(self) -> None:
+        """Wait until the autopilot has stated its version, for 3 s at most: not all do."""
+        seen = self._poll()
+        with self.kernel.joined():
+            self._executor.wait(lambda: seen.version is not None, VERSION_WITHIN)
 
     def wait_located(self, within: float, tell: Callable[[str], object] | None = None) -> None:
         """Wait until the autopilot reports position and home.

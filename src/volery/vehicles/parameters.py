@@ -26,15 +26,11 @@ COUNTERS = frozenset({"_HASH_CHECK"})
 
 
 class Difference(NamedTuple):
-    """One parameter that differs; ``None`` where a side does not have it.
-
-    ``stated`` is what a file states under another name, of another version of the firmware; else empty.
-    """
+    """One parameter that differs; ``None`` where a side does not have it."""
 
     name: str
     here: float | None
     there: float | None
-    stated: str = ""
 
 
 class Parameters:
@@ -47,12 +43,16 @@ class Parameters:
         name: name of the vehicle.
         services: services of its autopilot.
         system: MAVLink system id, for files.
+
+    Attributes:
+        converted: what the last file states under a name of another version of the firmware, by own name.
     """
 
     def __init__(self, name: str, services: Services, system: int = SYSTEM) -> None:
         self._name = name
         self._services = services
         self._system = system or SYSTEM
+        self.converted: dict[str, str] = {}
 
     def get(self, name: str) -> float:
         """Return the value of one parameter.
@@ -135,9 +135,8 @@ class Parameters:
         """
         there = file if isinstance(file, Mapping) else read_parameter_file(file)
         here = self.all()
-        own, stated = self._under_own_names(there, here)
-        found = [one for one in differences(here, own) if one.there is not None]
-        return [one._replace(stated=stated.get(one.name, "")) for one in found]
+        own, self.converted = self._under_own_names(there, here)
+        return [one for one in differences(here, own) if one.there is not None]
 
     def _under_own_names(
         self, there: Mapping[str, float], here: Mapping[str, float]

@@ -9,6 +9,7 @@ operation runs at a time, only while no other station has control, within the bo
 | limits or fence are violated | ``OutOfBounds`` | holds where it has stopped |
 | an obstacle is nearer than the stated clearance | ``ObstacleNear`` | holds where it has stopped |
 | it is far off its commanded path or place for 3 s | ``OffTrack`` | holds where it has stopped |
+| set-points show no effect for 3 s | ``OffTrack`` | holds where it has stopped |
 | the battery falls below the reserve | ``LowBattery`` | holds where it has stopped |
 | what is left suffices for a landing only | ``CriticalBattery`` | is landed where it is |
 | the thrust is at its limit and it does not climb | ``ThrustSaturated`` | is landed where it is |

@@ -35,6 +35,7 @@ class FakeAutopilot(Scripted):
     craft: Craft = field(default_factory=Craft)
     on_command: Callable[[int, dict[str, Any]], None] = lambda command, fields: None
     climb_s: float = 2.0
+    follows: bool = False  # velocities at once
     firmware: int = 3
     version: int = 0x040506FF
 
@@ -77,6 +78,8 @@ class FakeAutopilot(Scripted):
     # -- listening
 
     def take(self, name: str, fields: dict[str, Any]) -> None:
+        if name == "SET_POSITION_TARGET_LOCAL_NED" and self.follows:
+            self.craft.velocity = (fields["vx"], fields["vy"], -fields["vz"])
         if name == "SET_POSITION_TARGET_GLOBAL_INT" and self.craft.mode == "GUIDED":
             latitude, longitude, altitude = self.home
             self.craft.north = (fields["lat_int"] - latitude) * self.metres[0]

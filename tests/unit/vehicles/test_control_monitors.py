@@ -15,9 +15,9 @@ from volery.testing.stage import SimulatedStage
 from volery.trace.events import Operation, Text
 from volery.vehicles import Drone, Limits, Velocity
 from volery.vehicles.address import parse
-from volery.vehicles.control_monitors import ThrustMonitor, TrackMonitor
+from volery.vehicles.control_monitors import Demand, FollowMonitor, ThrustMonitor, TrackMonitor
 from volery.vehicles.limits import Bounds
-from volery.vehicles.telemetry import Telemetry
+from volery.vehicles.telemetry import Attitude, Telemetry
 
 HOME = Position(46.0825, -103.8995, AMSL(900.0))
 FRAME = LocalFrame(HOME.latitude, HOME.longitude, 900.0)
@@ -199,3 +199,90 @@ def test_a_drone_that_loses_its_position_between_two_calls_is_landed(autopilot: 
     assert landed == ["land"]
     assert not [event for event in stage.events if isinstance(event, Text) and "jumped" in event.text]
     stage.close()
+
+
+class Streamed(Reported):
+    """A set-point each 200 ms for some seconds, and what the vehicle does meanwhile."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.follow = FollowMonitor(self.seen)
+
+    def asked(
+        self,
+        demand: Demand,
+        *,
+        seconds: float = 6.0,
+        moves: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        turns: float = 0.0,
+        leans: tuple[float, float] = (0.0, 0.0),
+    ) -> VehicleError | None:
+        """Return the first error; *turns* is in degrees/s, *leans* are roll and pitch."""
+        heading = 0.0
+        for _ in range(round(seconds * 10)):
+            self.at(0.0, 0.0)
+            heading += turns / 10.0
+            self.seen.velocity = Velocity(*moves)
+            self.seen.attitude = Attitude(*leans, heading % 360.0)
+            self.follow.ask(demand, S)
+            error = self.follow.check("stream", self.kernel.now())
+            if error is not None:
+                return error
+        return None
+
+
+NORTH = Demand(velocity=(2.0, 0.0, 0.0), yaw_rate=0.0)
+NOSE_DOWN = Demand(roll=0.0, pitch=-10.0, yaw_rate=0.0, thrust=0.5)
+
+
+@pytest.mark.parametrize(
+    ("demand", "said"),
+    [
+        (NORTH, r"in 3 s [56]\.\d m were asked for and 0\.0 m came"),
+        (Demand(acceleration=(0.0, 1.0, 0.0), yaw_rate=0.0), r"4\.\d m were asked for and 0\.0 m came"),
+        (NOSE_DOWN, r"a lean of (9|10)\.\d degrees was asked for and 0\.0 came"),
+        (
+            Demand(velocity=(0.0, 0.0, 0.0), yaw_rate=30.0),
+            r"a turn of \d+ degrees was asked for and 0\.0 came",
+        ),
+        (Demand(roll=0.0, pitch=0.0, heading=90.0, thrust=0.5), "a turn of 90 degrees was asked for"),
+        (Demand(roll=0.0, pitch=0.0, yaw_rate=0.0, thrust=0.9), "a climb by thrust was asked for"),
+    ],
+)
+def test_a_vehicle_that_does_nothing_of_what_is_streamed(demand: Demand, said: str) -> None:
+    streamed = Streamed()
+    with pytest.raises(VehicleError, match=f"it does not follow its set-points: .*{said}"):
+        raise streamed.asked(demand) or AssertionError("nothing was found")
+    assert streamed.kernel.now() < 4 * S
+
+
+@pytest.mark.parametrize(
+    ("demand", "did"),
+    [
+        (NORTH, {"moves": (0.4, 0.0, 0.0)}),  # far too slow, but it follows
+        (NOSE_DOWN, {"leans": (0.0, -4.0)}),
+        (Demand(velocity=(0.0, 0.0, 0.0), yaw_rate=30.0), {"turns": 20.0}),
+        (Demand(roll=0.0, pitch=0.0, heading=270.0, thrust=0.5), {"turns": -20.0, "seconds": 4.0}),
+        (Demand(roll=0.0, pitch=0.0, yaw_rate=0.0, thrust=0.1), {"moves": (0.0, 0.0, -0.5)}),
+        (Demand(velocity=(0.3, 0.0, 0.0), yaw_rate=0.0), {}),  # as a law that holds a place against wind
+        (Demand(velocity=(0.0, 0.0, 0.0), yaw_rate=0.0), {}),
+        (Demand(velocity=(2.0, 0.0, 0.0), yaw_rate=20.0), {"turns": 20.0}),  # in part
+    ],
+)
+def test_a_vehicle_that_follows_at_least_in_part(demand: Demand, did: dict[str, Any]) -> None:
+    assert Streamed().asked(demand, **{"seconds": 12.0, **did}) is None
+
+
+def test_a_loop_that_asks_for_this_and_that_asks_for_nothing() -> None:
+    streamed = Streamed()
+    for number in range(40):
+        back = Demand(velocity=((-1.0) ** number, 0.0, 0.0), yaw_rate=0.0)
+        assert streamed.asked(back, seconds=0.2) is None
+
+
+def test_a_stream_that_has_ended_is_not_judged() -> None:
+    streamed = Streamed()
+    assert streamed.asked(NORTH, seconds=2.0) is None
+    for _ in range(50):
+        streamed.at(0.0, 0.0)
+        assert streamed.follow.check("after", streamed.kernel.now()) is None

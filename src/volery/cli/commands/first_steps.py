@@ -31,7 +31,7 @@ import typer
 from rich.text import Text
 
 import volery
-from volery.base.errors import UsageError, VoleryError
+from volery.base.errors import CapabilityError, UsageError, VoleryError
 from volery.base.installed import install_command, require_extra
 from volery.base.process import on_ending_signals
 from volery.cli.command import FAILED, OK, Commands
@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from volery.cli.run_display import Drawings
     from volery.requirements.record import RunRecord
     from volery.run.result import Progress
+    from volery.vehicles import Vehicle
+    from volery.vehicles.firmware_versions import FirmwareVersion
 
 commands = Commands("First steps")
 
@@ -371,12 +373,20 @@ PARTS: tuple[Part, ...] = (
 )
 
 
+VehicleUrl = Annotated[
+    str | None, typer.Option("--vehicle", metavar="URL", help="Show the firmware that answers there.")
+]
+
+
 @commands.add("json", "debug")
-def doctor(output: Output) -> int:
+def doctor(output: Output, vehicle: VehicleUrl = None) -> int:
     """Show which parts are installed, what each missing part would enable, and how to install it.
 
+    With --vehicle: which firmware answers there, and how this driver was tried with its version.
     Exit status: 0 if no necessary part is missing, 1 otherwise.
     """
+    if vehicle is not None:
+        return _vehicle(output, vehicle)
     findings = [Finding(part.name, part.find(), part.needed, part.enables, part.get) for part in PARTS]
     for one in findings:
         output.show(_line(one))
@@ -384,6 +394,36 @@ def doctor(output: Output) -> int:
     output.show(f"missing: {', '.join(missing)}" if missing else "every necessary part is installed")
     output.give({"ok": not missing, "parts": [asdict(one) for one in findings]})
     return FAILED if missing else OK
+
+
+def _vehicle(output: Output, url: str) -> int:
+    """Show which firmware answers at an address, and what is known about its version."""
+    from volery.run.connect import attach
+    from volery.vehicles import Drone, Rover
+    from volery.vehicles.tried_versions import row_of, tried
+
+    try:
+        autopilot, version = _stated(attach(url, Drone))
+    except CapabilityError:  # a rover, which is all the same here
+        autopilot, version = _stated(attach(url, Rover))
+    output.show(tried(autopilot, version))
+    row = row_of(autopilot, version)
+    output.give(
+        {
+            "autopilot": autopilot,
+            "version": str(version) if version is not None else "",
+            "row": row._asdict() | {"known": [one.value for one in row.known]} if row is not None else None,
+        }
+    )
+    return OK
+
+
+def _stated(attached: Vehicle) -> tuple[str, FirmwareVersion | None]:
+    """Return autopilot and version of a vehicle that is attached for this."""
+    with attached as vehicle:
+        seen = vehicle.telemetry
+        vehicle.wait_for_version()
+        return seen.autopilot, seen.version
 
 
 def _line(one: Finding) -> Text:

@@ -19,7 +19,7 @@ from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output, make_table, number_column
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from volery.vehicles import Vehicle
     from volery.vehicles.parameters import Difference
@@ -106,8 +106,9 @@ def save(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") ->
 def load(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
     """Set the parameters of a file that differ from the vehicle's."""
     with _attached(url, kind) as vehicle:
-        changed = vehicle.parameters.load(file)
-    _show(output, changed, "before", "now")
+        own = vehicle.parameters
+        changed = own.load(file)
+    _show(output, changed, own.converted, "before", "now")
     output.note(f"{len(changed)} parameters were set")
     return OK
 
@@ -116,22 +117,24 @@ def load(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") ->
 def diff(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
     """Compare a vehicle with a file. Exit status: 0 if no parameter of the file differs, else 1."""
     with _attached(url, kind) as vehicle:
-        found = vehicle.parameters.compare(file)
-    _show(output, found, "vehicle", "file")
+        own = vehicle.parameters
+        found = own.compare(file)
+    _show(output, found, own.converted, "vehicle", "file")
     return FAILED if found else OK
 
 
-def _show(output: Output, found: Sequence[Difference], here: str, there: str) -> None:
+def _show(
+    output: Output, found: Sequence[Difference], converted: Mapping[str, str], here: str, there: str
+) -> None:
     if found:
-        converted = any(one.stated for one in found)
         table = make_table("parameter", number_column(here), number_column(there))
         if converted:
             table.add_column("the file states")
         for one in found:
             values = ("-" if value is None else f"{value:.9g}" for value in (one.here, one.there))
-            table.add_row(one.name, *values, *([one.stated] if converted else []))
+            table.add_row(one.name, *values, *([converted.get(one.name, "")] if converted else []))
         output.show(table)
-    output.give([one._asdict() for one in found])
+    output.give([one._asdict() | {"stated": converted.get(one.name, "")} for one in found])
 
 
 @missions.add("quiet", "debug", name="upload")

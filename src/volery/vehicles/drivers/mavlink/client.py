@@ -34,6 +34,7 @@ from volery.vehicles.drivers.mavlink.services import MavlinkServices, item_field
 from volery.vehicles.firmware_versions import Coverage, MinorVersion, stated_version
 from volery.vehicles.services import Item, RenamedParameter
 from volery.vehicles.telemetry import Answer, Telemetry
+from volery.vehicles.tried_versions import tried
 
 GCS_SYSTEM, GCS_COMPONENT = 255, 190
 """Ids of a ground station: ArduPilot takes manual control only from system 255 (its SYSID_MYGCS)."""
@@ -53,8 +54,8 @@ TRIES = 5
 UPLOAD_STALLED: Ns = 5 * S
 MISSION_TYPE = 0
 
-_WARNING = 4
-"""Severity in syslog (RFC 5424)."""
+_WARNING, _INFORMATION = 4, 6
+"""Severities in syslog (RFC 5424)."""
 _IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
 _ACCEPTED = constant("MAV_RESULT_ACCEPTED")
 _NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
@@ -402,8 +403,9 @@ class MavlinkClient:
             )
             return True
         uncovered = self.firmware.coverage.uncovered(version)
-        if uncovered:
-            self._kernel.record(Text(self._kernel.now(), self.telemetry.name, _WARNING, uncovered))
+        said = uncovered or tried(self.firmware.name, version)
+        severity = _WARNING if uncovered else _INFORMATION
+        self._kernel.record(Text(self._kernel.now(), self.telemetry.name, severity, said))
         return True
 
     def _note_answer(self, key: str, accepted: bool, result: str) -> None:
