@@ -89,9 +89,7 @@ class FileTransfer:
             last = reply.data
             passed += len(entries)
             found += [entry for entry in map(_entry, entries) if entry is not None]
-        raise Refused(
-            self._name, asked, f"it has more than {MOST_ENTRIES:,} entries, or sends them without end"
-        )
+        raise Refused(self._name, asked, f"it sends more than {MOST_ENTRIES:,} entries")
 
     def open(self, path: str) -> int:
         """See ``FileSystem``."""
@@ -105,7 +103,7 @@ class FileTransfer:
     def read(self, path: str, offset: int) -> bytes:
         """See ``FileSystem``."""
         asked = f"read {path} from byte {offset}"
-        read = _PartialRead(offset, min(self._size, offset + LARGEST_BURST))
+        read = _PartialRead(offset, self._size)
 
         def gather(send: Action, whole: Callable[[], bool]) -> None:
             self._requests.gather(
@@ -122,6 +120,8 @@ class FileTransfer:
                 self._request(READ, place, size)
 
         gather(lambda: self._request(BURST, offset + len(read.joined()), PIECE), lambda: read.ended)
+        if read.astray is not None:
+            raise Refused(self._name, asked, f"it sends byte {read.astray}, which was not requested")
         if not read.pieces and read.refusal != END_OF_FILE:
             raise Refused(self._name, asked, _reason(read.refusal, b""))
         while read.gaps:
@@ -179,13 +179,16 @@ class FileTransfer:
 
 
 class _PartialRead:
-    """The pieces of a file that have arrived from *offset* to *end*; they may overlap."""
+    """The pieces of a file of *size* bytes that have arrived from *offset* on; they may overlap."""
 
-    def __init__(self, offset: int, end: int) -> None:
+    def __init__(self, offset: int, size: int) -> None:
         self.pieces: dict[int, bytes] = {}
         self.ended = False
         self.refusal = 0
-        self._offset, self._end = offset, end
+        self.astray: int | None = None
+        """Place of a piece that was neither asked for nor follows the others."""
+        self._offset, self._size = offset, size
+        self._furthest = offset
 
     def take(self, frame: Frame) -> None:
         """Keep the piece of a file that a frame brings."""
@@ -195,8 +198,14 @@ class _PartialRead:
         if reply.refused:
             self.ended = True
             self.refusal = _code(reply.data)
-        elif reply.data and reply.offset < self._end:  # a peer may state any place in 4 GB
-            self.pieces[reply.offset] = reply.data
+        elif reply.data:
+            if reply.offset >= min(self._size, self._furthest + LARGEST_BURST):  # a peer may state any place
+                self.astray = reply.offset
+                self.ended = True
+                return
+            self._furthest = max(self._furthest, reply.offset + len(reply.data))
+            if reply.offset < self._offset + LARGEST_BURST:
+                self.pieces[reply.offset] = reply.data
             self.ended = self.ended or reply.last
 
     def joined(self) -> bytes:
