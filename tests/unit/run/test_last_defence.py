@@ -127,9 +127,10 @@ def test_what_an_autopilot_cannot_be_asked_for_is_refused_by_name() -> None:
     assert "a rover does not land" in refusal("sim:px4?kind=rover", "land", Rover)
 
 
-def test_an_autopilot_that_listens_to_another_station_is_refused() -> None:
-    with connect("sim:ardupilot?start=warm") as drone:
-        drone.parameters.set("SYSID_MYGCS", 252)
+@pytest.mark.parametrize(("version", "name"), [("4.5", "SYSID_MYGCS"), ("4.8", "MAV_GCS_SYSID")])
+def test_an_autopilot_that_listens_to_another_station_is_refused(version: str, name: str) -> None:
+    with connect(f"sim:ardupilot?start=warm&version={version}") as drone:
+        drone.parameters.set(name, 252)
         with pytest.raises(CapabilityError, match="system id 252 is lost, not for this program"):
             drone.set_link_loss_action("land")
         assert drone.parameters.get("FS_GCS_ENABLE") == 0.0
