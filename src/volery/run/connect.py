@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from logging import getLogger
-from typing import TypeVar
+from typing import TypeVar, overload
 
 from volery.base.errors import UsageError, VoleryError
 from volery.base.process import interrupted_by_signals, without_hang_ups
@@ -30,16 +30,41 @@ LOCATED_WITHIN_S = 90.0
 """Longest wait for a position: a receiver that has just been switched on takes about a minute."""
 
 
+@overload
 def connect(
     url: str,
-    kind: type[V] = Drone,  # type: ignore[assignment] # mypy: a default of a type variable
     *,
     seed: int = 1,
     limits: Limits | None = None,
     fence: Fence | None = None,
     within: float = LOCATED_WITHIN_S,
     if_killed: LinkLossAction | None = None,
-) -> V:
+) -> Drone: ...
+
+
+@overload
+def connect(
+    url: str,
+    kind: type[V],
+    *,
+    seed: int = 1,
+    limits: Limits | None = None,
+    fence: Fence | None = None,
+    within: float = LOCATED_WITHIN_S,
+    if_killed: LinkLossAction | None = None,
+) -> V: ...
+
+
+def connect(
+    url: str,
+    kind: type[Vehicle] = Drone,
+    *,
+    seed: int = 1,
+    limits: Limits | None = None,
+    fence: Fence | None = None,
+    within: float = LOCATED_WITHIN_S,
+    if_killed: LinkLossAction | None = None,
+) -> Vehicle:
     """Connect to the vehicle at *url* and return it as soon as it knows where it is.
 
     ```python
