@@ -16,6 +16,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from math import nan
 from pathlib import Path
 
 from volery.base.frames import LocalFrame
@@ -35,7 +36,8 @@ VEHICLES = ("ardupilot", "ardupilot-rover", "px4", "px4-rover", "paparazzi", "dj
 CAPACITY_AH = 200.0
 EARLY_S = 600.0
 AIM = 1.1
-HOME = LocalFrame(46.0825, -103.8995, 900.0)
+HOME_AMSL = 900.0
+HOME = LocalFrame(46.0825, -103.8995, HOME_AMSL)
 STATION = (255, 190)
 HEARTBEAT = {"type": 6, "autopilot": 8}
 SETTLED_S = 5.0
@@ -98,8 +100,10 @@ def fly(client: Client, autopilot: Autopilot) -> None:
         if flies:
             client.command(22, 0, 0, 0, 0, 0, 0, 10)
     else:
-        client.command(176, 1, 4, 2 if flies else 3)
+        client.command(176, 1, 4, 3)
         client.command(400, 1)
+        if flies:
+            client.command(22, nan, nan, nan, nan, nan, nan, HOME_AMSL + 10.0)
     assert vehicle.armed, "it does not arm"
 
 
@@ -113,7 +117,7 @@ def measure(name: str, hours: float) -> tuple[float, float, int, bool]:
     autopilot = Autopilot(kernel, flight, family, warm=True, logging=True)
     received: Callable[[], int]
     if family.codec is None:
-        autopilot.join(EmbeddedGraph(kernel), "/dji", ExecutionContext(name))
+        autopilot.join(EmbeddedGraph(kernel), "/dji_1/dji_sdk", ExecutionContext(name))
         received = int
     else:
         client = Client(kernel, autopilot, family.codec)

@@ -152,7 +152,8 @@ FIRMWARES = {
         "ArduPilot",
         "ArduCopter and ArduRover 4.5.6",
         ARDUPILOT,
-        "All parameters of ArduCopter and ArduRover 4.5.6 are there: listed, read, set, kept. The copter's\n"
+        "All parameters of ArduCopter and ArduRover 4.5.6 are there: listed and read; what changes nothing\n"
+        "keeps its value. The copter's\n"
         "names, types and values are the recorded ones. Of the rover's, few were recorded: those that it\n"
         "shares with the copter have the copter's values, the rest the documented defaults.\n"
         "Where 4.8, the default, has another name, it follows; values in cm are metres there, 1/100 degrees\n"
@@ -188,7 +189,7 @@ def supported_parameters(firmware: Firmware) -> str:
         lines += [f"\n## {one.name}, {kind}\n", "| parameter | what it changes |", "|---|---|"]
         lines += [f"| {names[name]} | {what} |" for name, what in sorted(table.supported.items())]
         lines += [
-            f"\nStored without effect, {len(kept)} of {len(every)}:\n",
+            f"\nWithout effect, {len(kept)} of {len(every)}:\n",
             ", ".join(kept),
         ]
     return "\n".join(lines) + "\n"
