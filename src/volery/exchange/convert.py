@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import replace as changed
+from functools import partial
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -19,7 +20,7 @@ from volery.exchange.uml.xmi import MOST_BYTES
 from volery.model.assembly import model_file, read_tree
 from volery.model.builder import ModelBuilder
 from volery.model.reading import Vocabulary
-from volery.model.rules import MISSING_FILE, RULES
+from volery.model.rules import MISSING_FILE, MISSING_KEY, RULES
 from volery.model.system_loader import load
 from volery.model.text import CollectedModelError
 from volery.model.writing import model_text
@@ -27,10 +28,18 @@ from volery.model.writing import model_text
 FORMATS = {".uml": "UML with MARTE and S3D", ".aadl": "AADL", ".sysml": "SysML v2"}
 """Formats of an export by the ending of the file."""
 
-OF_THE_TEXT = frozenset(code for code in RULES if code < MISSING_FILE.code)
+OF_THE_TEXT = frozenset(code for code in RULES if code < MISSING_FILE.code) - {MISSING_KEY.code}
 """Rules of the form of the text: without it nothing can be exported."""
 
 _BESIDE = (".di", ".notation", ".aird")
+_EA = "Enterprise Architect's database: publish XMI 2.1 there"
+_OTHER_TOOLS = {
+    ".mdzip": "MagicDraw's and Cameo's container: export it there as Eclipse UML2 XMI",
+    ".mdxml": "MagicDraw's own format: export it there as Eclipse UML2 XMI",
+    ".mdj": "StarUML's own format: export XMI there with its XMI extension",
+    **dict.fromkeys((".eap", ".eapx", ".qea", ".qeax"), _EA),
+}
+"""Files of other modelling tools by their endings, and how they become XMI."""
 
 
 def read_uml(
@@ -50,19 +59,35 @@ def read_uml(
     if source.suffix in _BESIDE:
         what = f"a {source.suffix} file has diagrams and no model in it; give {source.stem}.uml beside it"
         raise ModelError(what, "", Location(str(source), 0))
+    if source.suffix.lower() in _OTHER_TOOLS:
+        what = f"this is {_OTHER_TOOLS[source.suffix.lower()]}, and give that .uml or .xmi file"
+        raise ModelError(what, "", Location(str(source), 0))
     try:
         data = read_bytes(source, MOST_BYTES)
     except OSError as error:
         raise ModelError(f"cannot read it: {error.strerror or error}", "", Location(str(source), 0)) from None
     rebase = _rebase(source.parent, folder)
-    imported = import_uml(data, str(source), rebase, catalogue, processors)
+    imported = import_uml(data, str(source), rebase, catalogue, processors, partial(_part_of, source))
     tree = _moved(imported.tree, rebase)
     outside = _outside(tree)
     if not outside:
         return changed(imported, tree=tree)
     tree["files_from"] = list(dict.fromkeys([*tree.get("files_from", []), *outside]))
     what = f"its files are in {choices(outside).replace(' or ', ' and ')}, which `files_from` allows now"
-    return changed(imported, tree=tree, notes=(*imported.notes, Note(what, Location(str(source), 0))))
+    note = Note(what, Location(str(source), 0), lost=False)
+    return changed(imported, tree=tree, notes=(*imported.notes, note))
+
+
+def _part_of(source: Path, name: str) -> bytes:
+    """Return a submodel that *source* refers to, a file in its folder or below."""
+    file = source.parent / name
+    try:
+        if not file.resolve().is_relative_to(source.parent.resolve()):
+            raise OSError("it is outside the folder of the model")
+        return read_bytes(file, MOST_BYTES)
+    except OSError as error:
+        what = f"its submodel {name} cannot be read: {error.strerror or error}"
+        raise ModelError(what, "", Location(str(source), 0)) from None
 
 
 def _moved(tree: Mapping[str, Any], rebase: Rebase) -> dict[str, Any]:
@@ -170,6 +195,9 @@ def export_model(model: Path, target: Path, vocabulary: Vocabulary) -> tuple[Not
     tree = read_tree(file).plain()
     if target.suffix == ".uml":
         base = read_uml(target, file.parent, vocabulary.processors) if target.exists() else None
+        if base is not None and base.file.parts:
+            files = ", ".join(base.file.parts)
+            raise UsageError(f"{target} has parts in other files ({files}): export to a new file")
         rebase = _rebase(file.parent, target.parent)
         text, notes = export_uml(_moved(tree, rebase), str(target), rebase, base)
     else:

@@ -18,7 +18,7 @@ from volery.base.errors import (
     Refused,
     UsageError,
 )
-from volery.cli.command import BAD_INPUT, FAILED, OK, exit_status
+from volery.cli.command import BAD_INPUT, FAILED, LEFT_OUT, OK, exit_status
 from volery.cli.commands.first_steps import PARTS, Part, doctor, example, module, program
 from volery.cli.console import Output
 from volery.cli.main import application
@@ -219,7 +219,7 @@ def test_a_model_without_its_code_is_analysed_drawn_shown_compared_and_exported(
     for words in (
         ("check",), ("analyse",), ("draw", "--to", str(tmp_path / "pictures")), ("show",),
         ("diff", str(folder)), ("export", "--to", str(tmp_path / "m.uml")),
-        ("export", "--to", str(tmp_path / "m.aadl")),
+        ("export", "--allow-loss", "--to", str(tmp_path / "m.aadl")),
     ):  # fmt: skip
         result = run("model", words[0], str(folder), *words[1:])
         assert result.exit_code == OK, (words, text(result))
@@ -249,6 +249,19 @@ def test_a_model_goes_to_another_folder_as_uml_and_comes_back(tmp_path, name):
     assert "no file" not in text(result)
     compared = run("model", "diff", str(example(name)), str(back))
     assert compared.exit_code == OK, text(compared)
+
+
+def test_what_is_left_out_is_a_status_of_its_own(tmp_path):
+    aadl = ("model", "export", str(example("starter")), "--to", str(tmp_path / "m.aadl"))
+    assert run(*aadl).exit_code == LEFT_OUT
+    assert run(*aadl, "--allow-loss").exit_code == OK
+    assert run("model", "export", str(example("starter")), "--to", str(tmp_path / "m.uml")).exit_code == OK
+    text = (tmp_path / "m.uml").read_text()
+    unknown = '<x:Y xmlns:x="x" base_Class="_model"/></xmi:XMI>'
+    (tmp_path / "m.uml").write_text(text.replace("</xmi:XMI>", unknown))
+    back = ("model", "import", str(tmp_path / "m.uml"), "--out", str(tmp_path / "m.yaml"), "--replace")
+    assert run(*back).exit_code == LEFT_OUT
+    assert run(*back, "--allow-loss").exit_code == OK
 
 
 def test_an_import_says_what_it_made_and_what_did_not_map(tmp_path):

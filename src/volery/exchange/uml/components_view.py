@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from volery.base.errors import ModelError
+from volery.exchange.uml.analysis_view import LANGUAGE
 from volery.exchange.uml.context import Export, Import
 from volery.exchange.uml.interfaces_view import is_many, set_many
 from volery.exchange.uml.notations import properties, property_text, tagged
@@ -40,7 +41,7 @@ _MANY = "[]"
 
 
 def read_components(imp: Import, rebase: Rebase) -> None:
-    """Read the components that instances are of, and those that carry «RtUnit» or «PpUnit».
+    """Read the components that instances are of, those with «RtUnit» or «PpUnit», and plain ones.
 
     Args:
         imp: The import.
@@ -49,13 +50,32 @@ def read_components(imp: Import, rebase: Rebase) -> None:
     used = set(_types_of_instances(imp))
     inherited = {general for each in used for general in generals(imp, each)[1:]}
     units = set(imp.file.with_stereotype(ACTIVE, PASSIVE))
+    plain = set(_plain(imp)) - inherited
     for element in imp.file.elements("Component", "Class"):
-        wanted = element in used or (element in units and element not in inherited)
+        wanted = element in used or element in plain or (element in units and element not in inherited)
         if wanted and not imp.annotation(element).get("stands_for"):
             components = imp.section("components")
             name = imp.name(element, components)
             imp.finish(f"component:{name}", element)
             components[name] = _Component(imp, element, name, rebase).read()
+
+
+def _plain(imp: Import) -> Iterator[Element]:
+    """Yield the components without any stereotype that have a port, an interface or an operation.
+
+    One that has instances of others, or that volery has written for another purpose, is none.
+    """
+    for element in imp.file.elements("Component"):
+        features = {local(each) for each in element}
+        if (
+            not imp.file.applied.get(element)
+            and not imp.annotation(element)
+            and not _has_parts(imp, element)
+            and local(element) == "packagedElement"
+            and element.get("isAbstract") != "true"
+            and (features & {"ownedAttribute", "ownedOperation", "interfaceRealization", "ownedPort"})
+        ):
+            yield element
 
 
 def _types_of_instances(imp: Import) -> Iterator[Element]:
@@ -82,6 +102,8 @@ def instance_owners(imp: Import) -> list[Element]:
         inside = [each for each in view.iter() if uml_type(each) in ("Component", "Class")]
         marked = [each for each in inside if _is_system(imp, each)]
         found += marked or [each for each in inside if _has_parts(imp, each)]
+    if not found:  # no view of S3D: plain UML has composite components
+        found = [each for each in imp.file.elements("Component", "Class") if _has_parts(imp, each)]
     return found
 
 
@@ -135,8 +157,11 @@ class _Component:
                 self.imp.note(owner, f"no component can be in {language!r}; {', '.join(LANGUAGES)} can")
             if number == 0 or language not in found:
                 found[language] = path
+        if not found and not any(self.imp.file.applied.get(each) for each in self.family):
+            self.imp.remark(self.element, f"a component without a file; {LANGUAGE} is taken for its language")
+            return {"language": LANGUAGE}
         if not found:
-            self.imp.note(self.element, "no $language and no $path; a model needs `language`")
+            self.imp.remark(self.element, "no $language and no $path; a model needs `language`")
             return {}
         (language, path), *others = found.items()
         made: dict[str, Any] = {"language": language} if language else {}
@@ -187,8 +212,7 @@ class _Component:
                         self.imp.finish(f"{self.key}/files-link", link)
         if linked:
             return linked
-        units = ("Component", "Class")
-        alone = [one for one in packages if sum(uml_type(each) in units for each in one) == 1]
+        alone = [one for one in packages if self.imp.units_in(one) == 1]
         return [each for package in alone for each in package if self._is_folder(each)]
 
     def _is_folder(self, element: Element) -> bool:
@@ -221,6 +245,10 @@ class _Component:
             queue = self._queue(port)
             if queue:
                 queues[name] = queue
+        if not provides and not requires and not self.imp.file.applied.get(self.element):
+            realized, used = self._of_type(self.element)
+            provides |= {self.imp.names[one].lower(): self.imp.names[one] for one in realized}
+            requires |= {self.imp.names[one].lower(): self.imp.names[one] for one in used}
         sections = {"provides": provides, "requires": requires, "queues": queues, **made}
         return {key: value for key, value in sections.items() if value}
 
@@ -235,6 +263,10 @@ class _Component:
         if not provided and not required and typed is not None and uml_type(typed) == "Interface":
             conjugated = str(port.get("isConjugated", "")) == "true" or kind == "required"
             (required if conjugated else provided).append(typed)
+        if not provided and not required and typed is not None:
+            provided, required = self._of_type(typed)
+            if str(port.get("isConjugated", "")) == "true":
+                provided, required = required, provided
         if not provided and not required:
             self.imp.note(port, "a port without an interface; it is left out")
             return
@@ -244,6 +276,23 @@ class _Component:
         for number, each in enumerate(required):
             taken = name in provides or number
             requires[f"{name}_required" if taken else name] = f"{self.imp.names[each]}{many}"
+
+    def _of_type(self, typed: Element) -> tuple[list[Element], list[Element]]:
+        """Return the interfaces that a type realizes, and those that it uses."""
+        realized, used = [], []
+        for each in typed:
+            if local(each) == "interfaceRealization":
+                realized += self.imp.file.references(each, "contract")
+        for link in self.imp.links_of(typed):
+            targets = self.imp.file.references(link, "supplier")
+            if uml_type(link) == "Usage":
+                used += targets
+            else:
+                realized += targets
+        return (
+            [one for one in dict.fromkeys(realized) if one in self.imp.names],
+            [one for one in dict.fromkeys(used) if one in self.imp.names],
+        )
 
     def _interfaces(self, application: Element | None, feature: str) -> list[Element]:
         found = self.imp.file.references(application, feature) if application is not None else []

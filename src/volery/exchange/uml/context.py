@@ -32,11 +32,15 @@ _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 
 @dataclass(frozen=True)
 class Note:
-    """What was not imported or exported as it stands, where, and what to do."""
+    """What was not imported or exported as it stands, where, and what to do.
+
+    ``lost`` is false where nothing was left out: a name that was changed, a value that was assumed.
+    """
 
     what: str
     where: Location | None = None
     element: str = ""
+    lost: bool = True
 
     def __str__(self) -> str:
         place = f"{self.where}: " if self.where else ""
@@ -71,13 +75,19 @@ class Import:
     _numbers: dict[str, int] = field(default_factory=dict)
     _parts: dict[Element, list[Element]] = field(default_factory=dict)
     _links: dict[Element, list[Element]] | None = None
+    _clients: dict[Element, list[Element]] | None = None
+    _units: dict[Element, int] = field(default_factory=dict)
     _specifications: dict[Element, Element] | None = None
 
-    def note(self, element: Element, what: str) -> None:
+    def remark(self, element: Element, what: str) -> None:
+        """Record what was imported from *element* in another form than it has there."""
+        self.note(element, what, lost=False)
+
+    def note(self, element: Element, what: str, *, lost: bool = True) -> None:
         """Record what could not be imported from *element*."""
         name = element.get("name") or local(element)
         place = f"{name} ({xmi_id(element)})" if xmi_id(element) else name
-        self.notes[Note(what, self.file.where(element), place)] = None
+        self.notes[Note(what, self.file.where(element), place, lost)] = None
 
     def section(self, *path: str) -> dict[str, Any]:
         """Return the mapping at *path* in the tree; it is made if it is missing."""
@@ -96,9 +106,9 @@ class Import:
                 made, number = f"{base}_{number}", number + 1
                 self._numbers[base] = number
             if identifier(written) != written:
-                self.note(element, f"{written!r} is no name in a model; it is {made!r} there")
+                self.remark(element, f"{written!r} is no name in a model; it is {made!r} there")
             elif made != written:
-                self.note(element, f"something else is {written!r}, too; this is {made!r} in the model")
+                self.remark(element, f"something else is {written!r}, too; this is {made!r} in the model")
             self.names[element] = made
         return self.names[element]
 
@@ -128,6 +138,21 @@ class Import:
                 for each in self.file.references(link, "supplier"):
                     self._links.setdefault(each, []).append(link)
         return self._links.get(supplier, [])
+
+    def links_of(self, client: Element) -> list[Element]:
+        """Return the usages and realizations whose client is *client*."""
+        if self._clients is None:
+            self._clients = {}
+            for link in self.file.elements("Usage", "InterfaceRealization", "Realization"):
+                for each in self.file.references(link, "client"):
+                    self._clients.setdefault(each, []).append(link)
+        return self._clients.get(client, [])
+
+    def units_in(self, package: Element) -> int:
+        """Return the number of components and classes in a package."""
+        if package not in self._units:
+            self._units[package] = sum(uml_type(each) in ("Component", "Class") for each in package)
+        return self._units[package]
 
     def specification(self, operation: Element) -> Element | None:
         """Return the application of «RtSpecification» to a comment on *operation*."""

@@ -112,13 +112,13 @@ def _processor(imp: Import, element: Element, kinds: Mapping[str, str]) -> dict[
     if made["is"] not in kinds.values():
         remedy = f"`import --processor {kind}=NAME` says which it is"
         what = f"{kind!r} is not in the catalogue of processors; {remedy}"
-        imp.note(element, what)
+        imp.remark(element, what)
     frequency = stated_quantity(tag(application, "frequency")) or stated_quantity(tag(of_kind, "frequency"))
     if frequency:
         made["frequency"] = frequency
     else:
-        imp.note(element, "no frequency; a model needs one")
-    cores = tag(application, "nbCores") or tag(of_kind, "nbCores")
+        imp.remark(element, "no frequency; a model needs one")
+    cores = _figure_of(application, of_kind, "nbCores", "resMult")
     if cores.isdigit():
         made["cores"] = int(cores)
     policy = tag(application, "schedPolicy")
@@ -133,6 +133,11 @@ def _processor(imp: Import, element: Element, kinds: Mapping[str, str]) -> dict[
         for each in caches:
             imp.finish(f"processor:{imp.names[element]}/cache:{imp.names[each]}", each)
     return _joined(made, imp.annotation(element))
+
+
+def _figure_of(application: Element, of_kind: Element | None, *names: str) -> str:
+    stated = [tag(one, name) for name in names for one in (application, of_kind)]
+    return next((one for one in stated if one.isdigit()), "")
 
 
 def _cache(imp: Import, element: Element) -> dict[str, Any]:
@@ -177,7 +182,7 @@ def _read_network(imp: Import, element: Element) -> None:
     if bandwidth:
         made["bandwidth"] = bandwidth
     else:
-        imp.note(element, "no bandwidth; a model needs one")
+        imp.remark(element, "no bandwidth; a model needs one")
     latency = stated_quantity(tag(application, "blockT"))
     made |= {"latency": latency} if latency else {}
     networks[name] = _joined(made, imp.annotation(element))

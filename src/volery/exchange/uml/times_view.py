@@ -36,15 +36,23 @@ def below(family: list[Element], feature: str) -> Iterator[Element]:
 
 
 def generals(imp: Import, component: Element) -> list[Element]:
-    """Return a component and what it inherits from, itself first."""
+    """Return a component and what it inherits from, itself first; no more than ``MOST_GENERALS``."""
     found = [component]
     for each in found:
         for one in each:
             if local(one) == "generalization":
                 general = imp.file.reference(one, "general")
-                if general is not None and general not in found:
-                    found.append(general)
+                if general is None or general in found:
+                    continue
+                if len(found) == MOST_GENERALS:
+                    imp.note(component, f"it inherits from {MOST_GENERALS} or more: the others are left out")
+                    return found
+                found.append(general)
     return found
+
+
+MOST_GENERALS = 32
+"""A bound of the time that a hostile file takes."""
 
 
 class Times:

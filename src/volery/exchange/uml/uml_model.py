@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePath
@@ -11,6 +12,7 @@ from typing import Any
 from volery.base.errors import Location, ModelError
 from volery.exchange.uml import (
     allocation_view,
+    analysis_view,
     components_view,
     design_view,
     instances_view,
@@ -19,8 +21,8 @@ from volery.exchange.uml import (
 )
 from volery.exchange.uml.context import Export, Import, Note, empty_file
 from volery.exchange.uml.notations import properties
-from volery.exchange.uml.stereotypes import NAMESPACES
-from volery.exchange.uml.xmi import Element, XmiFile, local, parse
+from volery.exchange.uml.stereotypes import NAMESPACES, PROFILES
+from volery.exchange.uml.xmi import Element, ReadPart, XmiFile, local, parse
 from volery.model.builder import plain_node
 from volery.model.document import Document, EnvironmentText
 from volery.model.fields import entries
@@ -48,6 +50,7 @@ def import_uml(
     rebase: components_view.Rebase = str,
     catalogue: Iterable[str] = (),
     processors: Mapping[str, str] | None = None,
+    read_part: ReadPart | None = None,
 ) -> Imported:
     """Return the model of a .uml file.
 
@@ -57,15 +60,13 @@ def import_uml(
         rebase: Makes a path of the file relative to the folder of the model.
         catalogue: Names of the processors of the catalogue.
         processors: The processor of the catalogue that each processor of the file is, by its name there.
+        read_part: Reads the submodels that are in other files.
 
     Raises:
-        ModelError: it is no UML model with MARTE or S3D.
+        ModelError: it is no UML model, or nothing in it is a component.
     """
-    imp = Import(parse(data, name))
+    imp = Import(parse(data, name, read_part))
     model = imp.file.model
-    if not imp.file.applied:
-        what = "no stereotype of MARTE or S3D is applied in it; was it saved with its profiles?"
-        raise ModelError(what, "", Location(name, 1))
     imp.tree = {"volery": 1, "name": str(model.get("name") or PurePath(name).stem)}
     imp.tree |= imp.annotation(model)
     description = _description(imp, model)
@@ -78,12 +79,16 @@ def import_uml(
     kinds |= {one.lower(): kind for one, kind in (processors or {}).items()}
     platform_view.read_platform(imp, kinds)
     instances_view.read_instances(imp)
+    analysis_view.read_analysis(imp)
+    _add_instances(imp)
     allocation_view.read_allocations(imp)
     design_view.read_design_parameters(imp)
     _read_packages(imp)
     _read_statements(imp)
     _add_references(imp)
     _note_what_is_left(imp)
+    if not imp.tree.get("components"):
+        raise ModelError(_nothing(imp), "", Location(name, 1))
     return Imported(_ordered(imp.tree), tuple(imp.notes), imp.file, imp.keys)
 
 
@@ -175,8 +180,11 @@ def _add_references(imp: Import) -> None:
         if "frequency" in kind:
             component["at"] = {"processor": kind["is"], "frequency": kind["frequency"]}
         else:
-            element = imp.keys[f"component:{name}"]
-            imp.note(element, "no processor is known that its times were taken at; add `at` to the component")
+            element = imp.keys.get(f"component:{name}", imp.file.model)
+            imp.remark(
+                element,
+                f"{name}: no processor is known that its times were taken at; add `at` to the component",
+            )
 
 
 def _listed(stated: Any) -> list[dict[str, Any]]:
@@ -191,9 +199,44 @@ def _processor_of(name: str, places: Mapping[str, str], processors: Mapping[str,
     return ""
 
 
+def _add_instances(imp: Import) -> None:
+    """Add an instance of each component where the file has no instances at all, as plain UML may."""
+    if imp.tree.get("application") or (imp.tree.get("environment") or {}).get("components"):
+        return
+    components = imp.tree.get("components") or {}
+    for name in components:
+        instance = name.lower() if name.lower() not in components else f"{name}_1"
+        imp.section("application")[instance] = {"is": name}
+
+
+def _stereotypes(imp: Import) -> Counter[str]:
+    applied = (one for listed in imp.file.applied.values() for one in listed)
+    unknown = (local(one) for one in imp.file.strange)
+    return Counter([*(one.name for one in applied), *unknown])
+
+
+def _nothing(imp: Import) -> str:
+    """Return why an import makes no model: what there is in the file, and what would be needed."""
+    counts = _stereotypes(imp)
+    there = ", ".join(f"{name} {count}" for name, count in counts.most_common()) or "none"
+    return (
+        f"nothing in it is a component. Its stereotypes: {there}. A model needs UML components with ports or "
+        "interfaces, «RtUnit» or «PpUnit», or steps with times («GaStep», «PaStep») in activities or "
+        "interactions; was it saved with its profiles?"
+    )
+
+
 def _note_what_is_left(imp: Import) -> None:
+    known = imp.file.asked.union(*(one.stereotypes for one in PROFILES.values()))
+    for name, count in _stereotypes(imp).most_common():
+        if name not in known and not any(local(one) == name for one in imp.file.strange):
+            first = next(one for one in imp.file.applied if imp.file.has(one, name))
+            times = "once" if count == 1 else f"{count} times"
+            imp.note(first, f"«{name}», applied {times}, has no counterpart in a model and is left out")
     for element, target in imp.file.dangling:
         imp.note(element, f"it refers to {target!r}, which does not exist in this file")
+    for element in imp.file.doubled:
+        imp.note(element, "another element has its id; references mean the first one")
     for element in imp.file.strange:
         imp.note(element, "a stereotype of a profile that is not read; it stays in the file")
 

@@ -8,9 +8,9 @@ What volery does not understand stays in the tree, so that it is still there aft
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, TypeAlias
 
 from lxml import etree
@@ -86,14 +86,18 @@ class XmiFile:
         self.root, self.name = root, name
         self.ids: dict[str, Element] = {}
         self._by_type: dict[str, list[Element]] = {}
+        doubled = []
         for element in root.iter(etree.Element):
             found = xmi_id(element)
-            if found:
-                self.ids.setdefault(found, element)
+            if found and self.ids.setdefault(found, element) is not element:
+                doubled.append(element)
             self._by_type.setdefault(uml_type(element), []).append(element)
         self.applied: dict[Element, list[Application]] = {}
         self.bases: dict[Element, Element] = {}
         self.strange: list[Element] = []
+        self.doubled = doubled  # their id is that of another element
+        self.parts: tuple[str, ...] = ()  # other files that it was put together from
+        self.asked: set[str] = set()  # names of stereotypes that a reader has looked for
         self.dangling: dict[tuple[Element, str], None] = {}  # an ordered set
         for element in root:
             if isinstance(element.tag, str) and element is not self.model:
@@ -141,6 +145,7 @@ class XmiFile:
 
     def stereotype(self, element: Element, *names: str) -> Element | None:
         """Return the application of the first of the stereotypes *names* to *element*."""
+        self.asked.update(names)
         for name in names:
             for one in self.applied.get(element, ()):
                 if one.name == name:
@@ -253,18 +258,91 @@ def tags(application: Element | None, *names: str) -> list[str]:
     return []
 
 
-def parse(data: bytes, name: str) -> XmiFile:
-    """Return the tree of a .uml file.
+ReadPart = Callable[[str], bytes]
+"""Returns the bytes of another file by its path, which starts in the folder of the first one."""
 
-    Entities, document types, other files and the network are out of reach of the text.
+
+def parse(data: bytes, name: str, read_part: ReadPart | None = None) -> XmiFile:
+    """Return the tree of a .uml file, with its submodels in other files in their places.
+
+    Entities, document types, the network and files other than .uml files below its folder are out of reach of
+    the text.
 
     Args:
         data: The bytes of the file.
         name: Its name in messages.
+        read_part: Reads a submodel; without it, submodels are left out.
 
     Raises:
         ModelError: it is too large, no XML, not safe, or no UML model.
     """
+    root = _tree(data, name)
+    parts = () if read_part is None else _put_together(root, name, read_part)
+    count = sum(1 for _ in root.iter(etree.Element))
+    if count > MOST_ELEMENTS:
+        raise ModelError(f"{count} elements; {MOST_ELEMENTS} are read at most", "", Location(name, 1))
+    file = XmiFile(_model_root(root, name), name)
+    file.parts = parts
+    return file
+
+
+MOST_PARTS = 100
+"""Most files that a model is put together from."""
+_PART = re.compile(r"(?P<file>[^#:]+\.uml)#(?P<id>[^#\s]+)\Z")
+
+
+def _put_together(root: Element, name: str, read_part: ReadPart) -> tuple[str, ...]:
+    """Put the elements of other files in the place of references to them; return those files."""
+    parts: dict[str, dict[str, Element]] = {}
+    waiting = list(_stubs(root, PurePosixPath()))
+    for stub, file, target in waiting:  # grows
+        if file not in parts:
+            if len(parts) >= MOST_PARTS:
+                raise ModelError(f"more than {MOST_PARTS} submodels in other files", "", Location(name, 1))
+            parts[file] = _part(root, _tree(read_part(file), file))
+        element = parts[file].get(target)
+        if element is not None and element not in stub.iterancestors():  # else it is a reference to nothing
+            element.tag = stub.tag
+            stub.getparent().replace(stub, element)
+            waiting += _stubs(element, PurePosixPath(file).parent)
+    own = PurePosixPath(name.replace("\\", "/")).name
+    if parts:
+        _make_local(root, {own, *(PurePosixPath(one).name for one in parts)})
+    return tuple(parts)
+
+
+def _part(root: Element, other: Element) -> dict[str, Element]:
+    """Return the elements of another file by their ids; its applied stereotypes go to *root*."""
+    for each in list(other):
+        if any(key.startswith("base_") for key in each.attrib):
+            root.append(each)
+    return {xmi_id(each): each for each in other.iter(etree.Element) if xmi_id(each)}
+
+
+def _make_local(root: Element, files: set[str]) -> None:
+    """Turn references to *files* into references within this file."""
+    for element in root.iter(etree.Element):
+        for key, value in element.attrib.items():
+            if ".uml#" in value:
+                element.set(key, " ".join(_local_reference(one, files) for one in value.split(" ")))
+
+
+def _stubs(root: Element, folder: PurePosixPath) -> Iterator[tuple[Element, str, str]]:
+    for each in root.iter(etree.Element):
+        found = _PART.match(str(each.get("href", ""))) if local(each) == "packagedElement" else None
+        if found:
+            path = folder / found["file"]
+            if not path.is_absolute() and ".." not in path.parts:
+                yield each, str(path), found["id"]
+
+
+def _local_reference(text: str, files: set[str]) -> str:
+    """Return a reference to one of *files* as one within this file."""
+    found = _PART.match(text)
+    return f"#{found['id']}" if found and PurePosixPath(found["file"]).name in files else text
+
+
+def _tree(data: bytes, name: str) -> Element:
     if len(data) > MOST_BYTES:
         what = f"{len(data) / 1e6:.0f} MB; a UML model has at most {MOST_BYTES >> 20} MiB"
         raise ModelError(what, "", Location(name, 0))
@@ -281,10 +359,7 @@ def parse(data: bytes, name: str) -> XmiFile:
         raise ModelError(f"this is not XML: {error.msg}", "", Location(name, line)) from None
     if root.getroottree().docinfo.doctype:  # in an encoding in which the search above finds nothing
         raise ModelError("a document type is declared; models have none", "", Location(name, 1))
-    count = sum(1 for _ in root.iter(etree.Element))
-    if count > MOST_ELEMENTS:
-        raise ModelError(f"{count} elements; {MOST_ELEMENTS} are read at most", "", Location(name, 1))
-    return XmiFile(_model_root(root, name), name)
+    return root
 
 
 def _model_root(root: Element, name: str) -> Element:

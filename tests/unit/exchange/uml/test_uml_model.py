@@ -8,13 +8,15 @@ import pytest
 from lxml import etree
 
 from rigs.watch_model import write_watch_model
-from volery.base.errors import ModelError
+from volery.base.errors import ModelError, UsageError
 from volery.cli.commands.first_steps import example
+from volery.exchange.convert import export_model, import_model, read_uml
 from volery.exchange.uml.uml_model import export_uml, import_uml
 from volery.exchange.uml.xmi import MOST_BYTES, xmi_id
 from volery.model.assembly import read_tree
 from volery.model.text import parse
 from volery.model.writing import model_text
+from volery.run.assembly.model_checks import vocabulary
 
 MODELS = Path(__file__).parent / "models"
 FILES = sorted(path.stem for path in MODELS.glob("*.uml"))
@@ -265,7 +267,7 @@ EMPTY = """<xmi:XMI xmlns:xmi="http://www.omg.org/spec/XMI/20131001" xmlns:uml="
             b'<di:SashWindowsMngr xmlns:di="http://www.eclipse.org/papyrus/0.7.0/sashdi"/>',
             "this is a .di file",
         ),
-        (EMPTY.encode(), "no stereotype of MARTE or S3D is applied in it; was it saved with its profiles?"),
+        (EMPTY.encode(), "nothing in it is a component. Its stereotypes: none."),
         (b" " * (MOST_BYTES + 1), "a UML model has at most 32 MiB"),
     ],
 )
@@ -280,3 +282,174 @@ def test_a_damaged_annotation_is_noted():
     spoilt = re.sub(r'key="wind" value="[^"]*"', 'key="wind" value="{speed: ["', text)
     assert spoilt != text
     assert any("its annotation is damaged" in line for line in said(read("m", spoilt.encode())))
+
+
+# -- plain UML, analysis models, several files
+
+HEAD = """<?xml version="1.0" encoding="UTF-8"?>
+<xmi:XMI xmi:version="2.1" xmlns:xmi="http://schema.omg.org/spec/XMI/2.1" xmlns:uml="http://schema.omg.org/spec/UML/2.2"
+ xmlns:GQAM="http://www.eclipse.org/papyrus/GQAM/1" xmlns:PAM="http://www.eclipse.org/papyrus/PAM/1">
+<uml:Model xmi:id="m" name="plant">"""
+PLAIN = """
+<packagedElement xmi:type="uml:Interface" xmi:id="i" name="Scan">
+ <ownedOperation xmi:id="o" name="look"/>
+</packagedElement>
+<packagedElement xmi:type="uml:Component" xmi:id="c1" name="Lens">
+ <ownedAttribute xmi:type="uml:Port" xmi:id="p1" name="eye" type="i"/>
+</packagedElement>
+<packagedElement xmi:type="uml:Component" xmi:id="c2" name="Pilot">
+ <ownedAttribute xmi:type="uml:Port" xmi:id="p2" name="sight" type="i" isConjugated="true"/>
+</packagedElement>
+<packagedElement xmi:type="uml:Component" xmi:id="c3" name="Store">
+ <interfaceRealization xmi:id="r" client="c3" supplier="i" contract="i"/>
+</packagedElement>"""
+SYSTEM = """
+<packagedElement xmi:type="uml:Component" xmi:id="s" name="Plant">
+ <ownedAttribute xmi:type="uml:Property" xmi:id="a1" name="lens" type="c1"/>
+ <ownedAttribute xmi:type="uml:Property" xmi:id="a2" name="pilot" type="c2"/>
+ <ownedConnector xmi:type="uml:Connector" xmi:id="k">
+  <end xmi:type="uml:ConnectorEnd" xmi:id="e1" role="p2" partWithPort="a2"/>
+  <end xmi:type="uml:ConnectorEnd" xmi:id="e2" role="p1" partWithPort="a1"/>
+ </ownedConnector>
+</packagedElement>"""
+STEPS = """
+<packagedElement xmi:type="uml:Node" xmi:id="n" name="board"/>
+<packagedElement xmi:type="uml:Activity" xmi:id="a" name="Serve">
+ <group xmi:type="uml:ActivityPartition" xmi:id="g1" name="parser"/>
+ <group xmi:type="uml:ActivityPartition" xmi:id="g2" name="store"/>
+ <node xmi:type="uml:InitialNode" xmi:id="n0" name="start"/>
+ <node xmi:type="uml:OpaqueAction" xmi:id="n1" name="parse" inPartition="g1"/>
+ <node xmi:type="uml:OpaqueAction" xmi:id="n2" name="keep it" inPartition="g2"/>
+ <node xmi:type="uml:OpaqueAction" xmi:id="n3" name="guess" inPartition="g2"/>
+ <edge xmi:type="uml:ControlFlow" xmi:id="f" source="n1" target="n2"/>
+</packagedElement>"""
+APPLIED = """
+<GQAM:GaExecHost xmi:id="x0" base_Classifier="n" resMult="2" schedPolicy="RoundRobin"/>
+<GQAM:GaStep xmi:id="x1" base_NamedElement="n1">
+ <hostDemand>(value=5,unit=ms,source=est)</hostDemand></GQAM:GaStep>
+<PAM:PaStep xmi:id="x2" base_NamedElement="n2" hostDemand="3 ms"/>
+<GQAM:GaStep xmi:id="x3" base_NamedElement="n3" hostDemand="(expr=$t,unit=ms)"/>
+<GQAM:GaStep xmi:id="x4" base_NamedElement="f" prob="0.5"/>
+<GQAM:GaWorkloadEvent xmi:id="x5" base_NamedElement="n0"
+ pattern="open=(arrivalRate=(expr=5.0, unit=Hz, source=est))"/>
+<PAM:PaRunTInstance xmi:id="x6" base_NamedElement="g1" host="x0"/>
+<GQAM:GaAnalysisContext xmi:id="x7" base_NamedElement="a"/>"""
+TAIL = "</uml:Model></xmi:XMI>"
+
+
+def text_of(*elements, applied=""):
+    return f"{HEAD}{''.join(elements)}</uml:Model>{applied}</xmi:XMI>".encode()
+
+
+def test_plain_components_ports_and_connectors_are_imported_without_files():
+    imported = read("plain", text_of(PLAIN, SYSTEM))
+    assert imported.tree["components"] == {
+        "Lens": {"language": "python", "provides": {"eye": "Scan"}},
+        "Pilot": {"language": "python", "requires": {"sight": "Scan"}},
+        "Store": {"language": "python", "provides": {"scan": "Scan"}},
+    }
+    assert imported.tree["application"] == {
+        "lens": {"is": "Lens"},
+        "pilot": {"is": "Pilot", "sight": "lens.eye"},
+    }
+    assert not any(one.lost for one in imported.notes)
+    alone = read("plain", text_of(PLAIN)).tree
+    assert alone["application"] == {name: {"is": name.title()} for name in ("lens", "pilot", "store")}
+    text, _ = export_uml(imported.tree, "plain.uml", base=imported)
+    assert read("plain", text.encode()).tree == imported.tree
+
+
+def test_hosts_steps_and_workloads_become_processors_times_and_arrivals():
+    imported = read("steps", text_of(STEPS, applied=APPLIED))
+    tree = imported.tree
+    assert tree["interfaces"] == {"parser_steps": {"parse": {}}, "store_steps": {"keep_it": {}, "guess": {}}}
+    assert tree["components"]["parser"] == {
+        "language": "python",
+        "provides": {"steps": "parser_steps"},
+        "operations": {"parse": {"time": "5 ms", "provenance": "estimated"}},
+        "active": {"period": "0.2 s"},
+    }
+    assert tree["components"]["store"]["operations"] == {"keep_it": {"time": "3 ms"}}
+    assert tree["platform"]["processors"] == {
+        "board": {"is": "board", "cores": 2, "scheduler": "round-robin"}
+    }
+    assert tree["allocations"] == {"default": {"parser_1": "board", "store_1": "board"}}
+    lost = [str(one) for one in imported.notes if one.lost]
+    for what in (
+        "'(expr=$t,unit=ms)' is no figure",
+        "a step on an edge",
+        "«GaAnalysisContext», applied once",
+    ):
+        assert any(what in one for one in lost), what
+    assert len(lost) == 3
+    for base in (None, imported):
+        text, _ = export_uml(tree, "steps.uml", base=base)
+        again = read("steps", text.encode()).tree
+        assert {key: again[key] for key in ("components", "interfaces", "application")} == {
+            key: tree[key] for key in ("components", "interfaces", "application")
+        }
+
+
+def test_a_file_without_a_component_lists_its_stereotypes():
+    applied = APPLIED.replace("GaStep", "Other").replace("PaStep", "Other")
+    with pytest.raises(
+        ModelError, match=r"nothing in it is a component. Its stereotypes: Other 4, GaExecHost 1"
+    ):
+        read("steps", text_of(STEPS, applied=applied))
+
+
+SUB = f"""{HEAD}<packagedElement xmi:type="uml:Package" xmi:id="deep" name="Deep">
+{SYSTEM.replace('type="c', 'type="main.uml#c').replace('role="p', 'role="main.uml#p')}
+</packagedElement>{TAIL}"""
+MAIN = f'<packagedElement href="below/sub.uml#deep"/>{PLAIN}'
+
+
+def test_a_submodel_in_another_file_is_followed(tmp_path):
+    (tmp_path / "below").mkdir()
+    (tmp_path / "main.uml").write_bytes(text_of(MAIN))
+    (tmp_path / "below" / "sub.uml").write_text(SUB)
+    imported = read_uml(tmp_path / "main.uml", tmp_path, CATALOGUE)
+    assert imported.tree["application"]["pilot"] == {"is": "Pilot", "sight": "lens.eye"}
+    (tmp_path / "model.yaml").write_text(model_text(imported.tree))
+    with pytest.raises(UsageError, match=r"has parts in other files \(below/sub.uml\): export to a new file"):
+        export_model(tmp_path / "model.yaml", tmp_path / "main.uml", vocabulary())
+    (tmp_path / "below" / "sub.uml").unlink()
+    with pytest.raises(ModelError, match=r"its submodel below/sub.uml cannot be read: No such file"):
+        read_uml(tmp_path / "main.uml", tmp_path, CATALOGUE)
+
+
+@pytest.mark.parametrize("outside", ["../secret.uml", "/etc/secret.uml", "http://host/secret.uml"])
+def test_nothing_outside_the_folder_is_read_for_a_submodel(tmp_path, outside):
+    (tmp_path / "main.uml").write_bytes(text_of(f'<packagedElement href="{outside}#deep"/>', PLAIN))
+    assert "Lens" in read_uml(tmp_path / "main.uml", tmp_path, CATALOGUE).tree["components"]
+    (tmp_path / "link.uml").symlink_to("/dev/null")
+    (tmp_path / "main.uml").write_bytes(text_of('<packagedElement href="link.uml#deep"/>', PLAIN))
+    with pytest.raises(ModelError, match="it is outside the folder of the model"):
+        read_uml(tmp_path / "main.uml", tmp_path, CATALOGUE)
+
+
+def test_an_id_that_stands_twice_is_said():
+    doubled = PLAIN.replace('xmi:id="c2"', 'xmi:id="c1"')
+    assert any("another element has its id" in one for one in said(read("plain", text_of(doubled))))
+
+
+@pytest.mark.parametrize(
+    ("ending", "words"), [("mdzip", "Eclipse UML2 XMI"), ("mdj", "XMI extension"), ("qea", "XMI 2.1")]
+)
+def test_containers_of_other_tools_are_named_with_the_way_to_xmi(tmp_path, ending, words):
+    (tmp_path / f"m.{ending}").write_bytes(b"PK")
+    with pytest.raises(ModelError, match=words):
+        read_uml(tmp_path / f"m.{ending}", tmp_path, CATALOGUE)
+
+
+def test_a_model_of_very_many_elements_is_refused():
+    with pytest.raises(ModelError, match="elements; 200000 are read at most"):
+        read("many", text_of("<a/>" * 200_001))
+
+
+def test_what_was_imported_can_be_written_again_without_a_frequency(tmp_path):
+    (tmp_path / "steps.uml").write_bytes(text_of(STEPS, applied=APPLIED))
+    import_model(tmp_path / "steps.uml", tmp_path / "model.yaml", CATALOGUE)
+    for name in ("steps.uml", "new.uml", "m.aadl", "m.sysml"):
+        export_model(tmp_path / "model.yaml", tmp_path / name, vocabulary())
+        assert (tmp_path / name).stat().st_size > 0
