@@ -372,8 +372,8 @@ class Vehicle:
     def position_ok(self) -> bool:
         """Whether the estimator has a position that counts."""
         estimate = self.estimate
-        lost = estimate.fix_type < FIX_3D and estimate.gps_age >= self.rules.position_kept
-        return estimate.position_ok and not lost
+        fresh = estimate.gps_age < self.rules.position_kept
+        return estimate.position_ok and (fresh or estimate.fix_type >= FIX_3D)
 
     @property
     def has_position(self) -> bool:

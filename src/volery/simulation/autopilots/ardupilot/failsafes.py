@@ -91,9 +91,10 @@ def estimator_lost(vehicle: Vehicle) -> bool:
     since, reported = vehicle.failsafes.true_since, vehicle.reports.sent_once
     if vehicle.parameters["FS_EKF_THRESH"] <= 0.0:
         return False
-    if vehicle.has_position:
+    has_position = vehicle.has_position
+    if has_position:
         reported.add("position")
-    if vehicle.has_position or "position" not in reported:
+    if has_position or "position" not in reported:
         since.pop("estimator", None)
         return False
     now = vehicle.kernel.now()
