@@ -130,6 +130,24 @@ def run_progress(output: Output, title: str) -> Iterator[Show | None]:
         yield None if drawings is None else RateLimited(partial(drawings.show, title))
 
 
+@contextmanager
+def status_line(output: Output) -> Iterator[Callable[[str], None]]:
+    """Yield what shows one line that is renewed on a terminal; elsewhere a line each ``LINE_PERIOD_S``."""
+    if output.shows_progress:
+        with Live(console=output.notes, transient=True, refresh_per_second=4) as live:
+            yield lambda text: live.update(Text(text, no_wrap=True, overflow="ellipsis"))
+        return
+    due = 0.0
+
+    def note(text: str) -> None:
+        nonlocal due
+        if perf_counter() >= due:
+            due = perf_counter() + LINE_PERIOD_S
+            output.note(text)
+
+    yield note
+
+
 RUNS = Path("runs")
 
 

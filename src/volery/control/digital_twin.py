@@ -7,9 +7,10 @@ error alone. Its loops are recorded like those of any flight, with the reference
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import hypot, isfinite, nan
+from math import hypot, inf, isfinite, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -22,13 +23,13 @@ from volery.control.manoeuvres import LoopSample, Manoeuvre
 from volery.control.step_response import Array, Signal
 from volery.vehicles import Drone
 
-FOLLOW_GAINS = PidGains(kp=0.9, low=-8.0, high=8.0)
-FOLLOW_HEIGHT_GAINS = PidGains(kp=0.9, low=-3.0, high=4.0)
+FOLLOW_GAINS = PidGains(kp=0.9, low=-8.0, high=8.0, deceleration=1.2)
+FOLLOW_HEIGHT_GAINS = PidGains(kp=0.9, low=-3.0, high=4.0, deceleration=0.8)
 FOLLOW_YAW_GAINS = PidGains(kp=2.0, low=-200.0, high=200.0, period=DEGREES)
 AIRBORNE = 1.5
 """Height of the reference from which it counts as flying, m."""
 SLOPE_S = 0.4
-"""Time over which velocities of a record are differences, s."""
+"""Time over which velocities of a record and turn rates are differences, s."""
 
 
 class Reference(NamedTuple):
@@ -143,22 +144,27 @@ def _whole(signal: Signal) -> Array:
 
 
 class LiveReference:
-    """A vehicle that another program or a pilot flies; this program only receives its telemetry.
+    """A vehicle that is flown elsewhere: its telemetry, from the first moment in the air.
 
     Args:
         leader: the vehicle.
-        over: whether the twin should stop following.
+        over: whether the twin should stop following, once the leader was in the air.
     """
 
     def __init__(self, leader: Drone, over: Callable[[], bool]) -> None:
         self._leader, self._over = leader, over
         self._frame: LocalFrame | None = None
+        self._begun = False
+        self._headings: deque[tuple[float, float]] = deque()
 
     def __call__(self, elapsed: float) -> Reference | None:
-        """Return the last telemetry; NaN while it is silent."""
+        """Return the last telemetry; NaN while it is silent or stands."""
+        seen = self._leader.telemetry
+        self._begun = self._begun or (seen.flying and seen.above_home > AIRBORNE)
+        if not self._begun:
+            return Reference(*[nan] * 8)
         if self._over():
             return None
-        seen = self._leader.telemetry
         north = east = nan
         if seen.position is not None and seen.located:
             if self._frame is None:
@@ -167,7 +173,19 @@ class LiveReference:
             place = seen.position
             east, north, _ = self._frame.to_enu(place.latitude, place.longitude, place.altitude.metres)
         heading = nan if seen.stale else seen.attitude.heading
-        return Reference(heading, north, east, seen.above_home, *seen.velocity)
+        turn_rate = self._turn_rate(elapsed, heading)
+        return Reference(heading, north, east, seen.above_home, *seen.velocity, turn_rate)
+
+    def _turn_rate(self, elapsed: float, heading: float) -> float:
+        """Return the rate of the heading over ``SLOPE_S``, degrees/s; 0 where it is unknown."""
+        if not isfinite(heading):
+            self._headings.clear()
+            return 0.0
+        self._headings.append((elapsed, heading))
+        while self._headings[0][0] < elapsed - SLOPE_S:
+            self._headings.popleft()
+        before, old = self._headings[0]
+        return float(wrap(heading - old)) / (elapsed - before) if elapsed - before > SLOPE_S / 2.0 else 0.0
 
 
 class Twin(Manoeuvre):
@@ -232,7 +250,7 @@ class TrackingError(NamedTuple):
 
 
 SETTLING_S = 5.0
-"""Time at the beginning that is not judged: the twin joins its reference."""
+"""Time after the first sample with a reference that is not judged: the twin joins it."""
 
 
 def tracking_errors(signals: Sequence[Signal]) -> list[TrackingError]:
@@ -245,17 +263,45 @@ def tracking_errors(signals: Sequence[Signal]) -> list[TrackingError]:
     for signal in signals:
         if signal.controller != "twin" or signal.goal is None:
             continue
-        late = signal.times >= signal.times[0] + SETTLING_S
+        late = signal.times >= _joined(signal) + SETTLING_S
         error = signal.goal[late] - signal.measured[late]
         error = np.asarray(wrap(error, signal.period)) if signal.period is not None else error
         error = np.abs(error[np.isfinite(error)])
         if len(error):
-            parts[signal.name] = error
+            parts[signal.name.rpartition(" ")[2]] = error
             found.append(_summary(signal.name, signal.unit, error))
     if "north" in parts and "east" in parts and len(parts["north"]) == len(parts["east"]):
         distance = np.array([hypot(*pair) for pair in zip(parts["north"], parts["east"], strict=True)])
         found.insert(0, _summary("horizontal", "m", distance))
     return found
+
+
+def describe_judged(signals: Sequence[Signal]) -> str:
+    """Return in words which part of a twin's flight ``tracking_errors`` judges, and how far away it began.
+
+    Args:
+        signals: what ``read_signals`` returns of the twin's run.
+    """
+    errors = []
+    for name in ("north", "east"):
+        signal = _called([one for one in signals if one.controller == "twin"], name)
+        if signal is None or signal.goal is None or not isfinite(_joined(signal)):
+            return "the twin never had a reference"
+        first = int(np.searchsorted(signal.times, _joined(signal)))
+        errors.append(float(signal.goal[first] - signal.measured[first]))
+        begun, ended = float(signal.times[first]), float(signal.times[-1])
+    return (
+        f"errors from {begun + SETTLING_S:.0f} to {ended:.0f} s; it began to follow at {begun:.0f} s, "
+        f"{hypot(*errors):.1f} m from its reference, and the first {SETTLING_S:g} s are not included"
+    )
+
+
+def _joined(signal: Signal) -> float:
+    """Return the time of the first sample with a set-point; infinite without one."""
+    if signal.goal is None:
+        return inf
+    known = np.flatnonzero(np.isfinite(signal.goal))
+    return float(signal.times[known[0]]) if len(known) else inf
 
 
 def _summary(quantity: str, unit: str, error: Array) -> TrackingError:

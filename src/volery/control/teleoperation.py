@@ -1,8 +1,10 @@
 """Teleoperation by keyboard or joystick: what the operator presses becomes a limited command.
 
 A key must be repeated, or a button of the joystick held (dead man): half a second after the last input the
-command goes to zero at a limited rate, and the drone hovers. Commands are sent ten times a second at most,
-and only the last input counts, so that a slow link never works off a queue of old ones.
+command goes to zero at a limited rate, and the drone hovers. A joystick reports changes only, so one that
+fails with its stick deflected looks like a steady hand: after three seconds without a report it counts as no
+input. Commands are sent ten times a second at most, and only the last input counts, so that a slow link never
+works off a queue of old ones.
 """
 
 from __future__ import annotations
@@ -13,21 +15,25 @@ import struct
 import sys
 import termios
 import tty
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from math import radians
+from math import hypot, nan, radians
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from volery.base.elementary import cos, sin
 from volery.base.errors import UsageError, VehicleError
+from volery.base.frames import LocalFrame
 from volery.base.time import MS, Ns, from_seconds, to_seconds
 from volery.control.actuation import Actuation, Command, Measured
 from volery.kernel.waiting import Rate
 from volery.vehicles import Drone
+from volery.vehicles.telemetry import Telemetry
 
 PERIOD: Ns = 100 * MS
+SHOWN: Ns = 500 * MS
+"""Time between two lines about the flight."""
 DEAD_MAN: Ns = 500 * MS
 """Time after the last input from which the command goes to zero."""
 
@@ -183,12 +189,15 @@ _BUTTON, _AXIS = 1, 2
 _FULL = 32767.0
 DEAD_ZONE = 0.08
 DEAD_MAN_BUTTON, LAND_BUTTON = 4, 1
+SILENT_POLLS = 30
+"""Polls without a report after which sticks and button count for nothing: 3 s. A hand moves by then."""
 
 
 class Joystick:
     """A joystick of Linux (``/dev/input/js0``) in mode 2: left stick climbs and turns, right stick moves.
 
-    The dead-man button (the left shoulder button) must be held. Button 1 lands.
+    The dead-man button (the left shoulder button) must be held, and sticks that are deflected must report
+    something each three seconds: to push one to its end and hold it there stops the drone. Button 1 lands.
 
     Args:
         path: the device.
@@ -205,9 +214,11 @@ class Joystick:
         self._path = path
         self._axes: dict[int, float] = {}
         self._held = False
+        self._silent = 0
 
     def poll(self) -> Intent | str | None:
         """Return the position of the sticks while the dead-man button is held."""
+        self._silent += 1
         while True:
             try:
                 data = os.read(self._file, _EVENT.size)
@@ -217,6 +228,7 @@ class Joystick:
                 raise VehicleError("teleoperation", f"the joystick {self._path}", str(error)) from error
             if len(data) < _EVENT.size:
                 raise VehicleError("teleoperation", f"the joystick {self._path}", "it was unplugged")
+            self._silent = 0
             _, value, kind, number = _EVENT.unpack(data)
             if kind & _AXIS:
                 self._axes[number] = value / _FULL
@@ -225,7 +237,7 @@ class Joystick:
                     return LAND
                 if number == DEAD_MAN_BUTTON:
                     self._held = bool(value)
-        if not self._held:
+        if not self._held or self._silent >= SILENT_POLLS:
             return None
         turn, up, right, forward = (self._axis(number) for number in (0, 1, 3, 4))
         return Intent(-forward, right, -up, turn)
@@ -239,7 +251,30 @@ class Joystick:
         os.close(self._file)
 
 
-def teleoperate(drone: Drone, source: Input, actuation: Actuation, limits: Limits, height: float) -> str:
+def describe_flight(seen: Telemetry) -> str:
+    """Return mode, height, speed, battery and distance from home in one line, as last reported."""
+    away = nan
+    if seen.position is not None and seen.home is not None:
+        frame = LocalFrame(seen.home.latitude, seen.home.longitude, 0.0)
+        away = hypot(*frame.to_enu(seen.position.latitude, seen.position.longitude, 0.0)[:2])
+    figures = (
+        f"{seen.above_home:.1f} m above home",
+        f"{hypot(*seen.velocity):.1f} m/s",
+        f"battery {seen.battery.remaining:.0%}",
+        f"{away:.0f} m from home",
+    )
+    known = (one.replace("nan%", "unknown").replace("nan", "?") for one in figures)
+    return " · ".join((seen.mode or "no mode", *known, *(("STALE",) if seen.stale else ())))
+
+
+def teleoperate(
+    drone: Drone,
+    source: Input,
+    actuation: Actuation,
+    limits: Limits,
+    height: float,
+    show: Callable[[str], None] = lambda _: None,
+) -> str:
     """Fly by the operator's input until it lands, quits or is lost; return what ended it.
 
     A device that is lost makes the drone stop and hover; then it lands.
@@ -250,9 +285,20 @@ def teleoperate(drone: Drone, source: Input, actuation: Actuation, limits: Limit
         actuation: how commands are applied.
         limits: limits of the commands.
         height: height of the take-off, m above home.
+        show: called with ``describe_flight`` twice a second; it must not block.
     """
     kernel = drone.kernel
     drone.wait_ready()
+    seen = drone.telemetry
+    showing = kernel.every(SHOWN, lambda: show(describe_flight(seen)))
+    try:
+        return _fly_by_hand(drone, source, actuation, limits, height)
+    finally:
+        showing.cancel()
+
+
+def _fly_by_hand(drone: Drone, source: Input, actuation: Actuation, limits: Limits, height: float) -> str:
+    kernel = drone.kernel
     if drone.flying:
         actuation.engage()
     else:

@@ -152,9 +152,9 @@ class _Flight:
             return
         here = self._opened.fleet.frame
         position = Position(here.latitude, here.longitude, AMSL(here.amsl))
-        tell(
-            f"no HOME is stated: it flies at {position}; HOME = Position(...) in the mission's file moves it"
-        )
+        by_file = "HOME = Position(...) in the mission's file" if self._path is not None else ""
+        moves = by_file or "home=LATITUDE,LONGITUDE,ALTITUDE in the address"
+        tell(f"no HOME is stated: it flies at {position}; {moves} moves it")
 
     def _load(self, mission: Mission | str | Path, seed: int) -> Mission:
         """Return the mission; in virtual time a file gets virtual ``time`` and ``random`` modules."""

@@ -17,6 +17,7 @@ from volery.control.digital_twin import (
     LiveReference,
     TrackingError,
     Twin,
+    describe_judged,
     recorded_reference,
     tracking_errors,
 )
@@ -34,10 +35,11 @@ HEIGHT = 3.0
 
 
 class TwinRun(NamedTuple):
-    """A run of a twin and its tracking errors."""
+    """A run of a twin, its tracking errors, and what part of the flight they include, in words."""
 
     run: Run
     errors: list[TrackingError]
+    judged: str = ""
 
 
 def follow_record(record: Path, on: str, options: Options) -> TwinRun:
@@ -65,7 +67,9 @@ def follow_record(record: Path, on: str, options: Options) -> TwinRun:
 def follow_vehicle(leader: str, on: str, options: Options, mission: Path | None = None) -> TwinRun:
     """Let the vehicle at *on* follow the one at *leader* until that has landed.
 
-    Both are simulated in one world, or both are real. The leader gets no command unless *mission* flies it.
+    Both are simulated in one world, or both are real. The leader gets no command unless *mission* flies it:
+    that begins once the twin is in the air. A leader that another program flies is awaited on the ground,
+    until it arms.
 
     Args:
         leader: address of the vehicle that is followed.
@@ -89,19 +93,20 @@ def follow_vehicle(leader: str, on: str, options: Options, mission: Path | None 
     def flown(drone: Drone) -> None:
         nonlocal ended
         drones[drone.name] = drone
-        if drone.name == names[0]:
-            _lead(drone)
+        _await(drone, lambda: len(drones) == len(names))
+        ahead, twin = (drones[name] for name in names)
+        if drone is ahead:
+            _lead(drone, twin)
             ended = True
-        else:
-            drone.wait_ready()
-            while names[0] not in drones:
-                sleep(drone.kernel, WAIT)
-            ahead = drones[names[0]]
-            _await(drone, lambda: ended or (ahead.flying and ahead.telemetry.above_home > AIRBORNE))
-            _flight(drone, LiveReference(ahead, lambda: ended or not ahead.flying), HEIGHT).run()
+            return
+        drone.wait_ready()
+        _await(drone, lambda: ended or ahead.armed or lead is not None)
+        _flight(drone, LiveReference(ahead, lambda: ended or not ahead.flying), HEIGHT).run()
 
-    def _lead(drone: Drone) -> None:
+    def _lead(drone: Drone, twin: Drone) -> None:
         if lead is not None:
+            drone.wait_ready()
+            _await(drone, lambda: twin.flying and twin.telemetry.above_home > AIRBORNE)
             lead(drone)
             return
         _await(drone, lambda: drone.flying)
@@ -120,5 +125,7 @@ def _flight(drone: Drone, reference: Follow, height: float) -> ControlledFlight:
 
 
 def _judged(run: Run) -> TwinRun:
-    errors = tracking_errors(read_signals(run.folder)) if run.folder is not None else []
-    return TwinRun(run, errors)
+    if run.folder is None:
+        return TwinRun(run, [])
+    signals = read_signals(run.folder)
+    return TwinRun(run, tracking_errors(signals), describe_judged(signals))

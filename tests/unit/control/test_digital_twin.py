@@ -136,6 +136,18 @@ def test_a_twin_follows_a_record() -> None:
     assert errors["yaw"].rms < 6.0
 
 
+def test_a_twin_that_is_far_behind_brakes_before_its_reference() -> None:
+    """50 m behind a reference that stands: at 8 m/s it would pass it by far."""
+    flown = fly_watched(
+        lambda: Twin(lambda elapsed: Reference(0.0, 50.0, 0.0, 5.0) if elapsed < 25.0 else None),
+        limit_s=120.0,
+    )
+    assert flown.error is None
+    north = [one for one in flown.samples if one.loop == "north" and one.controller == "twin"]
+    assert max(one.measurement for one in north) < 51.0
+    assert abs(north[-1].error) < 0.5
+
+
 def test_without_a_reference_the_twin_hovers() -> None:
     twin = Twin(lambda _: Reference(nan, nan, nan, nan, nan, nan, nan))
     from volery.control.actuation import Measured

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import struct
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from volery.control.teleoperation import (
     DEAD_MAN,
     LAND,
     QUIT,
+    SILENT_POLLS,
     Intent,
     Joystick,
     Keyboard,
@@ -107,6 +109,21 @@ def test_a_joystick_needs_its_dead_man_button(tmp_path: Path) -> None:
     stick.close()
 
 
+def test_a_joystick_that_falls_silent_with_a_deflected_stick_counts_for_nothing(tmp_path: Path) -> None:
+    """It reports changes only: a steady hand and a dead device look alike."""
+    path = tmp_path / "js0"
+    os.mkfifo(path)
+    stick = Joystick(path)
+    writer = os.open(path, os.O_WRONLY)
+    os.write(writer, event(1, 1, 4) + event(-32767, 2, 4))
+    polled = [stick.poll() for _ in range(SILENT_POLLS + 1)]
+    assert polled == [Intent(forward=1.0)] * SILENT_POLLS + [None]
+    os.write(writer, event(-32000, 2, 4))  # the hand moves: it goes on
+    assert stick.poll() == Intent(forward=32000 / 32767)
+    os.close(writer)
+    stick.close()
+
+
 def test_a_missing_joystick_and_wrong_limits_are_named(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="js7"):
         Joystick(tmp_path / "js7")
@@ -132,8 +149,12 @@ class Scripted:
 def test_a_key_moves_the_drone_and_l_lands_it() -> None:
     with connect("sim:ardupilot?start=warm") as drone:
         start = drone.position
-        ended = teleoperate(drone, Scripted(AHEAD, 30, LAND), VelocitySetpoints(drone), LIMITS, 3.0)
+        said: list[str] = []
+        source = Scripted(AHEAD, 30, LAND)
+        ended = teleoperate(drone, source, VelocitySetpoints(drone), LIMITS, 3.0, said.append)
         assert ended == LAND
+        line = r"GUIDED · \d\.\d m above home · [12]\.\d m/s · battery \d+% · [1-9] m from home"
+        assert any(re.fullmatch(line, one) for one in said), said
         assert not drone.armed
         assert (drone.position.latitude - start.latitude) * 111e3 > 2.0
 

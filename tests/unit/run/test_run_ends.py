@@ -61,6 +61,7 @@ def test_a_mission_without_home_reports_where_it_flies():
     without = type(hop)(hop.__code__, {"Drone": Drone})
     assert fly(without, "sim:ardupilot", Options(tell=told.append)).completed
     assert told[0].startswith("no HOME is stated: it flies at 46.0825000, -103.8995000, 900 m AMSL")
+    assert told[0].endswith("home=LATITUDE,LONGITUDE,ALTITUDE in the address moves it")  # there is no file
 
 
 @pytest.mark.parametrize(

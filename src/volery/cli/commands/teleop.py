@@ -37,7 +37,7 @@ def teleop(
     out: Out = None,
 ) -> int:
     """Fly by keyboard or joystick: take off, hold a key or the dead-man button, let go to hover."""
-    from volery.cli.run_display import run_folder, show_outcome
+    from volery.cli.run_display import run_folder, show_outcome, status_line
     from volery.control import teleoperation
     from volery.run.fly import fly
     from volery.run.go import ACTUATIONS, GoSettings, with_rates
@@ -58,12 +58,13 @@ def teleop(
             source = stack.enter_context(teleoperation.keyboard())
             output.note(teleoperation.HELP)
         folder = stack.enter_context(run_folder(out, "teleop"))
+        show = stack.enter_context(status_line(output))
         ended = ""
 
         def mission(drone: Drone) -> None:
             nonlocal ended
             actuation = ACTUATIONS[settings.by](drone)
-            ended = teleoperation.teleoperate(drone, source, actuation, limits, settings.height)
+            ended = teleoperation.teleoperate(drone, source, actuation, limits, settings.height, show)
 
         options = Options(fidelity="hardware", pace=pace, out=folder, tell=output.note, if_killed=if_killed)
         run = fly(mission, with_rates(url, None), options)
@@ -114,6 +115,7 @@ def twin(
         for one in found.errors:
             table.add_row(one.quantity, one.unit, f"{one.rms:.2f}", f"{one.p95:.2f}", f"{one.greatest:.2f}")
         output.show(table)
+        output.note(found.judged)
         output.give({one.quantity: one._asdict() for one in found.errors})
         if plot is not None:
             draw_records([(one, ()) for one in read_signals(folder) if one.controller == "twin"], plot)
