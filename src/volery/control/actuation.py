@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import copysign, degrees, inf, isnan, radians, sqrt
+from math import copysign, degrees, inf, isfinite, isnan, radians, sqrt
 from typing import NamedTuple, Protocol
 
 from volery.base.elementary import atan, cos, exp, log, sin
@@ -28,7 +28,7 @@ from volery.control.vehicle_answer import (
 )
 from volery.trace.events import Text
 from volery.vehicles import Drone
-from volery.vehicles.telemetry import HALF_US, MIDDLE_US
+from volery.vehicles.telemetry import HALF_US, MIDDLE_US, Attitude
 
 GRAVITY = 9.80665
 
@@ -210,7 +210,7 @@ RC_SCALES: Mapping[str, RcScale] = {
         RcAxis(480.0 / 30.0, dead=20.0),
         RcAxis(400.0 / 2.5, dead=100.0),
         RcAxis(480.0 / 202.5, dead=20.0),
-        20.0,
+        27.0,
         TurnModel(acceleration=270.0, delay_s=0.09, frequency=5.0, damping=0.3),
     ),
     # MPC_HOLD_DZ 0.1, MPC_MAN_TILT_MAX 35 degrees, MPC_Z_VEL_MAX_UP 3 m/s, MPC_Z_VEL_MAX_DN 1.5 m/s,
@@ -220,13 +220,13 @@ RC_SCALES: Mapping[str, RcScale] = {
         RcAxis(500.0 / 35.0),
         RcAxis(450.0 / 3.0, dead=50.0, per_unit_down=450.0 / 1.5, expo=0.6),
         RcAxis(450.0 / 150.0, dead=50.0, expo=0.6),
-        20.0,
+        27.0,
         TurnModel(acceleration=2600.0, delay_s=0.1, frequency=0.05, damping=32.0),
     ),
 }
 """Scales by autopilot, from the defaults of its parameters."""
 
-VELOCITY_GAINS = PidGains(kp=2.0, ki=0.4, low=-3.0, high=3.0)
+VELOCITY_GAINS = PidGains(kp=2.0, ki=0.4, low=-5.0, high=5.0)
 """From an error of velocity in m/s to an acceleration in m/s^2."""
 
 
@@ -243,9 +243,16 @@ class _TiltLoop:
         """Whether there are gains."""
         return self._gains is not None
 
-    def reset(self) -> None:
-        """Begin anew after a takeover."""
+    def reset(self, attitude: Attitude | None = None) -> None:
+        """Begin anew at an attitude, as of a hover in wind (bumpless transfer); level without one."""
         self._laws = (PidLaw(self._gains), PidLaw(self._gains)) if self._gains is not None else None
+        if self._laws is None or attitude is None or not all(map(isfinite, attitude)):
+            return
+        roll, pitch, heading = map(radians, attitude)
+        ahead, right = -GRAVITY * sin(pitch) / cos(pitch), GRAVITY * sin(roll) / cos(roll)
+        c, s = cos(heading), sin(heading)
+        for law, acceleration in zip(self._laws, (ahead * c - right * s, ahead * s + right * c), strict=True):
+            law.begin_at(acceleration)
 
     def tilt(self, command: Command, measured: Measured, sample_s: float, most: float) -> tuple[float, float]:
         """Return tilt forward and to the right in degrees, each at most *most*."""
@@ -324,7 +331,7 @@ class RcOverride(Actuation):
 
     def engage(self) -> None:
         """Enter altitude hold with centred sticks; a transmitter whose throttle stick is low is recorded."""
-        self._loop.reset()
+        self._loop.reset(self._drone.telemetry.attitude)
         self._turning = TurnPrediction(_turn_model(self._drone, self.scale))
         drone, channels = self._drone, self._drone.telemetry.rc
         own = channels[THROTTLE - 1] if len(channels) >= THROTTLE else 0
@@ -368,7 +375,7 @@ CLIMBS_BY_THRUST: Mapping[str, ClimbByThrust] = {
 """Autopilots that take thrust as a climb rate, by the first word of their name."""
 THRUST_GAINS = PidGains(kp=0.12, ki=0.08, low=-0.3, high=0.3)
 """From an error of climb rate in m/s to a share of thrust about hover."""
-MOST_TILT = 20.0
+MOST_TILT = 27.0
 
 
 class AttitudeSetpoints(Actuation):
@@ -393,12 +400,13 @@ class AttitudeSetpoints(Actuation):
     def take_off(self, height: float) -> None:
         """Take off by the autopilot's own take-off."""
         self._drone.takeoff(height)
+        self._loop.reset(self._drone.telemetry.attitude)
 
     def engage(self) -> None:
         """Stop where it is."""
-        self._loop.reset()
-        self._thrust.reset()
         self._drone.hold()
+        self._loop.reset(self._drone.telemetry.attitude)
+        self._thrust.reset()
 
     def apply(self, command: Command, measured: Measured, sample_s: float) -> None:
         """Send an attitude, a thrust and a turn rate."""

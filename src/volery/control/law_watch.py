@@ -21,14 +21,14 @@ GROWN_FOR_S = 1.0
 WITHIN_DEG = 10.0
 """Error of the heading within which a flight ends where it should."""
 
-WINDOW_S = 5.0
-"""Time within which a command must show an effect. The first half is left to delays and to braking."""
+WINDOW_S = (10.0, 10.0, 5.0, 5.0)
+"""Time north, east, up and of a turn within which a command must show an effect. The first half is left to
+delays and to braking, and in the plane to wind: a tilted drone drifts until its velocity loop has the tilt.
+"""
 FOLLOWED = 0.2
 """Share of what was commanded in the second half that must be seen."""
-LEAST_ASKED = (4.0, 4.0, 1.0, 20.0)
-"""Way north, east and up in m and turn in degrees, in each half, below which nothing is judged. In wind a
-tilted drone drifts until its velocity loop has the tilt; ``ErrorWatch`` bounds that.
-"""
+LEAST_ASKED = (8.0, 8.0, 1.0, 20.0)
+"""Way north, east and up in m and turn in degrees, in each half, below which nothing is judged."""
 
 
 class ErrorWatch:
@@ -117,7 +117,7 @@ class FollowWatch:
             self._came[axis] += way if isfinite(way) else 0.0
         self._command, self._last = command, measured
         self._seen.append((self._now_s, list(self._asked), list(self._came)))
-        while self._seen[0][0] < self._now_s - WINDOW_S:
+        while self._seen[0][0] < self._now_s - max(WINDOW_S):
             self._seen.popleft()
         return next(filter(None, map(self._judged, range(4))), "")
 
@@ -127,9 +127,10 @@ class FollowWatch:
         return now.north - last.north, now.east - last.east, now.up - last.up, turned
 
     def _judged(self, axis: int) -> str:
-        if self._steady_s[axis] < WINDOW_S:
+        window_s = WINDOW_S[axis]
+        if self._steady_s[axis] < window_s:
             return ""
-        (_, first, _), (_, middle, came_before) = self._seen[0], self._seen[len(self._seen) // 2]
+        (_, first, _), (_, middle, came_before) = self._before(window_s), self._before(window_s / 2.0)
         asked = min(middle[axis] - first[axis], self._asked[axis] - middle[axis], key=abs)
         came = self._came[axis] - came_before[axis]
         unit = "deg" if axis == 3 else "m"
@@ -137,8 +138,14 @@ class FollowWatch:
             return ""
         return (
             f"it does not follow: {asked:.1f} {unit} {self.AXES[axis]} were asked for within "
-            f"{WINDOW_S / 2.0:g} s, {came:.1f} {unit} came"
+            f"{window_s / 2.0:g} s, {came:.1f} {unit} came"
         )
+
+    def _before(self, seconds: float) -> tuple[float, list[float], list[float]]:
+        """Return what was noted that long ago; samples follow each other evenly."""
+        span = self._now_s - self._seen[0][0]
+        share = min(1.0, seconds / span) if span > 0.0 else 1.0
+        return self._seen[round((1.0 - share) * (len(self._seen) - 1))]
 
 
 def ended_off(samples: Iterable[LoopSample], accuracy_m: float) -> str:

@@ -385,6 +385,10 @@ class PidLaw:
         """Begin anew, as after a take-over by the operator."""
         self._state = PID_START
 
+    def begin_at(self, output: float) -> None:
+        """Begin anew without an error at an output, which the integral then holds."""
+        self._state = take_over(self._gains, 0.0, 0.0, output)._replace(measurement=np.nan, error=np.nan)
+
 
 class OnOffLaw:
     """An On/Off law with its state."""

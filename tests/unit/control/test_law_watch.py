@@ -39,7 +39,7 @@ def test_a_step_an_approach_and_a_jump_are_no_growth() -> None:
     assert all(watch.check([sample("north", 50.0, goal=50.0)], SAMPLE_S) == "" for _ in range(100))
 
 
-def followed(command: Command, share: float, seconds: float = 8.0, north: float | None = None) -> str:
+def followed(command: Command, share: float, seconds: float = 12.0, north: float | None = None) -> str:
     """Return what the watch says of a vehicle that does a *share* of what it is commanded."""
     watch, place = FollowWatch(), [0.0] * 4
     for _ in range(round(seconds / SAMPLE_S)):
@@ -56,7 +56,7 @@ def followed(command: Command, share: float, seconds: float = 8.0, north: float 
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        (Command(north=3.0), "7.5 m north were asked for within 2.5 s, 0.0 m came"),
+        (Command(north=3.0), "14.9 m north were asked for within 5 s, 0.0 m came"),
         (Command(up=-0.8), "-2.0 m up were asked for within 2.5 s, 0.0 m came"),
         (Command(yaw_rate=90.0), "225.0 deg turn were asked for"),
     ],

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import hypot
+from collections.abc import Callable, Sequence
+from math import hypot, isnan
 from pathlib import Path
 
 import pytest
@@ -12,9 +12,10 @@ from volery.base.errors import CapabilityError, NotArrived, OffTrack, UsageError
 from volery.control.log_signals import read_signals
 from volery.control.manoeuvres import Altitude, Manoeuvre, Rotation, Waypoints
 from volery.control.safety_switch import SwitchSettings
+from volery.control.step_response import StepResponse
 from volery.run.go import GoSettings, go, with_rates
 from volery.run.result import Options
-from volery.run.thesis_comparison import fly_thesis_comparison
+from volery.run.thesis_comparison import STEPS, fly_thesis_comparison
 from volery.trace.events import ControlSample, Event, Text
 
 
@@ -128,9 +129,29 @@ def test_wrong_settings_are_refused() -> None:
         GoSettings(graph="ros3")
 
 
+PAGE = Path(__file__).parents[3] / "docs" / "control.md"
+
+
+def documented(responses: Sequence[StepResponse]) -> list[str]:
+    """Return the rows of a law as the page has them, but for the first column."""
+    return [
+        f"| {step:.0f}° | {one.settled_10:.2f} s | {one.settled_3:.2f} s | {one.overshoot:.1f}° "
+        f"| {one.steady_share:.1%} |".replace("%", " %")
+        for step, one in zip(STEPS, responses, strict=True)
+    ]
+
+
 def test_the_figures_of_the_thesis_are_met_and_beaten(tmp_path: Path) -> None:
-    """The laws of the thesis behave as it states, and ours keeps its stated bounds."""
-    flown = {one.law: one.responses for one in fly_thesis_comparison(tmp_path, ("p", "pid-thesis", "pid"))}
+    """The laws of the thesis behave as it states, ours keeps its bounds, and the page has these figures."""
+    flown = {one.law: one.responses for one in fly_thesis_comparison(tmp_path)}
+    page = PAGE.read_text(encoding="utf-8")
+    rows = [*documented(flown["pid-thesis"]), *documented(flown["pid"])]
+    assert [row for row in rows if row not in page] == [], f"{PAGE} does not have these figures"
+    ours, theirs = flown["pid"][3], flown["pid-thesis"][3]
+    assert (
+        f"after {ours.recovery:.2f} s (thesis's PID: {theirs.pushed:.0f}°, {theirs.recovery:.2f} s)" in page
+    )
+    assert all(isnan(one.settled_10) for one in (*flown["on-off"], *flown["p"][:3]))
     offset = [one.steady_error for one in flown["p"]]
     assert offset[:3] == pytest.approx(
         [20.0] * 3, abs=1.0
