@@ -146,7 +146,7 @@ def test_the_figures_of_the_thesis_are_met_and_beaten(tmp_path: Path) -> None:
     flown = {one.law: one.responses for one in fly_thesis_comparison(tmp_path)}
     page = PAGE.read_text(encoding="utf-8")
     rows = [*documented(flown["pid-thesis"]), *documented(flown["pid"])]
-    assert [row for row in rows if row not in page] == [], f"{PAGE} does not have these figures"
+    assert "\n".join(row for row in rows if row not in page) == "", f"{PAGE} lacks these figures"
     ours, theirs = flown["pid"][3], flown["pid-thesis"][3]
     assert (
         f"after {ours.recovery:.2f} s (thesis's PID: {theirs.pushed:.0f}°, {theirs.recovery:.2f} s)" in page
