@@ -124,6 +124,23 @@ NEWER_MESSAGES = (
         FieldDefinition("uint16_t", "sequence_oldest_available"),
         FieldDefinition("uint8_t", "reason"),
     ),
+    MessageDefinition(
+        435,
+        "AVAILABLE_MODES",
+        FieldDefinition("uint8_t", "number_modes"),
+        FieldDefinition("uint8_t", "mode_index"),
+        FieldDefinition("uint8_t", "standard_mode"),
+        FieldDefinition("uint32_t", "custom_mode"),
+        FieldDefinition("uint32_t", "properties"),
+        FieldDefinition("char", "mode_name", 35),
+    ),
+    MessageDefinition(
+        436,
+        "CURRENT_MODE",
+        FieldDefinition("uint8_t", "standard_mode"),
+        FieldDefinition("uint32_t", "custom_mode"),
+        FieldDefinition("uint32_t", "intended_custom_mode"),
+    ),
 )
 """Messages of MAVLink's ``common`` dialect that pymavlink does not define yet."""
 

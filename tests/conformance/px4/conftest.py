@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import nan
 from typing import Any
 
@@ -109,6 +110,13 @@ class Bench(Station):
         assert self.mode(6) == 0
 
 
+class Today(Bench):
+    """The same of the newest version, at the home of its recordings."""
+
+    firmware = FIRMWARE
+    home = LocalFrame(46.0825, -103.8995, 900.0)
+
+
 POSITION_ONLY = {
     "time_boot_ms": 0,
     **TARGET,
@@ -132,6 +140,18 @@ POSITION_ONLY = {
 def facts() -> dict[str, Any]:
     """What ``extract.py`` found in the recordings."""
     return facts_of("px4")
+
+
+@pytest.fixture(scope="session")
+def today() -> type[Bench]:
+    """The same as ``bench``, of the newest version."""
+    return Today
+
+
+@pytest.fixture(scope="session")
+def rig_of() -> Callable[..., Bench]:
+    """Makes a warm multirotor of a version: ``rig_of("1.17")``."""
+    return lambda version, **options: {"1.14": Bench, "1.17": Today}[version](**options)
 
 
 @pytest.fixture(scope="session")

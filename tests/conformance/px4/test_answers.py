@@ -12,9 +12,12 @@ from typing import Any
 import pytest
 
 import volery.simulation.autopilots
+from rigs.station import TARGET
+from volery.links.mavlink_messages import to_bytewise
 from volery.simulation.autopilots.autopilot_parameters import REAL32
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.px4 import FIRMWARE, event_interface
+from volery.simulation.autopilots.px4.firmware import USES
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 NOT_SENT = {
@@ -550,3 +553,53 @@ def test_a_mission_that_is_started_names_what_has_armed(bench: Any) -> None:
     rig.command(300)
     rig.run(0.5)
     assert "Armed by mission start\t" in rig.texts()
+
+
+@pytest.mark.parametrize("kind", ["copter", "rover"])
+def test_a_parameter_without_effect_is_refused(kind: str, today: Any) -> None:
+    """Each is set to another value: only those that change what the vehicle does keep it."""
+    rig = today(kind)
+    rig.run(0.5)
+    table, kept = rig.autopilot.firmware.rules.parameters, set()
+    for name, type_, *_ in table.defaults():
+        now = rig.vehicle.parameters[name]
+        wanted = to_bytewise(type_, 0.0 if now else 1.0)
+        rig.send("PARAM_SET", **TARGET, param_id=name, param_value=wanted, param_type=type_)
+        rig.run(0.008)
+        if rig.vehicle.parameters[name] != now:
+            kept.add(name)
+            rig.vehicle.parameters.set(name, now)
+    assert kept == set(table.supported)
+
+
+@pytest.mark.parametrize("kind", ["copter", "rover"])
+def test_a_command_without_effect_is_refused(kind: str, today: Any) -> None:
+    """Of all numbers of MAV_CMD; those that only ask for a message, save parameters or end a failure that is
+    not there are answered as by the original.
+    """
+    rig = today(kind)
+    rig.ready()
+    silent = {245, 519, 420, 211, 241, 185}
+    for number in (*range(700), *range(1000, 3100), 31000, 42424, 42600):
+        before = state_of(rig)
+        count = len(rig.received)
+        answer = rig.command(number, 1)
+        if answer == ACCEPTED and number not in silent:
+            heard = {one.name for one in rig.received[count:]} - SENT_ANYWAY
+            assert heard or state_of(rig) != before, number
+
+
+SENT_ANYWAY = {"COMMAND_ACK", "HEARTBEAT"} | set().union(*USES.values())
+
+
+def state_of(rig: Any) -> tuple[Any, ...]:
+    vehicle, commander = rig.vehicle, rig.vehicle.firmware_state
+    return (
+        vehicle.armed,
+        vehicle.mode.number,
+        vehicle.home,
+        vehicle.commanded,
+        commander.requested,
+        commander.terminated,
+        len(rig.of("STATUSTEXT")),
+    )

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from math import nan, remainder, tau
 from typing import Any
 
 import pytest
+
+from rigs.station import TARGET
+from volery.links.mavlink_messages import to_bytewise
+from volery.simulation.autopilots.onboard_mission import MissionItem
 
 LAND, RTL, LOITER = "AUTO.LAND", "AUTO.RTL", "AUTO.LOITER"
 
@@ -175,3 +180,98 @@ def test_a_rover_drives_where_the_stream_says_and_stops_without_it(bench: Any) -
     rig.run(2.0)
     assert abs(rig.ned[0] - stopped[0]) < 0.3
     assert rig.latest["HEARTBEAT"]["type"] == 10
+
+
+def set_to(rig: Any, name: str, value: float) -> None:
+    kind = rig.vehicle.parameters.find(name).type
+    rig.send("PARAM_SET", **TARGET, param_id=name, param_value=to_bytewise(kind, value), param_type=kind)
+    rig.run(0.05)
+
+
+@pytest.mark.parametrize("version", ["1.14", "1.17"])
+def test_without_satellites_it_lands_after_five_seconds_and_is_not_armed(version: str, rig_of: Any) -> None:
+    rig = rig_of(version)
+    rig.airborne()
+    set_to(rig, "SIM_GPS_USED", 0.0)
+    taken = rig.run_until(lambda: rig.vehicle.mode.name == LAND, within=8.0)
+    assert taken == pytest.approx(5.0, abs=0.5)
+    rig.run_until(lambda: not rig.vehicle.armed, within=60.0)
+    assert rig.command(400, 1) == 1
+
+
+def test_a_battery_drains_as_the_parameters_of_the_simulator_say(bench: Any) -> None:
+    rig = bench()
+    rig.ready()
+    full = rig.vehicle.estimate.battery_left
+    set_to(rig, "SIM_BAT_DRAIN", 20.0)
+    set_to(rig, "SIM_BAT_MIN_PCT", 6.0)
+    rig.airborne()
+    rig.run_until(lambda: rig.vehicle.mode.name == RTL, within=40.0)
+    assert rig.vehicle.estimate.battery_left == pytest.approx(0.06, abs=0.01)
+    rig.run_until(lambda: not rig.vehicle.armed, within=120.0)
+    rig.run(0.3)
+    assert rig.vehicle.estimate.battery_left == pytest.approx(full, abs=0.05)  # exchanged, as there
+    assert rig.command(420, 100, 1) == 0
+    rig.run(5.0)
+    assert rig.command(400, 1) == 1  # below the critical level
+    assert rig.command(420, 100, 0) == 0
+    set_to(rig, "SYS_FAILURE_EN", 0.0)
+    assert rig.command(420, 100, 0) == 2
+
+
+@pytest.mark.parametrize("version", ["1.14", "1.17"])
+def test_a_terminated_vehicle_stays_armed_and_is_not_armed_again(version: str, rig_of: Any) -> None:
+    rig = rig_of(version)
+    rig.airborne()
+    assert rig.command(185, 1) == 0
+    rig.run(6.0)
+    assert rig.vehicle.armed
+    assert rig.latest["HEARTBEAT"]["system_status"] == 8
+    assert rig.height < 1.0
+    assert rig.command(400, 0) == 1
+    assert rig.command(400, 0, 21196) == 0
+    assert rig.command(400, 1) == 1
+
+
+@pytest.mark.parametrize("version", ["1.14", "1.17"])
+def test_a_mission_beyond_the_fence_is_not_started(version: str, rig_of: Any) -> None:
+    rig = rig_of(version, parameters={"GF_MAX_HOR_DIST": 40.0})
+    rig.airborne()
+    latitude, longitude, _ = rig.vehicle.estimate.geodetic
+    place = {"x": round((latitude + 5e-4) * 1e7), "y": round(longitude * 1e7), "z": 10.0}
+    rig.vehicle.mission.replace([MissionItem(16, 6, **place)])
+    since = rig.now
+    rig.run(0.2)
+    rig.mode(4, 4)
+    rig.run(0.1)
+    assert rig.latest["COMMAND_ACK"]["result"] == 1
+    assert rig.vehicle.mode.name == LOITER
+    name = {"1.14": "AUTO_MISSION", "1.17": "Mission"}[version]
+    assert rig.texts(since) == [
+        "Geofence violation for waypoint 1\t",
+        f"Switching to {name} is currently not available\t",
+    ]
+
+
+def test_body_rates_alone_are_flown_in_offboard(bench: Any) -> None:
+    rig = bench()
+    rig.airborne()
+    fields = {"time_boot_ms": 0, **TARGET, "type_mask": 128, "q": (1.0, 0.0, 0.0, 0.0), "thrust": 0.5}
+    rates = {"body_roll_rate": 0.0, "body_pitch_rate": 0.0, "body_yaw_rate": 0.5}
+    rig.kernel.every(50_000_000, lambda: rig.send("SET_ATTITUDE_TARGET", **fields, **rates))
+    rig.run(0.2)
+    before = rig.vehicle.estimate.attitude[2]
+    assert rig.mode(6) == 0
+    rig.run(2.0)
+    assert rig.vehicle.mode.name == "OFFBOARD"
+    assert remainder(rig.vehicle.estimate.attitude[2] - before, tau) == pytest.approx(1.0, abs=0.35)
+    assert rig.latest["HEARTBEAT"]["base_mode"] == 129
+
+
+def test_gf_action_1_only_warns_and_a_destination_beyond_is_flown_to(bench: Any) -> None:
+    rig = bench(parameters={"GF_ACTION": 1, "GF_MAX_HOR_DIST": 20.0})
+    rig.airborne()
+    latitude, longitude, amsl = rig.vehicle.estimate.geodetic
+    there = {"x": round((latitude + 3e-4) * 1e7), "y": round(longitude * 1e7), "z": amsl, "param4": nan}
+    assert rig.command_int(192, param1=-1, param2=1, **there) == 0
+    rig.run_until(lambda: rig.ned[0] > 25.0, within=30.0)

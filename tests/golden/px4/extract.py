@@ -3,8 +3,8 @@
     PYTHONPATH=tests python tests/golden/px4/extract.py FOLDER
 
 FOLDER holds the telemetry logs (8-byte big-endian microseconds, then a MAVLink frame). Writes
-``facts.json`` beside this file. Times are seconds after the boot, worked out from the messages that
-carry it.
+``facts.json`` of the recordings of 1.14 beside this file, and ``replays-1.17.json`` of those of 1.17.
+Times are seconds after the boot, worked out from the messages that carry it.
 """
 
 from __future__ import annotations
@@ -308,6 +308,12 @@ def main(folder: Path) -> None:
         },
         "replays": {name: replay(rows) for name, rows in logs.items()},
     }
+    newer = {
+        name: replay(read(folder / f"px4-1.17-{name}.tlog", CLOCKS))
+        for name in ("guided", "mission", "edges")
+    }
+    at = Path(__file__).with_name("replays-1.17.json")
+    at.write_text(json.dumps(newer, allow_nan=False) + "\n", encoding="utf-8")
     target = Path(__file__).with_name("facts.json")
     target.write_text(json.dumps(facts, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 

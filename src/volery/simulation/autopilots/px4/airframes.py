@@ -46,7 +46,7 @@ from volery.simulation.autopilots.px4.flight_modes import (
 )
 from volery.simulation.autopilots.px4.follow_target import FollowTarget
 from volery.simulation.autopilots.px4.modes import CRITICAL, INFO, commander_of
-from volery.simulation.autopilots.px4.offboard import AttitudeTarget, Offboard, OffboardTarget
+from volery.simulation.autopilots.px4.offboard import Offboard, OffboardTarget, StreamTarget
 from volery.simulation.autopilots.px4.versions import Version
 from volery.simulation.autopilots.vehicle_state import ArmingTimes, Manoeuvre, ParameterTable, Vehicle
 
@@ -73,6 +73,10 @@ _SHARED = {
     "NAV_ACC_RAD": "radius within which a waypoint is reached",
     "NAV_DLL_ACT": "action when the ground station is lost",
     "NAV_RCL_ACT": "action when manual control is lost",
+    "SIM_BAT_DRAIN": "time from arming in which the battery drains, unless both SIM_BAT have their defaults",
+    "SIM_BAT_MIN_PCT": "charge at which that ends",
+    "SIM_GPS_USED": "below 4 satellites the receiver has no fix",
+    "SYS_FAILURE_EN": "0: INJECT_FAILURE is denied",
 }
 
 COPTER_SUPPORTED: Mapping[str, str] = MappingProxyType(
@@ -307,7 +311,9 @@ def copter(version: Version) -> Firmware:
         arming=ArmingTimes(spool_up=1 * S, abandoned_after=1500 * MS, landed_after=LANDED_AFTER),
         parameters=ParameterTable(copter_parameters, copter_tuning, own_parameters, COPTER_SUPPORTED),
         on_step=_on_step,
-        endpoint=partial(MavlinkEndpoint, px4_mavlink(QUADROTOR, commands.COPTER_COMMANDS, version)),
+        endpoint=partial(
+            MavlinkEndpoint, px4_mavlink(QUADROTOR, commands.COPTER_COMMANDS, COPTER_SUPPORTED, version)
+        ),
         version=version,
     )
 
@@ -349,7 +355,7 @@ class OffboardRover(Manoeuvre):
         """Stand until a set-point arrives."""
         self.receive(commander_of(self.vehicle).stream.target)
 
-    def receive(self, target: OffboardTarget | AttitudeTarget | None) -> None:
+    def receive(self, target: StreamTarget | None) -> None:
         """Follow a new set-point; attitudes are ignored."""
         if not isinstance(target, OffboardTarget):
             return
@@ -451,6 +457,8 @@ def rover(version: Version) -> Firmware:
         modes=ROVER_MODES,
         parameters=ParameterTable(rover_parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
         on_step=on_step,
-        endpoint=partial(MavlinkEndpoint, px4_mavlink(GROUND_ROVER, ROVER_COMMANDS, version)),
+        endpoint=partial(
+            MavlinkEndpoint, px4_mavlink(GROUND_ROVER, ROVER_COMMANDS, ROVER_SUPPORTED, version)
+        ),
         version=version,
     )

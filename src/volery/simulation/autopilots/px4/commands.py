@@ -11,7 +11,7 @@ from math import isfinite, isnan
 from typing import Any, Protocol, runtime_checkable
 
 from volery.base.frames import Vector
-from volery.base.time import Ns, S
+from volery.base.time import US, Ns, S
 from volery.simulation.autopilots.mavlink.channel import GROUND_STATION
 from volery.simulation.autopilots.mavlink.firmware import MessageHandler
 from volery.simulation.autopilots.mavlink.messages import (
@@ -44,7 +44,17 @@ STORAGE, REBOOT, MISSION_START, ARM_DISARM, REQUEST_PROTOCOL = 245, 246, 300, 40
 ROI_LOCATION, ROI_NONE, ROI, GET_HOME, RUN_CHECKS, GRIPPER = 195, 197, 201, 410, 401, 211
 WINCH, INJECT_FAILURE = 42_600, 420
 GRIPPER_ACTIONS = (0, 1)
-MOTOR_TEST, CALIBRATION, ACTUATOR_TEST = 209, 241, 310
+CALIBRATION = 241
+SAVE = 1
+"""PREFLIGHT_STORAGE that saves the parameters."""
+
+BATTERY_UNIT, MOTOR_UNIT = 100, 101
+"""FAILURE_UNIT."""
+WORKS, IS_OFF, IS_WRONG = 0, 1, 4
+"""FAILURE_TYPE."""
+
+COMMANDER_AFTER: Ns = 3_500 * US
+"""Time after which the commander acknowledges what the receiver has acknowledged: recorded, 0 to 8 ms."""
 
 CUSTOM_MODE_ENABLED = 1
 
@@ -85,7 +95,8 @@ def on_set_mode(vehicle: Vehicle, command: Command) -> int:
         "target_system": system,
         "target_component": component,
     }
-    vehicle.output.send_event("COMMAND_ACK", fields)
+    now = vehicle.kernel.now()
+    vehicle.kernel.call_at(now + COMMANDER_AFTER, lambda: vehicle.output.send_event("COMMAND_ACK", fields))
     return ACCEPTED
 
 
@@ -183,9 +194,10 @@ def _move_hold(holding: Hold, point: Vector, heading: float | None, speed: float
 
 
 def on_change_speed(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_CHANGE_SPEED: speed over ground."""
-    if to_integer(command.param1) in SPEED_OVER_GROUND and command.param2 > 0.0:
-        vehicle.commanded.speed = command.param2
+    """Handle DO_CHANGE_SPEED: speed over ground; -1 returns to the usual one."""
+    if to_integer(command.param1) not in SPEED_OVER_GROUND or not isfinite(command.param2):
+        return DENIED
+    vehicle.commanded.speed = command.param2 if command.param2 > 0.0 else None
     return ACCEPTED
 
 
@@ -238,6 +250,10 @@ def on_terminate(vehicle: Vehicle, command: Command) -> int:
     if commander.version.terminates_as_mode:
         if not asked or not vehicle.armed:
             return DENIED
+        if vehicle.mode.number == modes.TERMINATION:
+            return TEMPORARILY_REJECTED
+        vehicle.send_text(CRITICAL, "Failsafe activated\t")
+        commander.log.send(event_interface.FAILSAFE, bytes((0, 0, 10, 0, 10)))
         commander.terminate()
     elif asked:
         commander.stop_motors()
@@ -317,13 +333,31 @@ def on_calibration(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_motor_test(vehicle: Vehicle, _command: Command) -> int:
-    """Handle DO_MOTOR_TEST and ACTUATOR_TEST: only disarmed; nothing moves."""
-    return TEMPORARILY_REJECTED if vehicle.armed else ACCEPTED
+def on_storage(_vehicle: Vehicle, command: Command) -> int:
+    """Handle PREFLIGHT_STORAGE: parameters are always saved; they are not loaded or reset."""
+    return ACCEPTED if to_integer(command.param1) == SAVE else DENIED
 
 
 def accept(_vehicle: Vehicle, _command: Command) -> int:
-    """Accept a command that changes nothing here, such as the storage of parameters."""
+    """Accept REQUEST_PROTOCOL_VERSION as recorded; the message is not in our definitions."""
+    return ACCEPTED
+
+
+def on_failure(vehicle: Vehicle, command: Command) -> int | None:
+    """Handle INJECT_FAILURE: an empty battery; of motors only the reports, of which there are none.
+
+    Nothing answers for other units, as in the original with its built-in quadrotor.
+    """
+    if not vehicle.parameters["SYS_FAILURE_EN"]:
+        return DENIED
+    unit, kind, instance = (to_integer(one) for one in (command.param1, command.param2, command.param3))
+    if unit == MOTOR_UNIT:
+        return ACCEPTED if kind in (WORKS, IS_OFF, IS_WRONG) else UNSUPPORTED
+    if unit != BATTERY_UNIT or kind not in (WORKS, IS_OFF):
+        return None
+    if instance != 0:
+        return UNSUPPORTED
+    commander_of(vehicle).faults.emptied = kind == IS_OFF
     return ACCEPTED
 
 
@@ -356,18 +390,13 @@ SHARED_COMMANDS: Mapping[int, Handler] = {
     MISSION_START: on_mission_start,
     ARM_DISARM: on_arm,
     REQUEST_PROTOCOL: accept,
-    STORAGE: accept,
-    ROI: on_region,
-    ROI_LOCATION: on_region,
-    ROI_NONE: on_region,
+    STORAGE: on_storage,
     GRIPPER: on_gripper,
     WINCH: ignore,
-    INJECT_FAILURE: ignore,
+    INJECT_FAILURE: on_failure,
     GET_HOME: on_get_home,
     RUN_CHECKS: on_run_checks,
     CALIBRATION: on_calibration,
-    MOTOR_TEST: on_motor_test,
-    ACTUATOR_TEST: on_motor_test,
 }
 
 COPTER_COMMANDS: Mapping[int, Handler] = {
@@ -375,6 +404,9 @@ COPTER_COMMANDS: Mapping[int, Handler] = {
     LAND: on_land,
     TAKEOFF: on_takeoff,
     ORBIT: on_orbit,
+    ROI: on_region,
+    ROI_LOCATION: on_region,
+    ROI_NONE: on_region,
 }
 """Commands of a multirotor. Unsupported are among others NAV_LOITER_UNLIM, CONDITION_YAW, 193 and 92."""
 
@@ -383,7 +415,7 @@ COPTER_COMMANDS: Mapping[int, Handler] = {
 class OffboardManoeuvre(Protocol):
     """A manoeuvre of the mode OFFBOARD."""
 
-    def receive(self, target: offboard.OffboardTarget | offboard.AttitudeTarget | None) -> None:
+    def receive(self, target: offboard.StreamTarget | None) -> None:
         """Follow a new set-point."""
 
 
@@ -434,7 +466,7 @@ def _override(commander: Commander) -> None:
         commander.pilot_takes_over()
 
 
-def _take(vehicle: Vehicle, target: offboard.OffboardTarget | offboard.AttitudeTarget | None) -> None:
+def _take(vehicle: Vehicle, target: offboard.StreamTarget | None) -> None:
     if target is None:
         return
     commander = commander_of(vehicle)

@@ -123,6 +123,7 @@ def on_step(vehicle: Vehicle) -> None:
     _detect_stick_loss(commander, now)
     _detect_ground(commander, now)
     _forget_ended_cause(commander)
+    commander.faults.step()
     commander.examine_mission()
     if commander.home_correction is not None and vehicle.flies:
         commander.home_correction.step(commander.lifted_at if vehicle.armed else NEVER)
@@ -150,8 +151,8 @@ def _detect_stick_loss(commander: Commander, now: Ns) -> None:
 
 def _detect_ground(commander: Commander, now: Ns) -> None:
     vehicle = commander.vehicle
-    if not vehicle.flies:
-        return
+    if not vehicle.flies or (vehicle.armed and commander.terminated):
+        return  # a terminated vehicle keeps its landed state
     if commander.control.seems_to_move:
         vehicle.ground.touched_at = now + GROUND_CONTACT
     flying = (not vehicle.estimate.landed or commander.control.lifts_off) and not vehicle.landed
@@ -254,6 +255,9 @@ def _end_hold(commander: Commander) -> None:
 def _hold_first(commander: Commander, name: str, number: int) -> None:
     """Hold for the rest of COM_FAIL_ACT_T, then enter mode ``number``."""
     vehicle, left = commander.vehicle, commander.hold_delay_left
+    if commander.hold_until != NEVER:
+        commander.failsafe, commander.after_hold = name, number
+        return
     if left <= 0.0:
         vehicle.send_text(CRITICAL, "Failsafe activated\t")
         commander.begin_failsafe(name, number)
@@ -387,7 +391,7 @@ def _react_to_battery(commander: Commander, name: str, number: int) -> None:
 
 
 def _report_once(vehicle: Vehicle, severity: int, text: str) -> None:
-    if text not in vehicle.reports.sent_once:
+    if text and text not in vehicle.reports.sent_once:
         vehicle.reports.sent_once.add(text)
         vehicle.send_text(severity, text)
 

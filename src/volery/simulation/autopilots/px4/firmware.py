@@ -5,7 +5,7 @@ All times are recorded.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 
 from volery.base.time import MS, Ns, S
@@ -46,6 +46,9 @@ ORIGIN: Ns = 6_200 * MS
 
 HOME: Ns = 7_600 * MS
 """First home position; recorded 7.59 to 7.60 s after boot."""
+
+POSITION_KEPT_S = 5.0
+"""Time for which a position counts after the last fix [s]: recorded of 1.14 and 1.17."""
 
 STREAMS: Ns = 500 * MS
 """First telemetry stream."""
@@ -149,8 +152,10 @@ BUILDERS: Mapping[str, Builder] = {
     "ATTITUDE_QUATERNION": telemetry.attitude_quaternion,
     "ATTITUDE_TARGET": telemetry.attitude_target,
     "AUTOPILOT_VERSION": telemetry.autopilot_version,
+    "AVAILABLE_MODES": telemetry.available_modes,
     "BATTERY_STATUS": telemetry.battery_status,
     "CURRENT_EVENT_SEQUENCE": telemetry.event_sequence,
+    "CURRENT_MODE": telemetry.current_mode,
     "DISTANCE_SENSOR": telemetry.distance_sensor,
     "ESTIMATOR_STATUS": telemetry.estimator_status,
     "EXTENDED_SYS_STATE": telemetry.extended_sys_state,
@@ -199,8 +204,17 @@ def _link_uses(version: Version) -> Mapping[str, Mapping[str, Ns]]:
     return {use: {**rates, "MISSION_CURRENT": version.mission_period} for use, rates in USES.items()}
 
 
-def px4_mavlink(mav_type: int, commands: Mapping[int, Handler], version: Version) -> MavlinkFirmware:
-    """Return the MAVLink rules of one version, for a vehicle of that MAV_TYPE with these commands."""
+def px4_mavlink(
+    mav_type: int, commands: Mapping[int, Handler], supported: Collection[str], version: Version
+) -> MavlinkFirmware:
+    """Return the MAVLink rules of one version, for a kind of vehicle.
+
+    Args:
+        mav_type: MAV_TYPE.
+        commands: Its commands.
+        supported: Parameters that change what it does: the others cannot be changed.
+        version: The version.
+    """
     return MavlinkFirmware(
         start=LinkStart(heartbeat_from=FIRST_HEARTBEAT),
         telemetry=TelemetryPolicy(
@@ -242,7 +256,7 @@ def px4_mavlink(mav_type: int, commands: Mapping[int, Handler], version: Version
             list_id=telemetry.list_id if version.plan_ids else None,
             item_refused=mission.report_refused_item,
         ),
-        parameters=PARAMETERS,
+        parameters=PARAMETERS._replace(refuses=lambda name: name not in supported),
         texts=TEXTS,
         logs=LogPolicy(ulog.encode, first=0, while_armed=True),
         files=files.FILES,
@@ -275,6 +289,7 @@ def px4_firmware(
             parameters=parameters,
             rc=RcDefaults((1500,) * 4 + (0,) * 12, throttle_centred=True),
             firmware_state=partial(Commander, version=version),
+            position_kept=POSITION_KEPT_S,
         ),
         boot=BootSequence(EVENTS, stand_on_ground, on_position),
         periodic=PeriodicWork(on_step=on_step, failsafe_ticks=1),

@@ -122,6 +122,7 @@ def _finish(vehicle: Vehicle) -> None:
     """Note and report that the mission has ended."""
     commander = commander_of(vehicle)
     commander.mission_finished = True
+    commander.after_disarming = modes.LOITER
     if commander.version.mission_words:
         vehicle.send_text(INFO, f"Mission finished, {'landed' if vehicle.landed else 'loitering'}\t")
         commander.log.send(

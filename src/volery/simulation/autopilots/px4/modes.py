@@ -24,6 +24,7 @@ from volery.simulation.autopilots.px4.geofence import fence_breach
 from volery.simulation.autopilots.px4.home_correction import HomeCorrection
 from volery.simulation.autopilots.px4.offboard import Joystick, SetpointStream
 from volery.simulation.autopilots.px4.position_control import PositionLoops
+from volery.simulation.autopilots.px4.simulated_faults import SimulatedFaults
 from volery.simulation.autopilots.px4.versions import ALTITUDE_CRUISE, EXTERNAL, POSITION_SLOW, Version
 from volery.simulation.autopilots.state_groups import NEVER, Home
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
@@ -163,6 +164,7 @@ class Commander:
 
     def reset(self) -> None:
         """Reset to the state after a boot."""
+        self.faults = SimulatedFaults(self.vehicle)
         self._forget_mission()
         self._refused_at: Ns = NEVER
         self.joystick = Joystick()
@@ -496,15 +498,16 @@ class Commander:
         """Enter the mode TERMINATION, which nothing leaves, and stop the motors."""
         self.end_failsafe()
         self.requested = self.after_disarming = TERMINATION
-        self._fly(TERMINATION)
         self.stop_motors()
+        self._fly(TERMINATION)
 
     def disarm(self, force: bool) -> int:
         """Disarm by command, and return a MAV_RESULT."""
         vehicle = self.vehicle
         if not vehicle.armed:
             return ACCEPTED
-        if vehicle.flies and not vehicle.landed and not force:
+        in_air = not vehicle.landed or (self.terminated and self.flying)
+        if vehicle.flies and in_air and not force:
             vehicle.send_text(CRITICAL, self.version.not_landed)
             self.log.send(event_interface.DISARM_REFUSED)
             return TEMPORARILY_REJECTED

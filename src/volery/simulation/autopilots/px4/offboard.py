@@ -122,7 +122,7 @@ CRITICAL = 2
 NO_YAW, NO_YAW_RATE = 1 << 10, 1 << 11
 """Bits of ``type_mask``."""
 
-ATTITUDE_IGNORED, THRUST_IGNORED, YAW_RATE_IGNORED = 1 << 7, 1 << 6, 1 << 2
+ATTITUDE_IGNORED, THRUST_IGNORED, YAW_RATE_IGNORED, RATES_IGNORED = 1 << 7, 1 << 6, 1 << 2, 0b111
 """Bits of SET_ATTITUDE_TARGET's ``type_mask``."""
 
 GLOBAL_FRAMES = (GLOBAL_INT, GLOBAL_RELATIVE_INT, GLOBAL_TERRAIN_INT)
@@ -152,14 +152,25 @@ class AttitudeTarget(NamedTuple):
     thrust: float
 
 
+class RateTarget(NamedTuple):
+    """Body rates forward, right, down [rad/s] and a collective thrust 0..1."""
+
+    rates: Vector
+    thrust: float
+
+
+StreamTarget = OffboardTarget | AttitudeTarget | RateTarget
+"""What a set-point of the stream commands."""
+
+
 class SetpointStream:
     """The last set-point of one vehicle."""
 
     def __init__(self) -> None:
         self.last_received_ns: Ns = NEVER
-        self.target: OffboardTarget | AttitudeTarget | None = None
+        self.target: StreamTarget | None = None
 
-    def receive(self, target: OffboardTarget | AttitudeTarget, now: Ns) -> None:
+    def receive(self, target: StreamTarget, now: Ns) -> None:
         """Store a set-point and its time."""
         self.last_received_ns, self.target = now, target
 
@@ -241,10 +252,17 @@ def global_target(vehicle: Vehicle, fields: dict[str, Any], log: EventLog) -> Of
     return target
 
 
-def attitude_target(fields: dict[str, Any]) -> AttitudeTarget | None:
-    """Parse SET_ATTITUDE_TARGET, or return None if it is invalid."""
+def attitude_target(fields: dict[str, Any]) -> AttitudeTarget | RateTarget | None:
+    """Parse SET_ATTITUDE_TARGET: its attitude, else its body rates; None if it is invalid."""
     mask = fields["type_mask"]
-    if mask & (ATTITUDE_IGNORED | THRUST_IGNORED) or not all_within((*fields["q"], fields["thrust"])):
+    if mask & THRUST_IGNORED or not all_within((fields["thrust"],)):
+        return None
+    if mask & ATTITUDE_IGNORED:
+        rates = fields["body_roll_rate"], fields["body_pitch_rate"], fields["body_yaw_rate"]
+        if mask & RATES_IGNORED or not all_within(rates):
+            return None
+        return RateTarget(rates, min(1.0, max(0.0, fields["thrust"])))
+    if not all_within(fields["q"]):
         return None
     w, x, y, z = fields["q"]
     size = hypot(w, x, y, z)
@@ -294,22 +312,22 @@ class FollowTarget(Manoeuvre):
 
 
 class Offboard(Manoeuvre):
-    """Mode OFFBOARD: position and velocity set-points by ``FollowTarget``, attitudes directly."""
+    """Mode OFFBOARD: position and velocity set-points by ``FollowTarget``, attitudes and rates directly."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         super().__init__(vehicle)
         self.slow_start = True
         self._follower = FollowTarget(vehicle)
-        self._attitude: AttitudeTarget | None = None
+        self._attitude: AttitudeTarget | RateTarget | None = None
 
     def enter(self) -> None:
         """Hold until a set-point arrives."""
         self._follower.enter()
         self.receive(self.vehicle.firmware_state.stream.target)
 
-    def receive(self, target: OffboardTarget | AttitudeTarget | None) -> None:
+    def receive(self, target: StreamTarget | None) -> None:
         """Follow a new set-point."""
-        self._attitude = target if isinstance(target, AttitudeTarget) else None
+        self._attitude = target if isinstance(target, AttitudeTarget | RateTarget) else None
         if isinstance(target, OffboardTarget):
             self._follower.follow(target)
         self.target = None if self._attitude else self._follower.target
@@ -326,9 +344,16 @@ class Offboard(Manoeuvre):
             self._follower.step()
             return
         self._follower.enter()
+        share = self._attitude.thrust / self.vehicle.parameters["MPC_THR_HOVER"]
+        throttle = min(1.0, share * self.vehicle.estimate.hover_throttle)
+        if isinstance(self._attitude, RateTarget):
+            roll, pitch, yaw = self._attitude.rates
+            self.vehicle.drive(
+                Setpoint(Control.RATE, roll_rate=roll, pitch_rate=pitch, yaw_rate=yaw, throttle=throttle)
+            )
+            return
         roll, pitch, yaw = quaternion_to_euler(self._attitude.attitude)
         rate = self._attitude.yaw_rate
-        share = self._attitude.thrust / self.vehicle.parameters["MPC_THR_HOVER"]
         self.vehicle.drive(
             Setpoint(
                 Control.ATTITUDE,
@@ -336,6 +361,6 @@ class Offboard(Manoeuvre):
                 pitch=pitch,
                 yaw=yaw if rate is None else None,
                 yaw_rate=rate,
-                throttle=min(1.0, share * self.vehicle.estimate.hover_throttle),
+                throttle=throttle,
             )
         )

@@ -26,7 +26,14 @@ from volery.simulation.autopilots.mavlink.microservices import FENCE, MISSION, R
 from volery.simulation.autopilots.px4 import modes
 from volery.simulation.autopilots.px4.flight_modes import Orbit
 from volery.simulation.autopilots.px4.modes import ATTITUDE_AFTER, commander_of
-from volery.simulation.autopilots.px4.offboard import AttitudeTarget
+from volery.simulation.autopilots.px4.offboard import AttitudeTarget, RateTarget
+from volery.simulation.autopilots.px4.versions import (
+    ADVANCED,
+    EXTERNAL,
+    NOT_SELECTABLE,
+    SIMPLE_MODES,
+    STANDARD_MODES,
+)
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 GLOBAL_AFTER: Ns = 6_500 * MS
@@ -337,7 +344,8 @@ def heartbeat(vehicle: Vehicle, kind: int) -> Fields:
     """Return HEARTBEAT of a vehicle of that MAV_TYPE."""
     commander, mode = commander_of(vehicle), vehicle.mode
     base = mode.base_mode
-    if mode.number == modes.OFFBOARD and commander.stream.target is None:
+    by_rates = commander.stream.target is None or isinstance(commander.stream.target, RateTarget)
+    if mode.number == modes.OFFBOARD and by_rates:
         base = modes.CUSTOM
     state = ACTIVE
     if not vehicle.armed:
@@ -491,6 +499,45 @@ NO_MISSION, NOT_STARTED, UNDER_WAY, PAUSED, COMPLETE = 1, 2, 3, 4, 5
 """MISSION_STATE."""
 IN_MISSION, SUSPENDED = 1, 2
 """``mission_mode``: PX4 counts a take-off and a landing as flying the mission."""
+
+
+def available_modes(vehicle: Vehicle) -> list[Fields]:
+    """Return AVAILABLE_MODES, all of them: as recorded, but for modes that are not simulated at all."""
+    version = commander_of(vehicle).version
+    if not version.lists_modes:
+        return []
+    every = {**version.words, modes.main_and_sub(modes.TERMINATION): "Termination"}
+    listed: list[Fields] = []
+    for place, (mode, word) in enumerate(sorted(every.items()), start=1):
+        absent = mode in EXTERNAL
+        properties = 0 if mode in SIMPLE_MODES else ADVANCED
+        if absent or mode == modes.main_and_sub(modes.TERMINATION):
+            properties = NOT_SELECTABLE if absent else ADVANCED | NOT_SELECTABLE
+        standard = STANDARD_MODES.get(mode, 0)
+        name = "" if standard else word
+        listed.append(
+            {
+                "number_modes": len(every),
+                "mode_index": place,
+                "standard_mode": standard,
+                "custom_mode": modes.custom_mode(*mode),
+                "properties": properties,
+                "mode_name": "(Mode not available)" if absent else name,
+            }
+        )
+    return listed
+
+
+def current_mode(vehicle: Vehicle) -> Fields | None:
+    """Return CURRENT_MODE: the mode that is flown, and the one that the user requested."""
+    commander = commander_of(vehicle)
+    if not commander.version.lists_modes:
+        return None
+    return {
+        "standard_mode": STANDARD_MODES.get(modes.main_and_sub(vehicle.mode.number), 0),
+        "custom_mode": vehicle.mode.number,
+        "intended_custom_mode": commander.requested,
+    }
 
 
 def ping(vehicle: Vehicle) -> Fields:

@@ -27,6 +27,24 @@ EXTERNAL: tuple[MainAndSub, ...] = tuple((4, sub) for sub in range(11, 19))
 """External modes 1 to 8, which programs on board bring: none is there."""
 
 
+STANDARD_MODES: Mapping[MainAndSub, int] = {
+    (2, 0): 4,
+    (3, 0): 1,
+    (3, 1): 2,
+    (4, 2): 8,
+    (4, 4): 6,
+    (4, 5): 5,
+    (4, 6): 7,
+}
+"""MAV_STANDARD_MODE of the modes of a multirotor that have one; AVAILABLE_MODES names the others."""
+
+SIMPLE_MODES = frozenset({(2, 0), (3, 0), ALTITUDE_CRUISE})
+"""Modes that are not marked as advanced."""
+
+ADVANCED, NOT_SELECTABLE = 1, 2
+"""MAV_MODE_PROPERTY."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Version:
     """One version of the firmware."""
@@ -52,6 +70,8 @@ class Version:
     """Modes that the firmware has and the simulated one cannot fly: accepted on the ground, refused in
     flight.
     """
+    lists_modes: bool = True
+    """Whether AVAILABLE_MODES and CURRENT_MODE are sent on request."""
     plan_ids: bool = True
     """Whether MISSION_ACK, MISSION_COUNT and MISSION_CURRENT carry checksums of the lists on board."""
     mission_state: bool = True
@@ -81,10 +101,10 @@ class Version:
     hold_words: str = "Failsafe activated: entering Hold for {} seconds\t"
     battery_words: tuple[tuple[int, str], tuple[int, str], tuple[int, str]] = (
         (2, "Low battery\t"),
-        (2, "Critical battery\t"),
+        (2, ""),
         (0, "Emergency battery level\t"),
     )
-    """Severity and text of a battery below its low, its critical and its emergency level."""
+    """Severity and text of a battery below its low, its critical and its emergency level, as recorded."""
     unready_state: int = 0
     """MAV_STATE of a vehicle that cannot be armed in its mode now."""
     says_failing_checks: bool = True
@@ -120,6 +140,7 @@ V1_14 = Version(
         (4, 6): "AUTO_LAND",
         (4, 8): "AUTO_FOLLOW_TARGET",
     },
+    lists_modes=False,
     plan_ids=False,
     mission_state=False,
     mission_period=100 * MS,
