@@ -163,7 +163,8 @@ FIRMWARES = {
         "PX4",
         "PX4 1.14.0 with its built-in quadrotor",
         PX4,
-        "The recorded parameters are there, with their recorded types and values: listed, read, set, kept.\n"
+        "The parameters recorded of 1.14 are there, with their recorded types and values, in both versions.\n"
+        "Those that have no effect are listed and read, and keep their values.\n"
         "The rover's are the multirotor's and documented defaults of a few of its own.",
     ),
 }

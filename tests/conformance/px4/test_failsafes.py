@@ -200,13 +200,13 @@ def test_without_satellites_it_lands_after_five_seconds_and_is_not_armed(version
 
 
 def test_a_battery_drains_as_the_parameters_of_the_simulator_say(bench: Any) -> None:
-    rig = bench()
+    rig = bench(parameters={"COM_LOW_BAT_ACT": 2})
     rig.ready()
     full = rig.vehicle.estimate.battery_left
-    set_to(rig, "SIM_BAT_DRAIN", 20.0)
+    set_to(rig, "SIM_BAT_DRAIN", 30.0)
     set_to(rig, "SIM_BAT_MIN_PCT", 6.0)
     rig.airborne()
-    rig.run_until(lambda: rig.vehicle.mode.name == RTL, within=40.0)
+    rig.run_until(lambda: rig.vehicle.mode.name == LAND, within=40.0)
     assert rig.vehicle.estimate.battery_left == pytest.approx(0.06, abs=0.01)
     rig.run_until(lambda: not rig.vehicle.armed, within=120.0)
     rig.run(0.3)

@@ -98,7 +98,7 @@ def test_1_17_answers_as_recorded(name: str, today: Any) -> None:
     theirs = Counter((command, result) for _, command, result in recorded["acks"])
     too_high = {(179, 0): 2} if name == "edges" else {}
     assert theirs - ours == Counter(too_high)
-    assert ours - theirs == Counter({(179, 2): count for count in too_high.values()})
+    assert ours - theirs == Counter({(179, 2): 2} if too_high else {})
 
 
 @pytest.mark.parametrize("name", NEWER)

@@ -52,9 +52,18 @@ def to_counts(value: float, scale: float, bits: int = 32) -> int:
     return round(min(float(most), max(-float(most), value * scale)))
 
 
+WEEK_MS = 604_800_000
+"""Milliseconds of a week of the satellite receiver's clock."""
+
+
 def to_unsigned(value: float, bits: int = 16) -> int:
     """Return a value limited to the range of an unsigned field."""
     return int(min(float((1 << bits) - 1), max(0.0, value)))
+
+
+def counted(value: float, bits: int = 16) -> int:
+    """Return a counter as an unsigned field shows it: it begins anew after its range."""
+    return int(value) % (1 << bits)
 
 
 def rotorcraft_fp(vehicle: Vehicle) -> Fields:
@@ -73,7 +82,7 @@ def rotorcraft_fp(vehicle: Vehicle) -> Fields:
         fields[f"carrot_{axis}"] = to_counts(metres, POSITION)
     fields["carrot_psi"] = to_counts(heading, ANGLE)
     fields["thrust"] = round(estimate.throttle * FULL) if vehicle.armed else 0
-    fields["flight_time"] = to_unsigned(to_seconds(vehicle.ground.flight_time))
+    fields["flight_time"] = counted(to_seconds(vehicle.ground.flight_time))
     return fields
 
 
@@ -104,7 +113,7 @@ def gps_int(vehicle: Vehicle) -> Fields:
         "hmsl": to_counts(fix.amsl, 1000.0),
         "pacc": to_unsigned(fix.h_acc * 100.0, 32),
         "sacc": to_unsigned(fix.speed_acc * 100.0, 32),
-        "tow": to_unsigned(vehicle.uptime() // MS, 32),
+        "tow": vehicle.uptime() // MS % WEEK_MS,
         "pdop": to_unsigned(fix.eph * 100.0),
         "numsv": fix.satellites if kind else 1,
         "fix": kind,
@@ -158,7 +167,7 @@ def rotorcraft_status(vehicle: Vehicle) -> Fields:
         "arming_status": modes.arming_status(vehicle),
         "ap_h_mode": plane,
         "ap_v_mode": height,
-        "cpu_time": to_unsigned(to_seconds(vehicle.uptime())),
+        "cpu_time": counted(to_seconds(vehicle.uptime())),
         "vsupply": vehicle.estimate.battery_volts,
         "vboard": 0.0,
     }
@@ -168,8 +177,8 @@ def nav_status(vehicle: Vehicle) -> Fields:
     """Return ROTORCRAFT_NAV_STATUS: progress of the flight plan."""
     navigation = state_of(vehicle).navigation
     return {
-        "block_time": to_unsigned(navigation.block_time),
-        "stage_time": to_unsigned(navigation.stage_time),
+        "block_time": counted(navigation.block_time),
+        "stage_time": counted(navigation.stage_time),
         "dist_home": navigation.from_home(),
         "dist_wp": navigation.from_goal(),
         "cur_block": navigation.block,
@@ -205,7 +214,7 @@ def datalink_report(vehicle: Vehicle) -> Fields:
     received = state.last_uplink_ns != NEVER
     silence = vehicle.kernel.now() - state.last_uplink_ns if received else vehicle.uptime()
     return {
-        "uplink_lost_time": to_unsigned(to_seconds(silence)),
+        "uplink_lost_time": counted(to_seconds(silence)),
         "uplink_nb_msgs": state.uplink_messages & 0xFFFF,
         "downlink_nb_msgs": state.downlink_messages & 0xFFFF,
     }

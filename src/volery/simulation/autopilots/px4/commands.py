@@ -65,6 +65,7 @@ CHANGE_MODE = 1
 """MAV_DO_REPOSITION_FLAGS."""
 
 SPEED_OVER_GROUND = (0, 1)
+USUAL_SPEED = -1.0
 
 
 def to_integer(value: float) -> int:
@@ -195,7 +196,8 @@ def _move_hold(holding: Hold, point: Vector, heading: float | None, speed: float
 
 def on_change_speed(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_CHANGE_SPEED: speed over ground; -1 returns to the usual one."""
-    if to_integer(command.param1) not in SPEED_OVER_GROUND or not isfinite(command.param2):
+    valid = command.param2 > 0.0 or command.param2 == USUAL_SPEED
+    if to_integer(command.param1) not in SPEED_OVER_GROUND or not valid:
         return DENIED
     vehicle.commanded.speed = command.param2 if command.param2 > 0.0 else None
     return ACCEPTED
@@ -364,6 +366,8 @@ def on_failure(vehicle: Vehicle, command: Command) -> int | None:
 def on_region(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_SET_ROI and its two forms: without a gimbal the nose turns to the place."""
     given = command.number != ROI_NONE and (command.x or command.y)
+    if command.number == ROI_LOCATION and not given:
+        return DENIED
     vehicle.commanded.look_at = commanded_point(vehicle, command) if given else None
     return ACCEPTED
 

@@ -6,8 +6,7 @@ refused. With both SIM_BAT parameters at their defaults the battery of the model
 
 from __future__ import annotations
 
-from math import exp
-
+from volery.base.elementary import exp
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -64,6 +63,5 @@ class SimulatedFaults:
         else:
             armed_for = to_seconds(now - vehicle.arming.armed_at)
             share = 1.0 - armed_for / max(1.0, drain)
-            wanted = max(ALMOST_EMPTY, least / 100.0, share)
-        if wanted < left:
-            vehicle.flight.drain_battery(wanted)
+            wanted = min(self._charge, max(ALMOST_EMPTY, least / 100.0, share))
+        vehicle.flight.drain_battery(wanted)

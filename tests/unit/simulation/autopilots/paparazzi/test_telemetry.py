@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from volery.base.frames import LocalFrame, ecef_to_geodetic
+from volery.base.time import S
 from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.simulation.world.body_specs import Battery
@@ -213,3 +214,13 @@ def test_far_from_its_origin_numbers_stay_within_their_fields(craft: Any) -> Non
     assert fp["carrot_north"] == 2**31 - 1
     assert fp["carrot_east"] == -(2**31 - 1)
     assert dist(craft.position[:2], (0.0, 0.0)) < 50.0
+
+
+def test_counters_of_16_bits_and_the_week_begin_anew(craft: Any) -> None:
+    """As the original's: nothing ends or stops after 18 hours, or after a week."""
+    vehicle = craft.autopilot.vehicle
+    vehicle.boot_at -= 7 * 86_400 * S
+    craft.run(3.0)
+    assert craft.last("GPS_INT")["tow"] < 100_000
+    now = vehicle.uptime() // S % 65_536
+    assert now - 4 <= craft.last("ROTORCRAFT_STATUS")["cpu_time"] <= now
