@@ -155,6 +155,10 @@ def _states_attitude(fields: dict[str, Any]) -> bool:
 
 def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle SET_ATTITUDE_TARGET: attitude, yaw rate, and thrust as a climb rate."""
+    _follow_attitude(vehicle, fields, fed_forward=True)
+
+
+def _follow_attitude(vehicle: Vehicle, fields: dict[str, Any], fed_forward: bool) -> None:
     guided, mask = vehicle.manoeuvre.flown, fields["type_mask"]
     if not isinstance(guided, Guided) or not _states_attitude(fields):
         return
@@ -162,17 +166,20 @@ def copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> N
     size = hypot(w, x, y, z)
     attitude = None if mask & ATTITUDE_IGNORED or size < 0.5 else (w / size, x / size, y / size, z / size)
     rate = None if mask & YAW_RATE_IGNORED else fields["body_yaw_rate"]
-    guided.follow_attitude(attitude, rate, min(1.0, max(0.0, fields["thrust"])))
+    guided.follow_attitude(attitude, rate, min(1.0, max(0.0, fields["thrust"])), fed_forward)
 
 
-def strict_copter_attitude(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
-    """Handle it as from 4.6 on: without a throttle, or with some body rates but not all, the copter stops."""
+def strict_copter_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """Handle it as 4.8: without a throttle, or with some body rates but not all, it stops (from 4.6 on).
+
+    A yaw rate is not fed forward, it moves the stated heading on only (from 4.7 on).
+    """
     guided, mask = vehicle.manoeuvre.flown, fields["type_mask"]
     if mask & THROTTLE_IGNORED or mask & RATES_IGNORED not in (0, RATES_IGNORED):
         if isinstance(guided, Guided):
             guided.follow_velocity((0.0, 0.0, 0.0))
     else:
-        copter_attitude(vehicle, fields, sender)
+        _follow_attitude(vehicle, fields, fed_forward=False)
 
 
 def rover_attitude(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:

@@ -120,15 +120,22 @@ class FollowAttitude(Manoeuvre):
         attitude: Quaternion from forward, right, down to north, east, down; ``None``: level.
         yaw_rate: Yaw rate [rad/s] by which the heading of *attitude* goes on.
         thrust: 0..1; one half holds the height.
+        fed_forward: Whether the yaw rate is fed forward beside a heading.
     """
 
     def __init__(
-        self, vehicle: Vehicle, attitude: Quaternion | None, yaw_rate: float | None, thrust: float
+        self,
+        vehicle: Vehicle,
+        attitude: Quaternion | None,
+        yaw_rate: float | None,
+        thrust: float,
+        fed_forward: bool = True,
     ) -> None:
         super().__init__(vehicle)
         self._roll, self._pitch, yaw = quaternion_to_euler(attitude) if attitude else (0.0, 0.0, None)
         self._turn = Turn(yaw, yaw_rate)
         self._thrust = thrust
+        self._fed_forward = fed_forward
         self._given: Ns = vehicle.kernel.now()
 
     def takeoff_requested(self) -> bool:
@@ -145,6 +152,7 @@ class FollowAttitude(Manoeuvre):
         yaw, rate = self._turn
         if yaw is not None and rate is not None:
             yaw = wrap_angle(yaw + rate * to_seconds(vehicle.kernel.now() - self._given))
+            rate = rate if self._fed_forward else None
         vehicle.drive(
             Setpoint(
                 Control.CLIMB,
@@ -244,15 +252,18 @@ class Guided(Manoeuvre):
         start = before.reached() if isinstance(before, FollowVelocity) else self.vehicle.estimate.velocity
         self._begin(FollowVelocity(self.vehicle, start, turn, acceleration))
 
-    def follow_attitude(self, attitude: Quaternion | None, yaw_rate: float | None, thrust: float) -> None:
+    def follow_attitude(
+        self, attitude: Quaternion | None, yaw_rate: float | None, thrust: float, fed_forward: bool = True
+    ) -> None:
         """Follow an attitude.
 
         Args:
             attitude: Quaternion from forward, right, down to north, east, down; ``None``: level.
-            yaw_rate: Yaw rate [rad/s] instead of the heading of *attitude*.
+            yaw_rate: Yaw rate [rad/s] by which the heading of *attitude* goes on.
             thrust: 0..1; one half holds the height.
+            fed_forward: Whether the yaw rate is fed forward beside a heading.
         """
-        self._begin(FollowAttitude(self.vehicle, attitude, yaw_rate, thrust))
+        self._begin(FollowAttitude(self.vehicle, attitude, yaw_rate, thrust, fed_forward))
 
 
 class GuidedAttitude(Guided):

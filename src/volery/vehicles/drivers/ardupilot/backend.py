@@ -23,7 +23,7 @@ from volery.vehicles.drivers.ardupilot.modes import (
     RESTING,
     STATION_PARAMETERS,
 )
-from volery.vehicles.drivers.ardupilot.versions import COVERAGE, RENAMED
+from volery.vehicles.drivers.ardupilot.versions import COVERAGE, DRAWN_BACK, RENAMED
 from volery.vehicles.drivers.mavlink.backend import (
     ATTITUDE_AND_RATES,
     INT_FRAMES,
@@ -53,6 +53,7 @@ ARDUPILOT_FIRMWARE = Firmware(
     estimator="EKF_STATUS_REPORT",
     coverage=COVERAGE,
     turning=ATTITUDE_AND_RATES,
+    drawn_back=DRAWN_BACK,
     renamed=RENAMED,
     home_first=True,
 )
@@ -201,7 +202,12 @@ class ArduPilotMavros(MavrosBackend):
     """ArduPilot over MAVROS. See ``ArduPilotBackend``."""
 
     firmware = FirmwareBehind(
-        "ArduPilot", RESTING, home_first=True, turning=ATTITUDE_AND_RATES, renamed=RENAMED
+        "ArduPilot",
+        RESTING,
+        home_first=True,
+        turning=ATTITUDE_AND_RATES,
+        drawn_back=DRAWN_BACK,
+        renamed=RENAMED,
     )
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:

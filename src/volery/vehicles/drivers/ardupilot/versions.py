@@ -8,10 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from volery.vehicles.firmware_versions import Coverage
+from volery.vehicles.firmware_versions import Coverage, Meaning, Rule
 from volery.vehicles.services import RenamedParameter
 
 COVERAGE = Coverage("ArduPilot", (4, 5), (4, 8))
+
+DRAWN_BACK: Rule[bool] = Rule(
+    "whether the measured heading beside a yaw rate of SET_ATTITUDE_TARGET draws the copter back",
+    Meaning((4, 5), False, "AC_AttitudeControl, input_quaternion: the stated rate is fed forward"),
+    Meaning(
+        (4, 7),
+        True,
+        "AC_AttitudeControl, input_quaternion: no feed-forward; flown with 4.8.0-dev, streamed at 50 Hz: it "
+        "turned at 15 of 107 degrees/s",
+    ),
+)
 
 
 # -- renamed and rescaled parameters: the conversions of ArduCopter/ (Parameters, mode_rtl, mode_land,

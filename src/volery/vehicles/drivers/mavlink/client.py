@@ -25,13 +25,14 @@ from volery.vehicles.drivers.mavlink import obstacle_decoder
 from volery.vehicles.drivers.mavlink.backend import (
     FORCE,
     GROUND_SPEED,
+    MEASURED_HEADING,
     UNCHANGED,
     Ack,
-    attitude_fields,
+    AttitudeStream,
 )
 from volery.vehicles.drivers.mavlink.decoder import TelemetryDecoder
 from volery.vehicles.drivers.mavlink.services import MavlinkServices, item_fields
-from volery.vehicles.firmware_versions import Coverage, MinorVersion, stated_version
+from volery.vehicles.firmware_versions import Coverage, MinorVersion, Rule, stated_version
 from volery.vehicles.services import Item, RenamedParameter
 from volery.vehicles.telemetry import Answer, Telemetry
 from volery.vehicles.tried_versions import tried
@@ -89,6 +90,7 @@ class Firmware(NamedTuple):
         estimator: message with the state of its estimator.
         home_first: item 0 of its missions is home.
         turning: type mask of SET_ATTITUDE_TARGET beside a yaw rate.
+        drawn_back: see ``AttitudeStream``.
         renamed: parameters with another name in another version, by both names.
         bytewise: whole parameter values lie in the bytes of the float (see ``from_bytewise``), as in PX4.
     """
@@ -100,6 +102,7 @@ class Firmware(NamedTuple):
     coverage: Coverage
     estimator: str
     turning: int
+    drawn_back: Rule[bool] = MEASURED_HEADING
     renamed: Mapping[str, RenamedParameter] = {}
     bytewise: bool = False
     home_first: bool = False
@@ -259,6 +262,7 @@ class MavlinkClient:
         self._system = system_option(options)
         self._component = 1
         self._decoder = self._make_decoder(records_texts(options))
+        self._attitudes = AttitudeStream(kernel, self.firmware.turning, self.firmware.drawn_back)
         self._streams = StreamRequests(stream_periods(self.firmware, options), self._request_stream)
         self._requests = ParameterRequests(self._request_parameter)
         self._parameters: dict[str, float] = {}
@@ -487,7 +491,7 @@ class MavlinkClient:
 
     def send_attitude(self, target: AttitudeTarget) -> None:
         """Send SET_ATTITUDE_TARGET."""
-        self._send_to("SET_ATTITUDE_TARGET", **attitude_fields(target, self.telemetry, self.firmware.turning))
+        self._send_to("SET_ATTITUDE_TARGET", **self._attitudes.fields(target, self.telemetry))
 
     def request_arming_checks(self) -> None:
         """Send RUN_PREARM_CHECKS; the reasons arrive as texts."""

@@ -39,15 +39,17 @@ from volery.vehicles.drivers.mavlink.backend import (
     FAILSAFE,
     FORCE,
     GROUND_SPEED,
+    MEASURED_HEADING,
     ON_GROUND,
     UNCHANGED,
     UNDEFINED,
     VELOCITY_AND_YAW_RATE,
     Ack,
-    attitude_fields,
+    AttitudeStream,
 )
 from volery.vehicles.drivers.mavlink.mavros_services import MavrosServices, to_waypoint
 from volery.vehicles.drivers.steps import ROVER_KIND
+from volery.vehicles.firmware_versions import Rule
 from volery.vehicles.services import Item, RenamedParameter
 from volery.vehicles.telemetry import Answer, Battery, StatusText, Telemetry, Velocity
 
@@ -73,6 +75,8 @@ class FirmwareBehind(NamedTuple):
     """Whether item 0 of a mission is home."""
     turning: int
     """Type mask of SET_ATTITUDE_TARGET beside a yaw rate."""
+    drawn_back: Rule[bool] = MEASURED_HEADING
+    """See ``AttitudeStream``."""
     renamed: Mapping[str, RenamedParameter] = {}
     """Parameters with another name in another version, by both names."""
 
@@ -241,6 +245,7 @@ class MavrosBackend:
         self._long = node.client(self._name("cmd/command"), "mavros_msgs/srv/CommandLong")
         self._push = node.client(self._name("mission/push"), "mavros_msgs/srv/WaypointPush")
         self._attitude: Publisher | None = None
+        self._attitudes = AttitudeStream(kernel, self.firmware.turning, self.firmware.drawn_back)
         self._inbox = inbox
         self._receives_attitude = False
         self._rate = node.rate(PERIOD)
@@ -405,7 +410,7 @@ class MavrosBackend:
         if self._attitude is None:
             name = self._name("setpoint_raw/attitude")
             self._attitude = self._node.advertise(name, "mavros_msgs/msg/AttitudeTarget")
-        fields = attitude_fields(target, self.telemetry, self.firmware.turning)
+        fields = self._attitudes.fields(target, self.telemetry)
         w, x, y, z = attitude_ned_to_enu(fields["q"])
         rate = to_ros_yaw_rate(degrees(fields["body_yaw_rate"]))
         message = new(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from math import degrees
 from typing import Any
 
 import pytest
@@ -20,6 +21,7 @@ from volery.base.errors import (
     Refused,
     UsageError,
 )
+from volery.base.frames import quaternion_to_euler
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
 from volery.base.time import S
 from volery.kernel.task import ExecutionContext
@@ -722,6 +724,32 @@ def test_an_attitude_states_all_body_rates_or_none(bench: Make) -> None:
         for fields in at.autopilot.sent("SET_ATTITUDE_TARGET")
     }
     assert sent == {(0b000, 0.0, 0.349), (0b111, 0.0, 0.0)}
+
+
+@pytest.mark.parametrize(("version", "turned"), [(0x04060300, 0.0), (0x04080000, 16.0)])
+def test_the_heading_beside_a_yaw_rate_is_integrated_where_it_is_not_fed_forward(
+    bench: Make, version: int, turned: float
+) -> None:
+    """ArduCopter from 4.7 on turns from the heading of the last message; the measured one draws it back."""
+    at = bench()
+    at.autopilot.version = version
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        drone.set_attitude(pitch=-5, yaw_rate=8, lasting=2)
+        sleep(at.kernel, 4 * S)
+        drone.set_attitude(pitch=-5, yaw_rate=-90, lasting=2)
+        sleep(at.kernel, 2 * S)
+
+    at.fly(mission)
+    stated = [
+        (fields["body_yaw_rate"] > 0, degrees(quaternion_to_euler(fields["q"])[2]))
+        for fields in at.autopilot.sent("SET_ATTITUDE_TARGET")
+    ]
+    clockwise = [heading for right, heading in stated if right]
+    back = [heading for right, heading in stated if not right]
+    assert clockwise[-1] - clockwise[0] == pytest.approx(turned, abs=2.0)
+    assert min(back) - back[0] == pytest.approx(-20.0 if turned else 0.0, abs=0.1)
 
 
 def test_an_attitude_that_is_not_followed_is_an_error(bench: Make) -> None:
