@@ -258,7 +258,7 @@ def describe_flight(seen: Telemetry) -> str:
         frame = LocalFrame(seen.home.latitude, seen.home.longitude, 0.0)
         away = hypot(*frame.to_enu(seen.position.latitude, seen.position.longitude, 0.0)[:2])
     figures = (
-        f"{seen.above_home:.1f} m above home",
+        f"{seen.above_home:z.1f} m above home",
         f"{hypot(*seen.velocity):.1f} m/s",
         f"battery {seen.battery.remaining:.0%}",
         f"{away:.0f} m from home",

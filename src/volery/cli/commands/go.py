@@ -167,7 +167,7 @@ def waypoints(
     ] = None,
     tolerance: Annotated[
         float, typer.Option(help="Distance within which a point counts as reached, m.")
-    ] = 0.1,
+    ] = 0.5,
     hold: Annotated[float, typer.Option(help="Time within the tolerance before the next point, s.")] = 1.0,
     rounds: Annotated[int, typer.Option(help="How often the sequence is flown.")] = 1,
     height: Height = 5.0,
