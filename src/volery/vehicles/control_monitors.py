@@ -222,6 +222,8 @@ class TrackMonitor:
 
 FOLLOWS_WITHIN: Ns = 3 * S
 """Time in which set-points must show an effect: heavy vehicles begin to move within two seconds."""
+SHOWS_WITHIN: Ns = 2 * S
+"""Time for which enough must have been asked for: a step after a rest has no effect at once."""
 AT_MOST: Ns = 10 * S
 """Time after which what was asked for, too little to judge, is forgotten."""
 ASKED_M, ASKED_M_S, ASKED_DEG, ASKED_DEG_S = 1.5, 0.4, 30.0, 10.0
@@ -273,6 +275,7 @@ class FollowMonitor:
         self._demand: Demand | None = None
         self._lasting: Ns = 0
         self._asked_at = self._began = self._summed = telemetry.moment()
+        self._enough: Moment | None = None  # since when enough was asked for to judge
         self._begin()
 
     def ask(self, demand: Demand, lasting: Ns) -> None:
@@ -293,16 +296,15 @@ class FollowMonitor:
         if self._demand is None:
             return None
         age = seen.elapsed(self._began)
-        if seen.stale or not (seen.flying and seen.armed) or age > AT_MOST:
+        if seen.stale or not (seen.flying and seen.armed) or age > AT_MOST + SHOWS_WITHIN:
             self._begin()
             return None
-        if age < FOLLOWS_WITHIN:
-            return None
-        judged = self._judged()
-        if not judged:
-            return None
+        judged = self._judged() if age > 0 else []
         if any(follows for follows, _ in judged):
             self._begin()
+            return None
+        self._enough = (self._enough or seen.moment()) if judged else None
+        if self._enough is None or seen.elapsed(self._enough) < SHOWS_WITHIN or age < FOLLOWS_WITHIN:
             return None
         said = "; ".join(words for _, words in judged)
         return OffTrack(
@@ -315,6 +317,7 @@ class FollowMonitor:
     def _begin(self) -> None:
         seen = self._telemetry
         self._began = self._summed = seen.moment()
+        self._enough = None
         self._speed: Vector = (0.0, 0.0, 0.0)  # that accelerations have asked for
         self._way: Vector = (0.0, 0.0, 0.0)
         self._turn = self._thrust = 0.0
