@@ -83,7 +83,7 @@ TILT_ANSWERS: Mapping[str, Answer] = {
     "ArduPilot": Answer(
         Process(0.93, 3.1, 0.37, 0.18),
         Process(1.0, 9.8, 1.1, 0.3),
-        Process(0.83, 12.0, 1.75, 0.07),
+        Process(1.0, 11.0, 1.75, 0.19),  # of 4.8, which follows turns later than 4.5
         TILT_WITHIN_S,
     ),
     "PX4": Answer(
