@@ -251,8 +251,9 @@ PX4_SPEED = 4.0
 """MAVSDK sends its set-points twenty times a second of real time: more than one a second must remain."""
 
 
-def px4(serve: Callable[..., Any]) -> str:
-    return f"udpin://127.0.0.1:{serve('udp', PX4_SPEED, autopilot='px4').port}"
+def px4(serve: Callable[..., Any], version: str = "1.14") -> str:
+    served = serve("udp", PX4_SPEED, "--version", version, autopilot="px4")
+    return f"udpin://127.0.0.1:{served.port}"
 
 
 async def filed(drone: Any, folder: Path) -> Path:
@@ -275,7 +276,8 @@ async def flies_px4(address: str, port: int, folder: Path) -> None:
         await soon(action.arm())
         await soon(action.takeoff())
         await first(telemetry.in_air(), bool)
-        up = await first(telemetry.position(), lambda position: position.relative_altitude_m > 5.0)
+        # home's altitude follows the receiver
+        up = await first(telemetry.position(), lambda position: position.relative_altitude_m > 3.0)
         await first(telemetry.flight_mode(), lambda mode: str(mode) == "HOLD")
         goal = HOME_LATITUDE + NORTH
         await soon(action.goto_location(goal, HOME_LONGITUDE, up.absolute_altitude_m + 3.0, 0.0))
@@ -299,14 +301,14 @@ async def flies_px4(address: str, port: int, folder: Path) -> None:
 
 
 def test_a_flight_of_px4(serve: Callable[..., Any], free_port: Callable[[], int], tmp_path: Path) -> None:
-    asyncio.run(flies_px4(px4(serve), free_port(), tmp_path))
+    asyncio.run(flies_px4(px4(serve, "1.17"), free_port(), tmp_path))
 
 
 async def plans_px4(address: str, port: int) -> None:
     from mavsdk.mission import MissionItem, MissionPlan
 
     still = (MissionItem.CameraAction.NONE, MissionItem.VehicleAction.NONE)
-    rest = (5.0, True, nan, nan, still[0], nan, nan, nan, nan, nan, still[1])
+    rest = (nan, True, nan, nan, still[0], nan, nan, nan, nan, nan, still[1])
     points = [(HOME_LATITUDE + NORTH * share, HOME_LONGITUDE, 6.0) for share in (0.5, 1.0)]
     plan = MissionPlan([MissionItem(*point, *rest) for point in points])
     async with connected(address, port, PX4_IDLE) as drone:

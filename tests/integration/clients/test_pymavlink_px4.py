@@ -19,7 +19,7 @@ PREARM = 1 << 28
 @pytest.fixture(params=["tcp", "udp"])
 def reached(request: Any, serve: Callable[..., Any], station: Callable[..., Any]) -> Any:
     """A station at a PX4 that has just been switched on."""
-    vehicle = serve(request.param, 4.0, autopilot="px4")
+    vehicle = serve(request.param, 4.0, "--version", "1.14", autopilot="px4")
     where = f"127.0.0.1:{vehicle.port}"
     return station(f"tcp:{where}" if request.param == "tcp" else f"udpin:{where}")
 

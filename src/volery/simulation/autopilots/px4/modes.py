@@ -353,15 +353,19 @@ class Commander:
         self.log.send(event_interface.MODE_REFUSED, bytes((0, 0, *asked, MODES_IN_EVENTS[asked])))
 
     def _accept_mode(self, number: int) -> None:
-        vehicle = self.vehicle
         self.requested = number
-        if vehicle.rules.modes[number].armable:
-            self.after_disarming = number
+        self._keep_for_disarming(number)
         if self.failsafe in TAKEN_OVER:
             self.taken_over = self.failsafe
         self.end_failsafe()
         self.joystick.set_reference()
         self._fly(number)
+
+    def _keep_for_disarming(self, number: int) -> None:
+        """Remember a requested mode that may be armed as the one after disarming."""
+        kept = number != TAKEOFF or self.version.keeps_takeoff
+        if kept and self.vehicle.rules.modes[number].armable:
+            self.after_disarming = number
 
     def _fly(self, number: int, restart: bool = False) -> None:
         mode = self.vehicle.rules.modes[number]
@@ -378,8 +382,7 @@ class Commander:
     def continue_with(self, number: int) -> None:
         """Enter the mode that follows after a mode has ended."""
         self.requested = number
-        if self.vehicle.rules.modes[number].armable:
-            self.after_disarming = number
+        self._keep_for_disarming(number)
         self.joystick.set_reference()
         self._fly(number)
 

@@ -92,6 +92,8 @@ class Version:
     """Whether a return says how high it begins and that it lands, and no other stages."""
     least_takeoff: bool = False
     """Whether a take-off climbs MIS_TAKEOFF_ALT at least; else that is the height without a given one."""
+    keeps_takeoff: bool = False
+    """Whether a take-off that was requested is the mode after disarming, too."""
     takeoff_words: str = "Using default takeoff altitude: {:.1f} m"
     """What is said when MIS_TAKEOFF_ALT counts."""
     warns_of_destinations: bool = False
@@ -149,6 +151,7 @@ V1_14 = Version(
     corrects_home=False,
     short_return=False,
     least_takeoff=True,
+    keeps_takeoff=True,
     warns_of_destinations=True,
     takeoff_words="Using minimum takeoff altitude: {:.2f} m",
     fence_texts=(
