@@ -47,7 +47,7 @@ ON_THE_GROUND = [
     ("get home", (410,), ACCEPTED),
     ("store parameters", (245, 1), ACCEPTED),
     ("run the arming checks", (401,), ACCEPTED),
-    ("region of interest", (195,), ACCEPTED),
+    ("region of interest without a place", (195,), DENIED),
     ("no region of interest", (197,), ACCEPTED),
 ]
 
