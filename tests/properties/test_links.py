@@ -52,7 +52,9 @@ def frames(draw: st.DrawFn) -> Frame:
 def test_the_wire_carries_every_message(frame: Frame, sequence: int) -> None:
     data = encode(frame, sequence)
     (read,) = MavlinkParser().feed(data)
-    assert read == quantised(frame) == frame
+    known = {name: read.fields[name] for name in frame.fields}  # fields newer than pymavlink's arrive as 0
+    assert read == quantised(frame)
+    assert Frame(read.name, known, read.system, read.component) == frame
 
 
 @settings(max_examples=150, deadline=None)

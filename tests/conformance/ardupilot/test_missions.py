@@ -174,6 +174,7 @@ def test_clearing_and_other_kinds_of_plan(bench: Any) -> None:
         "target_component": 190,
         "count": 0,
         "mission_type": 1,
+        "opaque_id": 0,  # newer than pymavlink's definition, and not sent by ArduPilot
     }
 
 

@@ -554,7 +554,7 @@ POLICIES = {
     "turn": (TURN, {"needs_control", "recorded", "bounded"}),
     "travel": (TRAVEL, {"needs_control", "recorded", "bounded", "travels", "on_track"}),
     "fly a mission": (FLY_MISSION, {"needs_control", "recorded", "bounded", "travels", "ignored"}),
-    "set-points": (STREAM, {"needs_control", "bounded", "travels", "goes_on"}),
+    "set-points": (STREAM, {"needs_control", "bounded", "travels", "goes_on", "streams"}),
     "sticks": (MANUAL, {"needs_control", "recorded", "bounded", "goes_on", "manual"}),
     "between two calls": (IN_PLACE, {"needs_control", "recorded", "holds_place"}),
     "to safety": (TO_SAFETY, {"needs_control", "recorded", "to_safety"}),
