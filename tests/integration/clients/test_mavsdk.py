@@ -202,7 +202,7 @@ async def asks(address: str, port: int) -> None:
         assert await soon(drone.param.get_param_float("WP_SPD")) == 7.0
         await refused(drone.param.get_param_float("NO_SUCH_NAME"), ParamError)
         version = await soon(drone.info.get_version())
-        assert (version.flight_sw_major, version.flight_sw_minor, version.flight_sw_patch) == (4, 5, 6)
+        assert (version.flight_sw_major, version.flight_sw_minor, version.flight_sw_patch) == (4, 8, 0)
 
 
 def test_parameters_and_version(serve: Callable[..., Any], free_port: Callable[[], int]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import dist, isfinite, isinf, isnan
+from math import dist, isinf, isnan
 
 from volery.base.time import from_seconds, to_seconds
 from volery.simulation.autopilots.ardupilot.camera import DIGICAM_CONTROL, TRIGGER_DISTANCE, act_on_camera
@@ -166,7 +166,6 @@ def stored_item(item: MissionItem) -> MissionItem | int:
     if item.frame not in STORED_FRAMES and item.frame != MISSION_FRAME:
         return UNSUPPORTED_FRAME
     wrong = _wrong_parameter(item) or (_wrong_place(item) if item.command in PLACED else 0)
-    wrong = wrong or (0 if isfinite(item.z) else INVALID_Z)
     if wrong:
         return wrong
     frame = STORED_FRAMES.get(item.frame, GLOBAL) if item.command in KEEPS_FRAME else GLOBAL
