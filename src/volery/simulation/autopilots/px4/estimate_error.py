@@ -37,6 +37,7 @@ from volery.simulation.autopilots.px4.error_states import (
     YAW,
     correct,
     grow,
+    make_symmetric,
     used_states,
     variance_at,
 )
@@ -97,6 +98,10 @@ FIRST_DEVIATIONS = (
 """Deviations of the states when EKF2 has aligned its heading and begins with fixes, as it logs them; mean of
 51 starts. What a bias of the accelerometer is and what a tilt, it learns when the nose turns."""
 
+EVEN_EVERY: Final = 30_000
+"""Substeps after which the covariance is made symmetric: ten minutes, in which its halves come to differ by
+less than 1e-6."""
+
 PREDICTOR_LAG: Final = 0.25
 """EKF2_TAU_VEL, EKF2_TAU_POS [s]."""
 
@@ -148,6 +153,8 @@ def step_errors(row: Array, key: np.uint64, step: int) -> None:
         GRAVITY * ROLL_NOISE * WALK * _noise(row, key, 4, step),
         YAW_NOISE * WALK * _noise(row, key, 12, step),
     )
+    if step % EVEN_EVERY == 0:
+        make_symmetric(row)
     accel = _accel_errors(row)
     _advance_states(row, accel)
     for axis in range(2):

@@ -112,6 +112,18 @@ def test_a_filter_that_began_a_short_time_ago_is_as_unsure_as_ekf2_logs() -> Non
     assert logged[12:15] == pytest.approx([0.349, 0.143, 0.03], rel=0.1)
 
 
+def test_the_covariance_stays_symmetric() -> None:
+    estimate = Estimate()
+    covariance = estimate.row[E_COVARIANCE : E_COVARIANCE + STATES * STATES].reshape(STATES, STATES)
+    estimate.run(200.0)
+    settled = estimate.deviations
+    covariance[0, 1] += 1e-6
+    covariance[0, TILT] += 1e-6
+    estimate.run(7200.0)
+    assert covariance == pytest.approx(covariance.T, abs=1e-6)
+    assert estimate.deviations == pytest.approx(settled, rel=0.1)
+
+
 def test_a_bias_is_distinguished_from_a_tilt_once_the_nose_turns() -> None:
     """Logged: 0.205 m/s^2 until the nose turns, and 0.04 to 0.06 m/s^2 after it."""
     estimate = Estimate()
