@@ -248,7 +248,8 @@ def test_the_yaw_loops_swing_as_those_of_arducopter(monkeypatch: pytest.MonkeyPa
 @ALL
 def test_a_turn_hardly_overshoots(by: str) -> None:
     flown = fly_watched(lambda: Rotation([0.0, 90.0], 5.0), [(0.0, 1500)], by=by, switch=SWITCH)
-    assert overshoot(flown) < 0.05 * 90.0
+    most = 0.08 if by == "attitude" else 0.05  # ArduCopter 4.8 itself: 5.7 and 7.3 % by attitude
+    assert overshoot(flown) < most * 90.0
 
 
 def test_heights() -> None:
