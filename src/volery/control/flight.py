@@ -102,6 +102,7 @@ class ControlledFlight:
         self._as_stated = as_stated
         self._landing = Landing()
         self._usual: dict[PidLaw, PidGains] = {}
+        self._suited: dict[PidLaw, PidGains] = {}
         self._shares: dict[str, float] = {}
         self._errors, self._follows = ErrorWatch(manoeuvre.laws), FollowWatch()
         self._last: dict[str, LoopSample] = {}
@@ -169,6 +170,8 @@ class ControlledFlight:
                 process = answer.of(loop)
                 if process is None or self._as_stated(loop) or not isinstance(law, PidLaw):
                     continue
+                if self._suited.get(law, law.gains) != law.gains:
+                    continue  # changed by the user since
                 reports_s = (seen.heading_reports if loop == "yaw" else seen.position_reports).seconds
                 usual = self._usual.setdefault(law, law.gains)
                 gains, share = suited(usual, process, reports_s, to_seconds(self._period))
@@ -177,7 +180,7 @@ class ControlledFlight:
                         f"{self._drone.name}: no law of {loop} is stable on it: it is reported each "
                         f"{reports_s:.1f} s; request more reports"
                     )
-                law.gains = gains
+                law.gains = self._suited[law] = gains
                 if manoeuvre is self._manoeuvre and self._shares.get(loop, 1.0) != share:
                     self._shares[loop] = share
                     self._note(
