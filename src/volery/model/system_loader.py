@@ -48,6 +48,7 @@ def check_code(system: System) -> None:
 
 
 def _unwritten(system: System) -> Iterator[ModelError]:
+    stated = {finding.path: finding.where for finding in system.warnings}
     for component in {one.component.name: one.component for one in system.instances}.values():
         if component.path and not system.file_of(component).exists():
             what = (
@@ -55,7 +56,7 @@ def _unwritten(system: System) -> Iterator[ModelError]:
                 "run with the times that the model states (--fidelity times)"
             )
             at = f"components.{component.name}.path"
-            yield ModelError(what, at, component.where, rules.UNWRITTEN_CODE.code)
+            yield ModelError(what, at, stated.get(at, component.where), rules.UNWRITTEN_CODE.code)
 
 
 def gaps(system: System, fidelity: str, vocabulary: Vocabulary) -> Iterator[ModelError]:

@@ -125,7 +125,7 @@ def test_a_goal_that_is_out_of_bounds_ends_the_run_and_the_drone_comes_down(case
     ("parameters", "names"),
     [
         ("{BATT_ARM_VOLT: 99}", ("drone_1", "Battery 1 below minimum arming voltage")),
-        ("{BATT_ARM_MAH: 90000}", ("drone_1", "Battery 1 below minimum arming voltage")),
+        ("{BATT_ARM_MAH: 90000}", ("drone_1", "Battery 1 below minimum arming capacity")),
     ],
 )
 def test_an_autopilot_that_never_becomes_ready_is_quoted(parameters, names, one_drone, tmp_path):
