@@ -44,6 +44,7 @@ from rosbags.typesys.base import TypesysError
 
 from volery.base.time import Ns, S
 from volery.ros.messages.encodings import our_name
+from volery.ros.messages.json_schemas import ros_name_of
 
 _LENGTH = struct.Struct("<I")
 _STAMP = struct.Struct("<II")
@@ -297,7 +298,8 @@ def _connection_of(channel: Channel, schema: Schema | None, count: int = 0) -> C
         ext = ConnectionExtRosbag1(metadata.get("callerid"), int(metadata.get("latching") in _TRUE))
     digest = metadata.get("md5sum", "") or metadata.get("topic_type_hash", "")
     definition = MessageDefinition(format_, text)
-    return Connection(channel.id, channel.topic, schema.name, definition, digest, count, ext, None)
+    name = ros_name_of(schema.name) if channel.message_encoding == "json" and schema.name else schema.name
+    return Connection(channel.id, channel.topic, name, definition, digest, count, ext, None)
 
 
 def recover_mcap(path: Path, damage: list[str]) -> Iterator[RawMessage]:

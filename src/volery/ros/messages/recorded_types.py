@@ -24,6 +24,7 @@ from volery.ros.messages.encodings import (
     ros1_to_cdr,
     to_cdr,
 )
+from volery.ros.messages.json_schemas import JsonType
 from volery.ros.messages.store import (
     DISTRIBUTIONS,
     distribution,
@@ -33,7 +34,7 @@ from volery.ros.messages.store import (
     types_of,
 )
 
-READABLE = ("cdr", "ros1")
+READABLE = ("cdr", "ros1", "json")
 """Encodings of messages that are decoded."""
 _OLD = ("galactic", "foxy", "eloquent", "dashing")
 """Distributions before Humble, whose recordings in SQLite hold no definitions."""
@@ -67,12 +68,18 @@ class RecordedType:
         if source.encoding not in READABLE:
             stated = f"encoded as {source.encoding}" if source.encoding else "of no stated encoding"
             raise UsageError(f"its messages are {stated}; {choices(READABLE)} can be read")
+        self._json: JsonType | None = None
+        if source.encoding == "json":
+            if not source.definition.strip():
+                raise UsageError("its messages are encoded as json and have no schema")
+            self._json = JsonType(source.type, source.definition)
         self._types: Typestore | None = None
         self._resolved = False
         problem = "not defined in the recording"
         if source.definition.strip() or (source.schema and not self._is_known):
             try:
-                self._types = _defined(self.name, source.encoding, source.schema, source.definition)
+                text = self._json.definition if self._json else source.definition
+                self._types = _defined(self.name, source.encoding, source.schema, text)
             except (RecursionError, SyntaxError, *DAMAGE) as error:  # classes are made of source code
                 problem += f": {error}"
         if self._types is None and not self._is_known:
@@ -87,7 +94,7 @@ class RecordedType:
     def message(self, data: bytes) -> Any:
         """Decode a message as one of our class. Raises ``UsageError`` if the bytes are no such message."""
         types = self._types_for(data)
-        if not self.to_ours.same_bytes:
+        if self._json is not None or not self.to_ours.same_bytes:
             return self.to_ours(self._decoded(types, data))
         if self.encoding == "cdr":
             return from_cdr(self.name, data)
@@ -97,6 +104,8 @@ class RecordedType:
             raise UsageError(f"these {len(data)} bytes are no {self.name} of ROS 1: {error}") from error
 
     def _decoded(self, types: Typestore, data: bytes) -> Any:
+        if self._json is not None:
+            return self._json.decoded(types, data)
         if types is store():
             message_class(self.name)  # before rosbags compiles its own class into the decoder
         decode = bounded(types, len(data))
@@ -130,7 +139,8 @@ class RecordedType:
     def left_out(self) -> tuple[str, ...]:
         """Fields of the messages converted so far that the other definition lacks."""
         made = (self.__dict__.get(one) for one in ("to_ours", "to_noetic", "to_other"))
-        return tuple(dict.fromkeys(field for one in made if one is not None for field in one.left_out))
+        found = dict.fromkeys(field for one in made if one is not None for field in one.left_out)
+        return (*found, *(self._json.left_out if self._json is not None else ()))
 
     def differences(self) -> str:
         """Describe what was read by another definition than ours; empty if nothing was."""
@@ -150,7 +160,7 @@ class RecordedType:
 
     def for_ros2(self) -> Written:
         """Return how it is written into a rosbag 2: as recorded, or from ROS 1 by our definition."""
-        types = self._known if self.encoding == "cdr" else store()
+        types = store() if self.encoding == "ros1" else self._known
         try:
             if self.encoding == "ros1":
                 _learn(self._known, self.name)
@@ -160,6 +170,8 @@ class RecordedType:
             raise UsageError(f"{self.name} cannot be written: {error}") from error
         if self.encoding == "ros1":
             return Written(text, digest, lambda data: to_cdr(self.message(data)))
+        if self._json is not None:
+            return Written(text, digest, lambda data: self._as_cdr(types, self._decoded(types, data)))
         recorded = self._source.definition if self._source.schema == "msg" else ""
         return Written(recorded or text, digest, bytes)
 
@@ -171,10 +183,12 @@ class RecordedType:
         self.to_other = Conversion(self._known, types, self.name, types.types.__getitem__)
 
         def convert(data: bytes) -> bytes:
-            message = self.to_other(self._decoded(self._known, data))
-            return bytes(types.serialize_cdr(message, self.name, little_endian=True))
+            return self._as_cdr(types, self.to_other(self._decoded(self._known, data)))
 
         return written._replace(convert=convert)
+
+    def _as_cdr(self, types: Typestore, message: Any) -> bytes:
+        return bytes(types.serialize_cdr(message, self.name, little_endian=True))
 
     def for_ros1(self) -> Written:
         """Return how it is written into a rosbag 1: as recorded, or converted from ROS 2 to Noetic's."""
@@ -210,7 +224,7 @@ class RecordedType:
         """
         if not self._resolved:
             self._resolved = True
-            if self._types is None or not self._fits(self._types, data):
+            if self._types is None or (self._json is None and not self._fits(self._types, data)):
                 self._assume(data)
         return self._known
 

@@ -275,21 +275,111 @@ def test_an_mcap_of_ros1_messages(tmp_path: Path) -> None:
 
 def test_an_encoding_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     def fill(writer: McapWriter) -> None:
-        schema = writer.register_schema("pose", "jsonschema", b'{"type": "object"}')
-        writer.add_message(writer.register_channel("/j", "json", schema), 1, b'{"a": 1}', 1)
+        schema = writer.register_schema("pose", "protobuf", b"\x0a\x01a")
+        writer.add_message(writer.register_channel("/p", "protobuf", schema), 1, b"\x0a\x01a", 1)
+        writer.add_message(writer.register_channel("/j", "json", 0), 1, b'{"a": 1}', 1)
         writer.add_message(writer.register_channel("/none", "cdr", 0), 1, b"\0\1\0\0", 1)
 
     path = mcap(tmp_path / "a.mcap", "", fill)
     bag = open_bag(path)
     assert bag.complete
     assert bag.unreadable == {
-        "/j": "its messages are encoded as json; cdr or ros1 can be read",
+        "/p": "its messages are encoded as protobuf; cdr, json or ros1 can be read",
+        "/j": "its messages are encoded as json and have no schema",
         "/none": "its type (none) is not known and not defined in the recording",
     }
     status, result, notes = converted(path, tmp_path / "b")
-    assert (status, result["written"], set(result["left_out"])) == (3, 0, {"/j", "/none"})
+    assert (status, result["written"], set(result["left_out"])) == (3, 0, {"/j", "/none", "/p"})
     assert "truncated" not in notes
     assert converted(path, tmp_path / "b", "--allow-loss")[0] == 0
+
+
+DETECTION = {
+    "type": "object",
+    "properties": {
+        "timestamp": {
+            "type": "object",
+            "title": "time",
+            "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}},
+        },
+        "frameId": {"type": "string"},
+        "size": {"type": "object", "properties": {"x": {"type": "number"}, "y": {"type": "number"}}},
+        "picture": {"type": "string", "contentEncoding": "base64"},
+        "ranges": {"type": "array", "items": {"type": "number"}},
+        "places": {"type": "array", "items": {"$ref": "#/$defs/place"}},
+        "rows": {"type": "array", "items": {"type": "array", "items": {"type": "integer"}}},
+        "maybe": {"anyOf": [{"type": "null"}, {"type": "number"}]},
+        "free": {},
+        "from": {"type": "integer"},
+    },
+    "$defs": {
+        "place": {
+            "type": "object",
+            "properties": {"x": {"type": "number"}, "next": {"$ref": "#/$defs/place"}},
+        }
+    },
+}
+
+
+def json_recording(path: Path, schema: object, *texts: str, name: str = "vendor.Detection") -> Path:
+    def fill(writer: McapWriter) -> None:
+        known = writer.register_schema(name, "jsonschema", json.dumps(schema).encode())
+        channel = writer.register_channel("/seen", "json", known)
+        for number, text in enumerate(texts):
+            writer.add_message(channel, number, text.encode(), number)
+
+    return mcap(path, "", fill)
+
+
+@pytest.mark.parametrize("out", ["b", "b.bag"])
+def test_json_becomes_messages_by_its_schema(tmp_path: Path, out: str) -> None:
+    message = {
+        "timestamp": {"sec": 100, "nsec": 5},
+        "frameId": "map",
+        "size": {"x": 1, "y": 0.5},
+        "picture": "AQID",
+        "ranges": [1, 2.5],
+        "places": [{"x": 1}, {"x": 2, "next": {"x": 3}}],
+        "rows": [[1, 2], [3]],
+        "maybe": None,
+        "free": {"a": [1]},
+        "from": 7,
+    }
+    path = json_recording(tmp_path / "a.mcap", DETECTION, json.dumps(message))
+    assert [topic.type for topic in open_bag(path).topics] == ["vendor/msg/Detection"]
+    status, result, _ = converted(path, tmp_path / out)
+    assert (status, result["written"], result["fields_left_out"]) == (0, 1, {})
+    (seen,) = read_by_rosbags(tmp_path / out)
+    assert (seen.timestamp.sec, seen.timestamp.nanosec, seen.frame_id) == (100, 5, "map")
+    assert (seen.size.x, seen.size.y, seen.from_, seen.maybe) == (1.0, 0.5, 7, 0.0)
+    assert (bytes(seen.picture), list(seen.ranges)) == (b"\1\2\3", [1.0, 2.5])
+    assert [(one.x, one.next) for one in seen.places] == [(1.0, "null"), (2.0, '{"x": 3}')]
+    assert (seen.rows, seen.free) == (["[1, 2]", "[3]"], '{"a": [1]}')
+    (own,) = open_bag(path).messages()  # what is played
+    assert (own.message.from_, own.message.size.x) == (7, 1.0)
+
+
+def test_json_without_fields_in_its_schema_is_carried_as_text(tmp_path: Path) -> None:
+    path = json_recording(tmp_path / "a.mcap", {"type": "object"}, '{"a": 1}', name="pose")
+    assert converted(path, tmp_path / "b")[0] == 0
+    (seen,) = read_by_rosbags(tmp_path / "b")
+    assert (seen.__msgtype__, seen.json) == ("json/msg/Pose", '{"a": 1}')
+
+
+def test_json_that_does_not_fit_is_left_out_and_named(tmp_path: Path) -> None:
+    schema = {"type": "object", "properties": {"n": {"type": "integer"}, "x": {"type": "number"}}}
+    large = "1" + "0" * 400
+    wrong = ['{"n": "a"}', f'{{"n": {large}}}', f'{{"x": {large}}}', "[1]", '{"n": true}', "{", "[" * 100_000]
+    for number, text in enumerate(wrong):
+        path = json_recording(tmp_path / f"{number}.mcap", schema, '{"n": 1}', text)
+        status, result, _ = converted(path, tmp_path / f"b{number}")
+        assert (status, result["written"], list(result["left_out"])) == (3, 1, ["/seen"]), text[:20]
+    path = json_recording(tmp_path / "more.mcap", schema, '{"n": 1, "other": 2}')
+    status, result, _ = converted(path, tmp_path / "more")
+    assert (status, result["written"], list(result["fields_left_out"])) == (3, 1, ["/seen"])
+    for schema_of_no_object in ([], 7, {"type": "object", "properties": 7}):
+        path = json_recording(tmp_path / "s.mcap", schema_of_no_object, '{"n": 1}')
+        assert open_bag(path).complete
 
 
 @pytest.mark.parametrize("encoding", ["ros2idl", "omgidl"])
