@@ -21,8 +21,6 @@ from volery.vehicles.services import Parameter, Services
 LARGEST_FILE = 4_000_000
 QGC, PLAIN = ".params", (".param", ".parm")
 SYSTEM, COMPONENT = 1, 1
-COUNTERS = frozenset({"_HASH_CHECK"})
-"""Values that are no settings: a checksum over the others."""
 
 
 class Difference(NamedTuple):
@@ -46,6 +44,7 @@ class Parameters:
 
     Attributes:
         converted: what the last file states under a name of another version of the firmware, by own name.
+        left_alone: where the last file differs in values that the autopilot writes itself, such as counters.
     """
 
     def __init__(self, name: str, services: Services, system: int = SYSTEM) -> None:
@@ -53,6 +52,7 @@ class Parameters:
         self._services = services
         self._system = system or SYSTEM
         self.converted: dict[str, str] = {}
+        self.left_alone: list[Difference] = []
 
     def get(self, name: str) -> float:
         """Return the value of one parameter.
@@ -101,7 +101,8 @@ class Parameters:
         """Set the parameters of a file that differ, and return what was changed (``here`` is the old value).
 
         A parameter that the autopilot refuses or does not have does not stop the others. A parameter that has
-        another name in this version of the firmware is set under that, converted to its unit.
+        another name in this version of the firmware is set under that, converted to its unit. Values that the
+        autopilot writes itself stay as they are.
 
         Raises:
             VehicleError: some were not set; the error names them. The others are set.
@@ -131,12 +132,16 @@ class Parameters:
         """Return where the vehicle (``here``) and a file or mapping (``there``) differ, by name.
 
         Parameters that only the vehicle has are left out: a file usually states a part of them. What a file
-        states under a name of another version of the firmware is compared under the vehicle's own.
+        states under a name of another version of the firmware is compared under the vehicle's own. Values
+        that the autopilot writes itself, such as counters, are no settings and left out (``left_alone``).
         """
         there = file if isinstance(file, Mapping) else read_parameter_file(file)
         here = self.all()
         own, self.converted = self._under_own_names(there, here)
-        return [one for one in differences(here, own) if one.there is not None]
+        found = [one for one in differences(here, own) if one.there is not None]
+        volatile = self._services.parameter_rules.volatile
+        self.left_alone = [one for one in found if one.name in volatile and one.here is not None]
+        return [one for one in found if one.name not in volatile]
 
     def _under_own_names(
         self, there: Mapping[str, float], here: Mapping[str, float]
@@ -144,7 +149,7 @@ class Parameters:
         """Return values under the names that the vehicle has, and what was stated under others."""
         own, stated = dict(there), {}
         for name, value in there.items():
-            renamed = self._services.renamed.get(name)
+            renamed = self._services.parameter_rules.renamed.get(name)
             if renamed is None or name in here or renamed.other(name) not in here:
                 continue
             del own[name]
@@ -158,7 +163,7 @@ class Parameters:
 def differences(here: Mapping[str, float], there: Mapping[str, float]) -> list[Difference]:
     """Return the parameters that differ by more than a 32-bit float does, in alphabetical order."""
     found = []
-    for name in sorted({*here, *there} - COUNTERS):
+    for name in sorted({*here, *there}):
         mine, other = here.get(name), there.get(name)
         same = mine is not None and other is not None and isclose(mine, other, rel_tol=1e-6, abs_tol=1e-9)
         if not same:

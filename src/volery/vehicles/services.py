@@ -7,7 +7,7 @@ built on it: ``Parameters``, ``OnboardPlan``, ``OnboardLogs`` and ``Payload``. A
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from typing import NamedTuple, Protocol
 
 from volery.base.errors import CapabilityError, Refused, UsageError, did_you_mean
@@ -69,6 +69,21 @@ class RenamedParameter(NamedTuple):
         if name == self.before:
             return self.upgrade(value) if self.upgrade is not None else value * self.factor
         return self.downgrade(value) if self.downgrade is not None else value / self.factor
+
+
+class ParameterRules(NamedTuple):
+    """What is known of the parameters of a firmware beside what it reports.
+
+    Args:
+        renamed: those with another name in another version, by both names.
+        volatile: those that the autopilot writes itself, such as counters; they are no settings.
+    """
+
+    renamed: Mapping[str, RenamedParameter] = {}
+    volatile: Set[str] = frozenset()
+
+
+NO_RULES = ParameterRules()
 
 
 class LogEntry(NamedTuple):
@@ -151,8 +166,8 @@ class Services(Protocol):
         """System and component id that the autopilot gets commands from; ``None`` if they are not known."""
 
     @property
-    def renamed(self) -> Mapping[str, RenamedParameter]:
-        """Parameters with another name in another version of the firmware, by both names."""
+    def parameter_rules(self) -> ParameterRules:
+        """Parameters with other names in other versions, and those that the autopilot writes itself."""
 
     def parameter_name(self, name: str) -> str:
         """Return the autopilot's spelling of a name; raise ``UsageError`` if it is none."""
@@ -212,7 +227,7 @@ class PartialServices:
     files = None
     home_first = False
     sender = None
-    renamed: Mapping[str, RenamedParameter] = {}
+    parameter_rules = NO_RULES
 
     def __init__(self, name: str, why: str) -> None:
         self._name, self._why = name, why

@@ -14,7 +14,12 @@ from volery.base.errors import NotArrived, Refused, VehicleError
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
-from volery.vehicles.drivers.ardupilot.versions import RENAMED, performed_checks, skipped_checks
+from volery.vehicles.drivers.ardupilot.versions import (
+    PARAMETER_RULES,
+    RENAMED,
+    performed_checks,
+    skipped_checks,
+)
 from volery.vehicles.drivers.mavlink.services import MavlinkServices
 from volery.vehicles.parameters import Parameters, read_parameter_file
 from volery.vehicles.telemetry import Telemetry
@@ -45,7 +50,7 @@ class Autopilot:
             self.take,
             bytewise=False,
             home_first=True,
-            renamed=RENAMED,
+            parameter_rules=PARAMETER_RULES,
         )
         self.parameters = Parameters("craft", self.services)
 
@@ -224,3 +229,18 @@ def test_rows_of_another_component_are_not_the_autopilots(tmp_path: Path) -> Non
         "# Vehicle-Id Component-Id Name Value Type\n1\t1\tRTL_ALT\t1500\t9\n1\t154\tSYSID_THISMAV\t9\t6\n"
     )
     assert read_parameter_file(file) == {"RTL_ALT": 1500.0}
+
+
+def test_what_the_autopilot_writes_itself_is_no_setting(tmp_path: Path) -> None:
+    """ArduCopter 4.8 refuses to set its ground pressure and number of items; STAT_RUNTIME counts."""
+    own = {"BARO1_GND_PRESS": 94502.5, "MIS_TOTAL": 5.0, "STAT_RUNTIME": 60.0}
+    file = tmp_path / "saved.parm"
+    file.write_text("BARO1_GND_PRESS,94511\nMIS_TOTAL,0\nSTAT_RUNTIME,30\nSTAT_FLTCNT,2\nWP_SPD,10\n")
+    craft = Autopilot(NEW | own)
+    assert craft.run(lambda: craft.parameters.compare(file)) == []
+    assert craft.run(lambda: craft.parameters.load(file)) == []
+    assert [one.name for one in craft.parameters.left_alone] == list(own)
+    assert "PARAM_SET" not in craft.asked
+    file.write_text("MIS_TOTAL,0\nWP_SPD,5\n")
+    assert [one.name for one in craft.run(lambda: craft.parameters.load(file))] == ["WP_SPD"]
+    assert craft.values["MIS_TOTAL"] == 5.0

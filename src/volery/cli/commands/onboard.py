@@ -19,10 +19,10 @@ from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output, make_table, number_column
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from volery.vehicles import Vehicle
-    from volery.vehicles.parameters import Difference
+    from volery.vehicles.parameters import Difference, Parameters
 
 parameters = Commands("Fly", group="params", summary="Read and write the parameters of an autopilot.")
 missions = Commands("Fly", group="mission", summary="Upload and download missions, geofences, rally points.")
@@ -104,28 +104,30 @@ def save(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") ->
 
 @parameters.add("quiet", "json", "debug", name="load")
 def load(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
-    """Set the parameters of a file that differ from the vehicle's."""
+    """Set the parameters of a file that differ from the vehicle's, but for those that it writes itself."""
     with _attached(url, kind) as vehicle:
         own = vehicle.parameters
         changed = own.load(file)
-    _show(output, changed, own.converted, "before", "now")
+    _show(output, changed, own, "before", "now")
     output.note(f"{len(changed)} parameters were set")
     return OK
 
 
 @parameters.add("quiet", "json", "debug", name="diff")
 def diff(output: Output, url: Url, file: ParameterFile, kind: Kind = "drone") -> int:
-    """Compare a vehicle with a file. Exit status: 0 if no parameter of the file differs, else 1."""
+    """Compare a vehicle with a file. Exit status: 0 if no setting of the file differs, else 1.
+
+    Values that the autopilot writes itself, such as counters, are no settings: those that differ are named.
+    """
     with _attached(url, kind) as vehicle:
         own = vehicle.parameters
         found = own.compare(file)
-    _show(output, found, own.converted, "vehicle", "file")
+    _show(output, found, own, "vehicle", "file")
     return FAILED if found else OK
 
 
-def _show(
-    output: Output, found: Sequence[Difference], converted: Mapping[str, str], here: str, there: str
-) -> None:
+def _show(output: Output, found: Sequence[Difference], own: Parameters, here: str, there: str) -> None:
+    converted = own.converted
     if found:
         table = make_table("parameter", number_column(here), number_column(there))
         if converted:
@@ -134,6 +136,9 @@ def _show(
             values = ("-" if value is None else f"{value:.9g}" for value in (one.here, one.there))
             table.add_row(one.name, *values, *([converted.get(one.name, "")] if converted else []))
         output.show(table)
+    if own.left_alone:
+        names = ", ".join(one.name for one in own.left_alone)
+        output.note(f"written by the autopilot itself, left alone: {names}")
     output.give([one._asdict() | {"stated": converted.get(one.name, "")} for one in found])
 
 

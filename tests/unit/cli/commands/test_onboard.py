@@ -18,6 +18,9 @@ def test_parameters_are_saved_compared_and_set(tmp_path: Path) -> None:
     file = tmp_path / "all.params"
     assert volery("params", "save", "sim:px4", file).exit_code == 0
     assert volery("params", "diff", "sim:px4", file).exit_code == 0
+    file.write_text("LND_FLIGHT_T_LO 5\n", encoding="utf-8")
+    counted = volery("params", "diff", "sim:px4", file)
+    assert (counted.exit_code, "left alone: LND_FLIGHT_T_LO" in counted.output) == (0, True)
     file.write_text("MPC_XY_CRUISE 3.5\n", encoding="utf-8")
     found = volery("params", "diff", "sim:px4", file, "--json")
     assert found.exit_code == 1

@@ -23,7 +23,7 @@ from volery.vehicles.drivers.ardupilot.modes import (
     RESTING,
     STATION_PARAMETERS,
 )
-from volery.vehicles.drivers.ardupilot.versions import COVERAGE, DRAWN_BACK, RENAMED
+from volery.vehicles.drivers.ardupilot.versions import COVERAGE, DRAWN_BACK, PARAMETER_RULES
 from volery.vehicles.drivers.mavlink.backend import (
     ATTITUDE_AND_RATES,
     INT_FRAMES,
@@ -54,7 +54,7 @@ ARDUPILOT_FIRMWARE = Firmware(
     coverage=COVERAGE,
     turning=ATTITUDE_AND_RATES,
     drawn_back=DRAWN_BACK,
-    renamed=RENAMED,
+    parameter_rules=PARAMETER_RULES,
     home_first=True,
 )
 
@@ -207,7 +207,7 @@ class ArduPilotMavros(MavrosBackend):
         home_first=True,
         turning=ATTITUDE_AND_RATES,
         drawn_back=DRAWN_BACK,
-        renamed=RENAMED,
+        parameter_rules=PARAMETER_RULES,
     )
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:

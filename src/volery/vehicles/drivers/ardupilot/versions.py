@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from volery.vehicles.firmware_versions import Coverage, Meaning, Rule
-from volery.vehicles.services import RenamedParameter
+from volery.vehicles.services import ParameterRules, RenamedParameter
 
 COVERAGE = Coverage("ArduPilot", (4, 5), (4, 8))
 
@@ -23,6 +23,15 @@ DRAWN_BACK: Rule[bool] = Rule(
         "turned at 15 of 107 degrees/s",
     ),
 )
+
+_VOLATILE = frozenset(
+    {"MIS_TOTAL", "FENCE_TOTAL", "RALLY_TOTAL", "FORMAT_VERSION"}
+    | {f"BARO{number}_{what}" for number in (1, 2, 3) for what in ("GND_PRESS", "DEVID")}
+    | {"ARSPD_DEVID", "ARSPD2_DEVID", "MNT1_DEVID", "MNT2_DEVID"}
+    | {f"STAT_{what}" for what in ("BOOTCNT", "DISTFLWN", "FLTCNT", "FLTTIME", "RESET", "RUNTIME")}
+)
+"""Parameters that it writes itself: AP_PARAM_FLAG_INTERNAL_USE_ONLY (4.8 refuses to set them), the numbers of
+items that it stores, AP_Stats, and the layout of its store (another number erases all parameters)."""
 
 
 # -- renamed and rescaled parameters: the conversions of ArduCopter/ (Parameters, mode_rtl, mode_land,
@@ -159,3 +168,4 @@ _ALL = (
 )
 RENAMED: Mapping[str, RenamedParameter] = {name: one for one in _ALL for name in (one.before, one.after)}
 """Parameters of Copter and Rover with another name in another version, by both names."""
+PARAMETER_RULES = ParameterRules(RENAMED, _VOLATILE)

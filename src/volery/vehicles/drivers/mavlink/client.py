@@ -33,7 +33,7 @@ from volery.vehicles.drivers.mavlink.backend import (
 from volery.vehicles.drivers.mavlink.decoder import TelemetryDecoder
 from volery.vehicles.drivers.mavlink.services import MavlinkServices, item_fields
 from volery.vehicles.firmware_versions import Coverage, MinorVersion, Rule, stated_version
-from volery.vehicles.services import Item, RenamedParameter
+from volery.vehicles.services import NO_RULES, Item, ParameterRules
 from volery.vehicles.telemetry import Answer, Telemetry
 from volery.vehicles.tried_versions import tried
 
@@ -91,7 +91,7 @@ class Firmware(NamedTuple):
         home_first: item 0 of its missions is home.
         turning: type mask of SET_ATTITUDE_TARGET beside a yaw rate.
         drawn_back: see ``AttitudeStream``.
-        renamed: parameters with another name in another version, by both names.
+        parameter_rules: its parameters with other names in other versions, and those that it writes itself.
         bytewise: whole parameter values lie in the bytes of the float (see ``from_bytewise``), as in PX4.
     """
 
@@ -103,7 +103,7 @@ class Firmware(NamedTuple):
     estimator: str
     turning: int
     drawn_back: Rule[bool] = MEASURED_HEADING
-    renamed: Mapping[str, RenamedParameter] = {}
+    parameter_rules: ParameterRules = NO_RULES
     bytewise: bool = False
     home_first: bool = False
 
@@ -277,7 +277,7 @@ class MavlinkClient:
             self._send_to,
             bytewise=self.firmware.bytewise,
             home_first=self.firmware.home_first,
-            renamed=self.firmware.renamed,
+            parameter_rules=self.firmware.parameter_rules,
             sender=(GCS_SYSTEM, GCS_COMPONENT),
         )
         link.receive(self._receive)
@@ -389,7 +389,7 @@ class MavlinkClient:
 
     def _absent_beside(self, name: str) -> Sequence[str]:
         """Return the parameters that a firmware which has *name* does not have."""
-        renamed = self.firmware.renamed.get(name)
+        renamed = self.firmware.parameter_rules.renamed.get(name)
         return () if renamed is None else (renamed.other(name),)
 
     def _handle_version(self, number: int) -> bool:

@@ -50,7 +50,7 @@ from volery.vehicles.drivers.mavlink.backend import (
 from volery.vehicles.drivers.mavlink.mavros_services import MavrosServices, to_waypoint
 from volery.vehicles.drivers.steps import ROVER_KIND
 from volery.vehicles.firmware_versions import Rule
-from volery.vehicles.services import Item, RenamedParameter
+from volery.vehicles.services import NO_RULES, Item, ParameterRules
 from volery.vehicles.telemetry import Answer, Battery, StatusText, Telemetry, Velocity
 
 PERIOD: Ns = 100 * MS
@@ -77,8 +77,8 @@ class FirmwareBehind(NamedTuple):
     """Type mask of SET_ATTITUDE_TARGET beside a yaw rate."""
     drawn_back: Rule[bool] = MEASURED_HEADING
     """See ``AttitudeStream``."""
-    renamed: Mapping[str, RenamedParameter] = {}
-    """Parameters with another name in another version, by both names."""
+    parameter_rules: ParameterRules = NO_RULES
+    """Its parameters with other names in other versions, and those that it writes itself."""
 
 
 class MavrosDecoder:
@@ -256,7 +256,7 @@ class MavrosBackend:
             self._namespace,
             self._spin,
             home_first=self.firmware.home_first,
-            renamed=self.firmware.renamed,
+            parameter_rules=self.firmware.parameter_rules,
         )
 
     def _name(self, name: str) -> str:

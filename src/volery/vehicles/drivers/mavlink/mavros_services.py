@@ -8,7 +8,7 @@ answer for is reported as ``NotArrived``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from math import isclose
 from typing import Any, TypeVar
 
@@ -19,10 +19,11 @@ from volery.links.mavlink_messages import constant, entry_name
 from volery.ros.graph import Node, QoS, ServiceError
 from volery.ros.messages import new, request
 from volery.vehicles.services import (
+    NO_RULES,
     Item,
     LogEntry,
     Parameter,
-    RenamedParameter,
+    ParameterRules,
     mavlink_parameter_name,
     missing_parameter,
 )
@@ -67,7 +68,7 @@ class MavrosServices:
         namespace: namespace of the vehicle node.
         spin: one round of the node's loop.
         home_first: whether item 0 of a mission is home, as in ArduPilot.
-        renamed: parameters with another name in another version of the firmware, by both names.
+        parameter_rules: its parameters with other names in other versions, and those that it writes itself.
     """
 
     files = None
@@ -82,10 +83,10 @@ class MavrosServices:
         spin: Action,
         *,
         home_first: bool,
-        renamed: Mapping[str, RenamedParameter] = {},
+        parameter_rules: ParameterRules = NO_RULES,
     ) -> None:
         self.home_first = home_first
-        self.renamed = renamed
+        self.parameter_rules = parameter_rules
         self._kernel = kernel
         self._node = node
         self._telemetry = telemetry
@@ -209,7 +210,9 @@ class MavrosServices:
             self._pull(asked)  # MAVROS answers from what it has pulled
             value = self._read(asked, name)
         if value is None:
-            raise missing_parameter(self._name, name, self._pulled_values(asked), self.renamed.get(name))
+            raise missing_parameter(
+                self._name, name, self._pulled_values(asked), self.parameter_rules.renamed.get(name)
+            )
         return self._as_parameter(name, value)
 
     def _read(self, asked: str, name: str) -> float | int | None:

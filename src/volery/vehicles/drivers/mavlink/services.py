@@ -29,10 +29,11 @@ from volery.vehicles.drivers.mavlink.pending_requests import AGAIN, TRIES, Pendi
 from volery.vehicles.rtcm import correction_parts
 from volery.vehicles.services import (
     MISSION,
+    NO_RULES,
     Item,
     LogEntry,
     Parameter,
-    RenamedParameter,
+    ParameterRules,
     mavlink_parameter_name,
     missing_parameter,
 )
@@ -78,7 +79,7 @@ class MavlinkServices(PendingRequests):
         send: sends a message without a target.
         send_to: sends a message, given its name and its fields without the target.
         bytewise: whether whole parameters lie in the bytes of the float, as in PX4.
-        renamed: parameters with another name in another version of the firmware, by both names.
+        parameter_rules: its parameters with other names in other versions, and those that it writes itself.
         home_first: whether item 0 of a mission is home, as in ArduPilot.
         sender: system and component ids that the messages are sent with.
     """
@@ -92,7 +93,7 @@ class MavlinkServices(PendingRequests):
         *,
         bytewise: bool,
         home_first: bool,
-        renamed: Mapping[str, RenamedParameter] = {},
+        parameter_rules: ParameterRules = NO_RULES,
         sender: tuple[int, int] | None = None,
     ) -> None:
         super().__init__(kernel, telemetry.name)
@@ -102,7 +103,7 @@ class MavlinkServices(PendingRequests):
         self._telemetry = telemetry
         self._send, self._send_to = send, send_to
         self._bytewise = bytewise
-        self.renamed = renamed
+        self.parameter_rules = parameter_rules
         self._plan_lock = Lock(kernel, f"plan of {telemetry.name}")
         self._known: dict[str, Parameter] = {}
         self._whole = False  # all parameters are known, and none was written since
@@ -198,7 +199,7 @@ class MavlinkServices(PendingRequests):
         return answer
 
     def _missing(self, name: str) -> Refused:
-        return missing_parameter(self._name, name, self._known, self.renamed.get(name))
+        return missing_parameter(self._name, name, self._known, self.parameter_rules.renamed.get(name))
 
     def write_parameter(self, name: str, value: float) -> Parameter:
         """See ``Services``."""

@@ -41,7 +41,7 @@ from volery.vehicles.drivers.px4.events import (
     uncompressed,
 )
 from volery.vehicles.drivers.px4.modes import HOLD, LINK_LOSS_PARAMETERS, MODES
-from volery.vehicles.drivers.px4.versions import COVERAGE
+from volery.vehicles.drivers.px4.versions import COVERAGE, PARAMETER_RULES
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Velocity
 
@@ -53,6 +53,7 @@ PX4_FIRMWARE = Firmware(
     coverage=COVERAGE,
     estimator="ESTIMATOR_STATUS",
     turning=ATTITUDE_AND_YAW_RATE,  # with all three rates it takes the rates as a set-point of their own
+    parameter_rules=PARAMETER_RULES,
     bytewise=True,
 )
 
@@ -265,7 +266,9 @@ def _on_board(services: MavlinkServices, path: str) -> bytes:
 class PX4Mavros(MavrosBackend):
     """PX4 over MAVROS. See ``PX4Backend``."""
 
-    firmware = FirmwareBehind("PX4", HOLD, home_first=False, turning=ATTITUDE_AND_YAW_RATE)
+    firmware = FirmwareBehind(
+        "PX4", HOLD, home_first=False, turning=ATTITUDE_AND_YAW_RATE, parameter_rules=PARAMETER_RULES
+    )
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
         super().__init__(kernel, node, name, namespace, geoid)

@@ -7,8 +7,14 @@ from __future__ import annotations
 
 from volery.links.mavlink_messages import constant
 from volery.vehicles.firmware_versions import Coverage, Meaning, Rule
+from volery.vehicles.services import ParameterRules
 
 COVERAGE = Coverage("PX4", (1, 13), (1, 18))
+
+PARAMETER_RULES = ParameterRules(
+    volatile={"_HASH_CHECK", "COM_FLIGHT_UUID", "EKF2_MAG_DECL", "LND_FLIGHT_T_HI", "LND_FLIGHT_T_LO"}
+)
+"""It writes these itself: volatile in its metadata and no calibration, and the checksum over all."""
 
 NO_HORIZONTAL_POSITION: Rule[int] = Rule(
     "flags of ESTIMATOR_STATUS with which there is no horizontal position",
