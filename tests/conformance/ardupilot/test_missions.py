@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from math import nan
 from typing import Any
 
 import pytest
 
 from rigs.station import TARGET
 
-ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, INVALID_SEQUENCE = 0, 1, 2, 3, 13
+ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, INVALID_PARAM3, INVALID_SEQUENCE = 0, 1, 2, 3, 8, 13
 WAYPOINT, LOITER_TIME, LAND, TAKEOFF, DELAY, JUMP, SPEED = 16, 19, 21, 22, 93, 177, 178
 HERE = {"latitude": -35.363261, "longitude": 149.165230}
 
@@ -439,3 +440,12 @@ def test_the_fields_of_a_camera_item_are_no_degrees(bench: Any) -> None:
         rig.send("MISSION_REQUEST", **TARGET, seq=1)
         rig.run(0.1)
         assert (rig.latest["MISSION_ITEM"]["x"], rig.latest["MISSION_ITEM"]["y"]) == (1.0, 7.0)
+
+
+def test_items_of_cameras_and_gimbals_are_taken(bench: Any) -> None:
+    """As in AP_Mission of 4.5 to 4.8; of their parameters none may be NaN."""
+    rig = bench()
+    rig.run(0.5)
+    commands = (202, 531, 532, 534, 1000, 2000, 2001, 2500, 2501)
+    assert upload(rig, [HOME, *(item(command, frame=2) for command in commands)]) == 0
+    assert upload(rig, [HOME, item(1000, frame=2, param1=-30.0, param3=nan)]) == INVALID_PARAM3

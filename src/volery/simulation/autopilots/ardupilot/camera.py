@@ -31,6 +31,8 @@ SERVO, COMPONENTS = 1, 5
 TRIGGER = 10
 """SERVOn_FUNCTION."""
 DIGICAM_CONFIGURE, DIGICAM_CONTROL, TRIGGER_DISTANCE, START_CAPTURE, STOP_CAPTURE = 202, 203, 206, 2000, 2001
+SET_ZOOM, SET_FOCUS, SET_SOURCE, START_VIDEO, STOP_VIDEO = 531, 532, 534, 2500, 2501
+"""Commands that a camera by servo or relay takes as mission items only, without an effect."""
 """MAV_CMD."""
 SHOOT = 1
 """Shooting command of DIGICAM_CONTROL."""

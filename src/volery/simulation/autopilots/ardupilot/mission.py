@@ -7,7 +7,20 @@ from dataclasses import replace
 from math import dist, isinf, isnan
 
 from volery.base.time import from_seconds, to_seconds
-from volery.simulation.autopilots.ardupilot.camera import DIGICAM_CONTROL, TRIGGER_DISTANCE, act_on_camera
+from volery.simulation.autopilots.ardupilot.camera import (
+    CAMERA_COMMANDS,
+    DIGICAM_CONFIGURE,
+    DIGICAM_CONTROL,
+    SET_FOCUS,
+    SET_SOURCE,
+    SET_ZOOM,
+    START_CAPTURE,
+    START_VIDEO,
+    STOP_CAPTURE,
+    STOP_VIDEO,
+    TRIGGER_DISTANCE,
+    act_on_camera,
+)
 from volery.simulation.autopilots.ardupilot.commands import (
     FENCE_ENABLE,
     HIGHEST,
@@ -31,7 +44,12 @@ from volery.simulation.autopilots.ardupilot.modes import (
     change_mode,
     disarm,
 )
-from volery.simulation.autopilots.ardupilot.mount_control import MOUNT_CONTROL, on_mount_control
+from volery.simulation.autopilots.ardupilot.mount_control import (
+    GIMBAL_PITCHYAW,
+    MOUNT_CONTROL,
+    on_gimbal_pitchyaw,
+    on_mount_control,
+)
 from volery.simulation.autopilots.ardupilot.payload import (
     GRIPPER,
     SET_RELAY,
@@ -121,6 +139,15 @@ NAMES = {
     LAND_START: "LandStart",
     **dict.fromkeys((ROI_LOCATION, ROI_NONE, ROI), "SetROI"),
     MOUNT_CONTROL: "MountControl",
+    GIMBAL_PITCHYAW: "GimbalPitchYaw",
+    DIGICAM_CONFIGURE: "DigiCamCfg",
+    START_CAPTURE: "ImageStartCapture",
+    STOP_CAPTURE: "ImageStopCapture",
+    SET_ZOOM: "SetCameraZoom",
+    SET_FOCUS: "SetCameraFocus",
+    SET_SOURCE: "SetCameraSource",
+    START_VIDEO: "VideoStartCapture",
+    STOP_VIDEO: "VideoStopCapture",
     FENCE_ENABLE: "FenceEnable",
     JUMP_TAG: "Tag",
 }
@@ -221,7 +248,8 @@ def item_begins(vehicle: Vehicle, index: int, item: MissionItem) -> None:
 
 SILENT = frozenset(
     {GRIPPER, SET_SERVO, SET_RELAY, REPEAT_RELAY, REPEAT_SERVO, DIGICAM_CONTROL, TRIGGER_DISTANCE}
-    | {DO_SPRAYER, DO_AUX_FUNCTION, JUMP_TAG}
+    | {DO_SPRAYER, DO_AUX_FUNCTION, JUMP_TAG, GIMBAL_PITCHYAW, DIGICAM_CONFIGURE, START_CAPTURE, STOP_CAPTURE}
+    | {SET_ZOOM, SET_FOCUS, SET_SOURCE, START_VIDEO, STOP_VIDEO}
 )
 """Actions that AP_Mission itself executes: their end is not reported."""
 
@@ -312,6 +340,8 @@ ACTIONS: Mapping[int, Callable[[Vehicle, MissionItem], None]] = {
     REPEAT_SERVO: _as_command(on_repeat_servo),
     FENCE_ENABLE: _as_command(on_fence_enable),
     MOUNT_CONTROL: _as_command(on_mount_control),
+    GIMBAL_PITCHYAW: _as_command(on_gimbal_pitchyaw),
+    **{one: _as_command(CAMERA_COMMANDS[one]) for one in (DIGICAM_CONFIGURE, START_CAPTURE, STOP_CAPTURE)},
 }
 """What executes the item of a command."""
 

@@ -115,11 +115,14 @@ def on_gimbal_pitchyaw(vehicle: Vehicle, command: Command) -> int:
 
 
 def _point(vehicle: Vehicle, flags: int, angles: tuple[float, float], rates: tuple[float, float]) -> bool:
-    """Follow flags of the gimbal manager, else pitch and yaw [degrees], else their rates; NaN: not given."""
+    """Follow flags of the gimbal manager, else pitch and yaw [degrees], else their rates.
+
+    Angles that are NaN or larger than 90 and 360 degrees are not given.
+    """
     from_north = bool(flags & LOCKS_YAW)
     if flags & (RETRACTED | IS_NEUTRAL):
         set_mount_mode(vehicle, RETRACT if flags & RETRACTED else NEUTRAL)
-    elif not any(isnan(angle) for angle in angles):
+    elif abs(angles[0]) <= 90.0 and abs(angles[1]) <= 360.0:
         point_by_angles(vehicle, 0.0, *angles, from_north=from_north)
     elif not any(isnan(rate) for rate in rates):
         point_by_rates(vehicle, 0.0, *rates, from_north=from_north)

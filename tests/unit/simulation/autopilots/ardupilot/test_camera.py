@@ -113,11 +113,12 @@ def test_pictures_by_distance(station: Any) -> None:
     assert rig.vehicle.parameters["CAM1_TRIGG_DIST"] == 0.0
 
 
-def test_a_mission_item_takes_a_picture(station: Any) -> None:
+@pytest.mark.parametrize(("command", "fields"), [(CONTROL, {"x": 1}), (START, {"param3": 1.0})])
+def test_a_mission_item_takes_a_picture(command: int, fields: dict[str, Any], station: Any) -> None:
     rig = station("rover", parameters=CAMERA)
     rig.beat()
     rig.run(0.5)
-    rig.listed(CONTROL, x=1)
+    rig.listed(command, **fields)
     assert rig.command(176, 1, 10) == 0
     assert rig.command(400, 1) == 0
     rig.run(2.0)

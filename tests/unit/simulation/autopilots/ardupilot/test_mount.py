@@ -68,6 +68,17 @@ def test_the_pilot_points_it_by_angle_and_by_rate(rig: Any) -> None:
     assert angles(rig)[1] == pytest.approx(45.0, abs=0.01)
 
 
+def test_a_mission_item_points_it(station: Any) -> None:
+    rig = station("rover", parameters=MOUNT)
+    rig.beat()
+    rig.run(0.5)
+    rig.listed(PITCHYAW, param1=-30.0, param2=20.0)
+    assert rig.command(176, 1, 10) == 0
+    assert rig.command(400, 1) == 0
+    rig.run(2.0)
+    assert angles(rig) == pytest.approx((0.0, -30.0, 20.0), abs=0.01)
+
+
 def test_a_moved_stick_takes_it_over_from_a_message(rig: Any) -> None:
     assert rig.command(CONTROL, -20, 5, 30, 0, 0, 0, BY_MESSAGE) == 0
     assert angles(rig) == pytest.approx((5.0, -20.0, 30.0), abs=0.01)
