@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from volery.base.time import MS, Ns
-from volery.bridge.autopilot_link import FrameSubscription
+from volery.bridge.autopilot_link import ARDUPILOT_ID, FrameSubscription
 from volery.bridge.node_interface import (
     LATCHED_STATE,
     Fields,
@@ -92,7 +92,7 @@ def to_waypoint(item: dict[str, Any]) -> Any:
 class PlanServices:
     """Handlers of ``push``, ``pull`` and ``clear`` of one list.
 
-    The list is published after each ``pull`` and ``push``.
+    The list is published after each ``pull``, ``push`` and ``clear``.
 
     Args:
         context: The interface.
@@ -100,7 +100,7 @@ class PlanServices:
     """
 
     def __init__(self, context: InterfaceContext, plan: PlanList) -> None:
-        self._link, self._publish = context.link, context.publish
+        self._link, self._publish, self._warn = context.link, context.publish, context.warn
         self._plan = plan
         self._of = {"mission_type": plan.kind}
         self.waypoints: list[Any] = []
@@ -136,19 +136,28 @@ class PlanServices:
         return None
 
     def push(self, request: Any) -> Any:
-        """Handle ``push``."""
+        """Handle ``push`` of a whole list, or of a part from ``start_index`` on, which ArduPilot stores."""
         response = service("mavros_msgs/srv/WaypointPush").response
-        waypoints = list(request.waypoints)
-        if request.start_index != 0 or not waypoints:
+        given, first = list(request.waypoints), request.start_index
+        if not given:
             return response(False, 0)
+        begin, fields = "MISSION_COUNT", {"count": len(given)}
+        before: list[Any] = []
+        if first:
+            before = self._stored_before(first, len(given))
+            if not before:
+                return response(False, 0)
+            begin = "MISSION_WRITE_PARTIAL_LIST"
+            fields = {"start_index": first, "end_index": first + len(given) - 1}
+        waypoints = [*before[:first], *given, *before[first + len(given) :]]
         sent = 0
         with self._link.subscribe("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK") as answers:
-            answer = self._request(answers, "MISSION_COUNT", {"count": len(waypoints), **self._of})
+            answer = self._request(answers, begin, {**fields, **self._of})
             while answer is not None and answer.name != "MISSION_ACK":
                 sequence = answer.fields["seq"]
-                if sequence >= len(waypoints):
+                if not 0 <= sequence - first < len(given):
                     return response(False, sent)
-                sent = max(sent, sequence + 1)
+                sent = max(sent, sequence - first + 1)
                 item = to_item(waypoints[sequence], sequence, self._plan.kind)
                 self._link.send_to_autopilot("MISSION_ITEM_INT", item)
                 answer = self._next(answers, ATTEMPTS * ANSWERED_WITHIN)
@@ -156,6 +165,20 @@ class PlanServices:
         if accepted:
             self.publish_list(waypoints)
         return response(accepted, sent if accepted else 0)
+
+    def _stored_before(self, first: int, count: int) -> list[Any]:
+        """Return the stored list, of which a part is to be replaced; empty, with a warning, if not."""
+        name, problem = f"{self._plan.name}/push", ""
+        if self._link.autopilot.autopilot != ARDUPILOT_ID:
+            problem = "only ArduPilot stores a part of a list; push the whole list with start_index 0"
+        elif not self.waypoints and not self.pull(None).success:
+            problem = "the list on board cannot be read"
+        elif first + count > len(self.waypoints):
+            problem = f"items {first} to {first + count - 1} do not exist: {len(self.waypoints)} are on board"
+        if problem:
+            self._warn(f"{name} with start_index {first}: {problem}")
+            return []
+        return self.waypoints
 
     def pull(self, request: Any) -> Any:
         """Handle ``pull``."""
@@ -179,6 +202,8 @@ class PlanServices:
         with self._link.subscribe("MISSION_ACK") as answers:
             answer = self._request(answers, "MISSION_CLEAR_ALL", self._of)
         accepted = answer is not None and answer.fields["type"] == ACCEPTED
+        if accepted:
+            self.publish_list([])
         return service("mavros_msgs/srv/WaypointClear").response(accepted)
 
 

@@ -316,6 +316,7 @@ def test_a_mission_is_pushed_pulled_and_cleared(rig: Any) -> None:
     assert (pulled.success, pulled.wp_received) == (True, 3)
     assert [message.waypoints for message in shown] == [route, route]
     assert rig.call("mission/clear", "mavros_msgs/WaypointClear").success
+    assert shown[-1].waypoints == []
 
 
 def test_a_mission_that_is_refused_or_not_answered(rig: Any) -> None:
@@ -323,13 +324,51 @@ def test_a_mission_that_is_refused_or_not_answered(rig: Any) -> None:
     rig.answers["MISSION_COUNT"] = lambda fields: rig.emit("MISSION_ACK", type=4)
     refused = rig.call("mission/push", "mavros_msgs/WaypointPush", waypoints=[waypoint()])
     assert (refused.success, refused.wp_transfered) == (False, 0)
-    for empty in ({}, {"waypoints": [waypoint()], "start_index": 1}):
-        assert not rig.call("mission/push", "mavros_msgs/WaypointPush", **empty).success
+    assert not rig.call("mission/push", "mavros_msgs/WaypointPush").success
     del rig.answers["MISSION_COUNT"]
     assert not rig.call("mission/push", "mavros_msgs/WaypointPush", waypoints=[waypoint()]).success
     assert not rig.call("mission/pull", "mavros_msgs/WaypointPull").success
     assert not rig.call("mission/clear", "mavros_msgs/WaypointClear").success
     assert len(rig.asked("MISSION_REQUEST_LIST")) == 3
+
+
+def test_a_part_of_a_mission_is_pushed(rig: Any) -> None:
+    rig.connect()
+    stored = [to_item(waypoint(command=16, z_alt=float(one)), one) for one in range(4)]
+    last = 0
+
+    def begin(fields: Any) -> None:
+        nonlocal last
+        last = fields["end_index"]
+        rig.emit("MISSION_REQUEST", seq=fields["start_index"])
+
+    def item(fields: Any) -> None:
+        stored[fields["seq"]] = fields
+        if fields["seq"] == last:
+            rig.emit("MISSION_ACK", type=0)
+        else:
+            rig.emit("MISSION_REQUEST_INT", seq=fields["seq"] + 1)
+
+    rig.answers["MISSION_WRITE_PARTIAL_LIST"], rig.answers["MISSION_ITEM_INT"] = begin, item
+    rig.answers["MISSION_REQUEST_LIST"] = lambda fields: rig.emit("MISSION_COUNT", count=len(stored))
+    rig.answers["MISSION_REQUEST_INT"] = lambda fields: rig.emit("MISSION_ITEM_INT", **stored[fields["seq"]])
+    shown = rig.listen("mission/waypoints", "mavros_msgs/WaypointList")
+    part = [waypoint(command=16, z_alt=20.0), waypoint(command=16, z_alt=30.0)]
+    pushed = rig.call("mission/push", "mavros_msgs/WaypointPush", start_index=1, waypoints=part)
+    assert (pushed.success, pushed.wp_transfered) == (True, 2)
+    assert [one["z"] for one in stored] == [0.0, 20.0, 30.0, 3.0]
+    assert [one.z_alt for one in shown[-1].waypoints] == [0.0, 20.0, 30.0, 3.0]
+    beyond = rig.call("mission/push", "mavros_msgs/WaypointPush", start_index=3, waypoints=part)
+    assert (beyond.success, beyond.wp_transfered) == (False, 0)
+    assert "items 3 to 4 do not exist: 4 are on board" in rig.of_texts()[-1].text
+
+
+def test_a_part_of_a_mission_is_for_ardupilot_only(rig: Any) -> None:
+    rig.heartbeat(autopilot=12)
+    rig.run(200 * MS)
+    pushed = rig.call("mission/push", "mavros_msgs/WaypointPush", start_index=1, waypoints=[waypoint()])
+    assert not pushed.success
+    assert "only ArduPilot stores a part of a list" in rig.of_texts()[-1].text
 
 
 def test_the_current_waypoint(rig: Any) -> None:
@@ -346,7 +385,9 @@ def test_the_current_waypoint(rig: Any) -> None:
 
 def test_the_current_waypoint_is_marked_whatever_was_pushed() -> None:
     published: list[Any] = []
-    context: Any = SimpleNamespace(link=None, publish=lambda topic, message: published.append(message))
+    context: Any = SimpleNamespace(
+        link=None, publish=lambda topic, message: published.append(message), warn=None
+    )
     services = MissionServices(context)
     services.publish_list([messages.new(WAYPOINT, is_current=one == 1) for one in range(3)])
     services.translators()["MISSION_CURRENT"]({"seq": 2}, 0)

@@ -197,8 +197,7 @@ def convert(
     unknown = chosen - recorded
     if unknown:
         raise UsageError(f"{recording} has no topic {', '.join(sorted(unknown))}")
-    if not bag.complete:
-        output.note(f"{bag.path} is truncated; only its complete part is read")
+    _note_reading(output, bag)
     left_out: dict[str, str] = {}
     written = 0
     duration = to_seconds(bag.end - bag.start)
@@ -223,9 +222,15 @@ def convert(
     return LEFT_OUT if lost and not allow_loss else OK
 
 
-def _note_defects(output: Output, bag: Bag) -> None:
+def _note_reading(output: Output, bag: Bag) -> None:
+    if bag.remark:
+        output.note(bag.remark)
     if not bag.complete:
         output.note(f"{bag.path} is truncated; only its complete part is read")
+
+
+def _note_defects(output: Output, bag: Bag) -> None:
+    _note_reading(output, bag)
     for topic, why in bag.unreadable.items():
         output.note(f"{topic} is left out: {why}")
     _note_damage(output, bag)

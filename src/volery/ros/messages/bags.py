@@ -10,6 +10,7 @@ import shutil
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field, replace
+from heapq import merge
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, NamedTuple, Protocol, Self
@@ -107,6 +108,8 @@ class Bag:
         complete: False if the recording was cut short or is damaged; its complete messages are read.
         indexed: Whether it can be read in order of time without being read as a whole.
         damage: What was found to be damaged while messages were read; their reader appends to it.
+        remark: How it was read if not as usual; empty otherwise.
+        parts: The files of a folder whose metadata cannot be read, as ``ros2 bag reindex`` finds them.
     """
 
     path: Path
@@ -117,6 +120,8 @@ class Bag:
     complete: bool
     indexed: bool = True
     damage: list[str] = field(default_factory=list, compare=False)
+    remark: str = ""
+    parts: tuple[Bag, ...] = ()
 
     @property
     def topics(self) -> tuple[BagTopic, ...]:
@@ -180,6 +185,10 @@ class Bag:
             self.damage.append(what)
 
     def _raw(self) -> Iterator[RawMessage]:
+        if self.parts:
+            for _, raw in merge(*(one.raw() for one in self.parts), key=lambda pair: pair[1].at):
+                yield raw
+            return
         if not self.indexed:
             yield from self._salvaged()
             return
@@ -243,10 +252,37 @@ def open_bag(path: Path) -> Bag:
     except DAMAGE as error:
         if kind != ROSBAG2:
             return _salvaged(path, kind, str(error))
-        inside = sorted(path.glob("*.mcap")) if path.is_dir() else []
-        if not inside:
-            raise UsageError(f"{path} is no rosbag 2 that can be read: {error}") from error
-        return replace(_salvaged(inside[0], MCAP, str(error)), complete=False)
+        if path.is_dir():
+            return _of_files(path, str(error))
+        raise UsageError(f"{path} is no rosbag 2 that can be read: {error}") from error
+
+
+def _of_files(path: Path, problem: str) -> Bag:
+    """Open a folder whose ``metadata.yaml`` is missing or wrong by all of its files."""
+    parts: list[Bag] = []
+    damage: list[str] = []
+    for file in sorted(one for one in path.iterdir() if one.suffix in (".mcap", ".db3") and one.is_file()):
+        try:
+            parts.append(replace(open_bag(file), damage=damage))
+        except UsageError as error:
+            damage.append(str(error))
+    if not parts:
+        raise UsageError(f"{path} is no rosbag 2 that can be read: {'; '.join([problem, *damage])}")
+    counts: Counter[Source] = Counter()
+    for one in (connection for part in parts for connection in part.connections):
+        counts[one.source] += one.messages
+    filled = [part for part in parts if any(one.messages for one in part.connections)]
+    return Bag(
+        path,
+        ROSBAG2,
+        _connections(counts),
+        min((part.start for part in filled), default=0),
+        max((part.end for part in filled), default=0),
+        complete=not (damage or (path / METADATA).exists()) and all(part.complete for part in parts),
+        damage=damage,
+        remark=f"{path} is read from all of its files, as its {METADATA} cannot be followed: {problem}",
+        parts=tuple(parts),
+    )
 
 
 def _reader(path: Path, kind: str) -> Any:
@@ -294,6 +330,7 @@ def _salvaged(path: Path, kind: str, problem: str) -> Bag:
     return Bag(path, kind, _connections(counts), min(times), max(times), not damage, indexed=False)
 
 
+METADATA = "metadata.yaml"
 _METADATA_VERSION: Literal[9] = 9
 """Version of rosbag2's metadata.yaml; Jazzy and later write it, Iron and later read it."""
 
@@ -452,7 +489,7 @@ class Rosbag2Writer(_Writer):
     """Writer of a folder with an MCAP file, which ``ros2 bag``, Foxglove and PlotJuggler read."""
 
     def __init__(self, path: Path) -> None:
-        if path.is_dir() and (path / "metadata.yaml").exists():
+        if path.is_dir() and (path / METADATA).exists():
             shutil.rmtree(path)
         self._defined: dict[str, RecordedType] = {}
         self._connected: dict[tuple[str, str, tuple[Qos, ...]], Connection] = {}

@@ -7,6 +7,7 @@ start. Messages stay bytes here; ``recorded_types`` decodes them by their connec
 from __future__ import annotations
 
 import bz2
+import sqlite3
 import struct
 from collections.abc import Collection, Iterator
 from contextlib import suppress
@@ -58,6 +59,7 @@ DAMAGE = (
     Reader2Error,
     McapError,
     TypesysError,
+    sqlite3.Error,
     zstandard.ZstdError,
     struct.error,
     EOFError,

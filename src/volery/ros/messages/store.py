@@ -190,6 +190,10 @@ def _register(into: rosbags.Typestore, texts: dict[str, str]) -> None:
     for name, (_, fields) in parsed.items():
         for label, what in fields:
             inner = _inner_type(what)
+            if inner.rpartition("/")[2] == "wstring":
+                raise UsageError(
+                    f"{name}.{label}: wstring is not supported; string carries any text as UTF-8"
+                )
             if inner and inner not in parsed and inner not in into.fielddefs:
                 raise UsageError(f"{name}.{label}: no message type named {inner!r}; define it first")
     try:

@@ -72,6 +72,10 @@ def test_a_rosbag_2_whose_writer_was_killed(tmp_path: Path) -> None:
     record(tmp_path / "flight")
     (tmp_path / "flight/metadata.yaml").unlink()
     bag = open_bag(tmp_path / "flight")
+    assert (bag.complete, len(list(bag.messages()))) == (True, 20)  # the file has its end
+    (file,) = (tmp_path / "flight").glob("*.mcap")
+    file.write_bytes(file.read_bytes()[:-20])
+    bag = open_bag(tmp_path / "flight")
     assert (bag.complete, len(list(bag.messages()))) == (False, 20)
 
 

@@ -11,8 +11,13 @@ import lz4.frame
 import pytest
 import zstandard
 from mcap.writer import CompressionType, Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as RosbagWriter
+from rosbags.typesys import Stores, get_typestore
+from typer.testing import CliRunner
 
 from volery.base.errors import UsageError
+from volery.cli.main import application
 from volery.ros.messages import bags, containers
 from volery.ros.messages import new as message_of
 from volery.ros.messages.bags import create_bag, open_bag
@@ -171,3 +176,54 @@ def test_a_type_whose_name_is_none_is_reported_once_and_not_for_each_message(tmp
     bag = open_bag(file)
     assert "x_msgs/m/Word is not known" in bag.unreadable["/words"]
     assert (list(bag.messages()), bag.damage) == ([], [])
+
+
+def split_folder(path: Path, storage: StoragePlugin) -> list[int]:
+    """Write a folder of two files and without ``metadata.yaml``; return the times of its messages."""
+    times = []
+    for part in range(2):
+        one = path.with_name(f"part{part}")
+        with RosbagWriter(one, version=9, storage_plugin=storage) as writer:
+            given = writer.add_connection(
+                "/words", "std_msgs/msg/String", typestore=get_typestore(Stores.ROS2_JAZZY)
+            )
+            for number in range(4):
+                times.append(part * 100 + number)
+                writer.write(given, times[-1], b"\0\1\0\0\2\0\0\0a\0")
+        path.mkdir(exist_ok=True)
+        (data,) = (file for file in one.iterdir() if file.suffix in (".mcap", ".db3"))
+        data.rename(path / f"bag_{part}{data.suffix}")
+    return times
+
+
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_a_folder_without_metadata_is_read_from_all_of_its_files(
+    tmp_path: Path, storage: StoragePlugin
+) -> None:
+    folder = tmp_path / "bag"
+    times = split_folder(folder, storage)
+    bag = open_bag(folder)
+    assert bag.complete
+    assert (bag.start, bag.end, [topic.messages for topic in bag.topics]) == (times[0], times[-1], [8])
+    assert [one.at for one in bag.messages()] == times
+    assert "metadata.yaml" in bag.remark
+    assert (
+        CliRunner().invoke(application(), ["bag", "convert", str(folder), str(tmp_path / "b")]).exit_code == 0
+    )
+
+    for text in ("", "rosbag2_bagfile_information: 7", "\0\0", "a: [" * 2000):
+        (folder / "metadata.yaml").write_text(text)
+        bag = open_bag(folder)
+        assert [one.at for one in bag.messages()] == times
+        assert not bag.complete  # it may have had more files
+    (folder / "metadata.yaml").unlink()
+
+    second = sorted(one for one in folder.iterdir())[1]
+    second.write_bytes(second.read_bytes()[:200])
+    bag = open_bag(folder)
+    assert [one.at for one in bag.messages()] == times[:4]
+    assert not bag.complete
+    (folder / "bag_0.mcap").unlink(missing_ok=True)
+    (folder / "bag_0.db3").unlink(missing_ok=True)
+    with pytest.raises(UsageError, match=f"{folder} is no rosbag 2 that can be read: .*{second.name}"):
+        open_bag(folder)

@@ -138,6 +138,10 @@ def test_constants_are_attributes_of_the_class() -> None:
         (lambda: messages.define("std_msgs/msg/String", "int32 data"), ["std_msgs/msg/String"]),
         (lambda: messages.define("my_msgs/msg/Broken", "what is this"), ["my_msgs/msg/Broken"]),
         (lambda: messages.define("my_msgs/srv/Broken", "int32 a"), ["---"]),
+        (
+            lambda: messages.define("my_msgs/msg/Wide", "wstring label"),
+            ["Wide.label: wstring is not supported"],
+        ),
     ],
 )
 def test_errors_name_the_offender(fault: object, words: list[str]) -> None:
