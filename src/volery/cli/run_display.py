@@ -21,7 +21,7 @@ from volery.base.time import clock, to_seconds
 from volery.cli.command import BAD_INPUT, BAD_INPUT_ERRORS, FAILED, OK
 from volery.cli.console import Output
 from volery.report.terminal import summary_table
-from volery.requirements.record import RequirementRecord
+from volery.requirements.record import RunRecord
 from volery.run.event_log import LogOptions, parse_level
 from volery.run.recording import make_folder
 from volery.run.result import FULL, NOTHING, SUMMARY, Progress, Run
@@ -231,7 +231,7 @@ def show_outcome(output: Output, run: Run) -> int:
         output.complain(f"volery: {run.record.outcome.status}: {run.record.outcome.reason}")
     for name, found in run.record.requirements.items():
         if found.met is False:
-            output.complain(f"volery: {unmet(name, found)}")
+            output.complain(f"volery: {unmet(run.record, name)}")
     for note in run.notes:
         output.note(f"volery: {note}")
     for problem in (*run.problems, *(f"{name} did not end when it was cancelled" for name in run.left)):
@@ -241,9 +241,12 @@ def show_outcome(output: Output, run: Run) -> int:
     return OK if run.ok else FAILED
 
 
-def unmet(name: str, found: RequirementRecord) -> str:
+def unmet(record: RunRecord, name: str) -> str:
     """Return one sentence about a requirement that was not met."""
+    found = record.requirements[name]
     bound = f"{found.relation} {found.bound:g} {found.unit}".strip()
     value = "" if found.observed is None else f"{found.observed:g} {found.unit}".strip()
-    seen = f"is {value}" if value else "was never observed"
+    chain = record.chains.get(found.observable.rpartition(".")[0])
+    why = f" ({chain.unobserved})" if chain is not None and chain.unobserved else ""
+    seen = f"is {value}" if value else f"was never observed{why}"
     return f"the requirement {name!r} is not met: {found.observable} {seen}, required is {bound}"

@@ -231,7 +231,7 @@ def chains_grid(record: RunRecord) -> Grid:
     rows = tuple(
         (
             Cell(name),
-            Cell(" → ".join(one.topics), status="quiet"),
+            Cell(one.unobserved or " → ".join(one.topics), status="warn" if one.unobserved else "quiet"),
             Cell(count(one.latency_s.count)),
             Cell(milliseconds(one.latency_s.mean)),
             Cell(milliseconds(one.latency_s.p95)),

@@ -93,6 +93,11 @@ def summary_table(record: RunRecord, *, notes: bool = False) -> RenderableType:
     """
     parts: list[RenderableType] = [headline(record)]
     parts += [GridTable(grid) for grid in all_grids(record)]
+    parts += [
+        Text(f"chain {name}: no latency was observed: {one.unobserved}", style="yellow")
+        for name, one in record.chains.items()
+        if one.unobserved
+    ]
     if notes:
         parts += [Text(f"⚠ {line}", style="yellow") for line in record.warnings]
         parts += [Text(f"not counted: {line}", style="dim") for line in record.not_counted]

@@ -307,13 +307,16 @@ class ChainLedger:
         self._received: list[dict[str, Received]] = [
             {} for _ in setup.topics
         ]  # by topic and node: when, since when
+        self._arrivals, self._losses = [0] * len(setup.topics), [0] * len(setup.topics)
 
     def message(self, event: Message) -> None:
         """Add a message that arrived or was lost."""
-        if event.received == NONE:
-            return
         for place, topic in enumerate(self.setup.topics):
             if topic == event.topic:
+                if event.received == NONE:
+                    self._losses[place] += 1
+                    continue
+                self._arrivals[place] += 1
                 since = self._since(place, event)
                 if since is not None:
                     self._arrived(place, event, since)
@@ -337,11 +340,24 @@ class ChainLedger:
         spread = self.latencies
         mean, p95 = spread.mean(), spread.quantile(0.95)
         if mean is None or p95 is None:
-            return ChainRecord(topics=list(self.setup.topics), latency_s=LatencyRecord())
+            why = self._unobserved()
+            return ChainRecord(topics=list(self.setup.topics), latency_s=LatencyRecord(), unobserved=why)
         latency = LatencyRecord(
             count=spread.count, mean=mean * 1e-9, p95=p95 * 1e-9, max=spread.largest * 1e-9
         )
         return ChainRecord(topics=list(self.setup.topics), latency_s=latency)
+
+    def _unobserved(self) -> str:
+        """Return why no message on the last topic goes back to one on the first."""
+        topics = self.setup.topics
+        for place, topic in enumerate(topics):
+            if not self._arrivals[place]:
+                if self._losses[place]:
+                    return f"all {self._losses[place]} messages of {topic} were lost"
+                return f"no message of {topic} arrived: no node publishes it, or none subscribes to it"
+        received = next(place for place, nodes in enumerate(self._received) if not nodes)
+        before, after = topics[received - 1], topics[received]
+        return f"no node published {after} after it had received {before}"
 
 
 def _bare(node: str) -> str:

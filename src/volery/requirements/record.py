@@ -56,10 +56,11 @@ class LatencyRecord(_Part):
 
 
 class ChainRecord(_Part):
-    """A chain of topics, and the age of the data at its end."""
+    """A chain of topics, the age of the data at its end, and why none was observed, if so."""
 
     topics: list[str]
     latency_s: LatencyRecord
+    unobserved: str = ""
 
 
 class PreemptionRecord(_Part):

@@ -248,6 +248,17 @@ def test_what_was_lost_or_has_no_beginning_is_in_no_chain() -> None:
     )
     assert found.latencies.count == 0
     assert found.record().latency_s.count == 0
+    assert found.record().unobserved == "no node published /pose after it had received /image"
+    found.message(Message(10 * MS, 10 * MS, "/pose", "/other", "/third", 1))
+    assert found.record().unobserved == "no node published /command after it had received /pose"
+
+
+def test_a_chain_says_which_topic_did_not_arrive() -> None:
+    image = Message(0, 1, "/image", "/camera", "/locate", 1)
+    never = "no message of /pose arrived: no node publishes it, or none subscribes to it"
+    assert chain(image).record().unobserved == never
+    lost = chain(image, *[Message(1, NONE, "/pose", "/locate", "/steer", 1)] * 2)
+    assert lost.record().unobserved == "all 2 messages of /pose were lost"
 
 
 def test_a_chain_of_one_topic_is_the_latency_of_a_message() -> None:

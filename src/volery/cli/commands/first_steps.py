@@ -103,7 +103,7 @@ def demo(
     for name, outcome in outcomes.items():
         for requirement, found in outcome.record.requirements.items():
             if found.met is False:
-                output.note(f"{name}: {unmet(requirement, found)}")
+                output.note(f"{name}: {unmet(outcome.record, requirement)}")
         for problem in outcome.problems:
             output.complain(f"volery: {name}: {problem}")
         output.note(f"report: {outcome.folder / 'report.html'}")

@@ -1,5 +1,8 @@
 """MARTE's analysis models (GQAM, PAM, SAM): steps with their times, the hosts that execute them, workloads.
 
+DICE's profiles of technologies (Storm, Hadoop, Spark) specialize GaStep, GaExecHost, GaScenario and
+GaWorkloadEvent, and are read as those.
+
 Such a model has no components: it has activities or interactions whose steps carry times, swimlanes or
 lifelines that execute them, and hosts. What executes steps becomes a component without a file, with one
 operation for each step; an arrival with a period or a rate makes the component of the first step active. It
@@ -15,9 +18,16 @@ from volery.exchange.uml.context import Import, identifier
 from volery.exchange.uml.notations import SOURCES, figure, tagged
 from volery.exchange.uml.xmi import Element, tag, uml_type
 
-STEPS = ("GaStep", "PaStep", "SaStep", "PaCommStep", "GaCommStep")
-_WORKLOADS = ("GaWorkloadEvent", "GaWorkloadBehavior")
-_RUNNING = ("PaRunTInstance", "GaScenario", "PaLogicalResource")
+STEPS = (
+    *("GaStep", "PaStep", "SaStep", "PaCommStep", "GaCommStep"),
+    *("StormSpout", "StormBolt", "StormStreamStep", "HadoopOperation"),
+    *("SparkTransformation", "SparkAction", "SparkMap", "SparkReduce"),
+)
+_WORKLOADS = ("GaWorkloadEvent", "GaWorkloadBehavior", "HadoopWorkloadEvent", "SparkWorkloadEvent")
+_SCENARIOS = ("GaScenario", "StormScenarioTopology", "HadoopScenario", "SparkScenario")
+_RUNNING = ("PaRunTInstance", "PaLogicalResource", *_SCENARIOS)
+_CLASSIFIERS = ("Artifact", "Class", "Component", "Device", "Node")
+"""What DICE marks with the stereotype of a step although it only holds the code of one."""
 _EDGES = ("ControlFlow", "ObjectFlow")
 _BEHAVIOURS = ("Activity", "Interaction")
 LANGUAGE = "python"
@@ -34,7 +44,8 @@ def read_analysis(imp: Import) -> None:
         if uml_type(step) in _EDGES:
             imp.note(step, "a step on an edge: a model has no probabilities of branches; it is left out")
             continue
-        executed.setdefault(_executes(imp, step), []).append(step)
+        if uml_type(step) not in _CLASSIFIERS:
+            executed.setdefault(_executes(imp, step), []).append(step)
     written = set(imp.tree.get("components", {}))
     made: dict[Element, str] = {}
     for owner, steps in executed.items():
@@ -129,7 +140,11 @@ def _host(imp: Import, owner: Element, steps: list[Element]) -> str:
 
 def _hosts(imp: Import, owner: Element, steps: list[Element]) -> Iterator[Element]:
     represented = imp.file.reference(owner, "represents")
-    for one in (owner, represented, *steps):
+    above = represented
+    while above is not None:  # an artifact within its node
+        yield above
+        above = above.getparent()
+    for one in (owner, represented, *steps, _behaviour(steps[0])):
         for name in (*_RUNNING, *STEPS):
             application = imp.file.stereotype(one, name) if one is not None else None
             if application is not None:

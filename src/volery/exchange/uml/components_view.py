@@ -12,7 +12,7 @@ from typing import Any
 from volery.base.errors import ModelError
 from volery.exchange.uml.analysis_view import LANGUAGE
 from volery.exchange.uml.context import Export, Import
-from volery.exchange.uml.interfaces_view import is_many, set_many
+from volery.exchange.uml.interfaces_view import EXPOSED, is_many, set_many
 from volery.exchange.uml.notations import properties, property_text, tagged
 from volery.exchange.uml.times_view import ACTIVE, Times, below, generals, write_activity, write_times
 from volery.exchange.uml.xmi import Element, local, tag, uml_type, xmi_id
@@ -73,7 +73,7 @@ def _plain(imp: Import) -> Iterator[Element]:
             and not _has_parts(imp, element)
             and local(element) == "packagedElement"
             and element.get("isAbstract") != "true"
-            and (features & {"ownedAttribute", "ownedOperation", "interfaceRealization", "ownedPort"})
+            and features & {"ownedAttribute", "ownedOperation", "interfaceRealization", "ownedPort", *EXPOSED}
         ):
             yield element
 
@@ -259,6 +259,8 @@ class _Component:
         kind = tag(application, "kind")
         provided = self._interfaces(application, "provInterface")
         required = self._interfaces(application, "reqInterface")
+        if not provided and not required:
+            provided, required = (self._exposed(port, feature) for feature in EXPOSED)
         typed = self.imp.file.reference(port, "type")
         if not provided and not required and typed is not None and uml_type(typed) == "Interface":
             conjugated = str(port.get("isConjugated", "")) == "true" or kind == "required"
@@ -277,9 +279,14 @@ class _Component:
             taken = name in provides or number
             requires[f"{name}_required" if taken else name] = f"{self.imp.names[each]}{many}"
 
+    def _exposed(self, element: Element, feature: str) -> list[Element]:
+        """Return what ``<provided>`` or ``<required>`` of a port or a component states."""
+        inside = [each for each in element if local(each) == feature and each in self.imp.names]
+        return [*self._interfaces(element, feature), *inside]
+
     def _of_type(self, typed: Element) -> tuple[list[Element], list[Element]]:
         """Return the interfaces that a type realizes, and those that it uses."""
-        realized, used = [], []
+        realized, used = (self._exposed(typed, feature) for feature in EXPOSED)
         for each in typed:
             if local(each) == "interfaceRealization":
                 realized += self.imp.file.references(each, "contract")

@@ -16,6 +16,8 @@ PRIMITIVES = {"bool": "Boolean", "int": "Integer", "float": "Real", "str": "Stri
 
 _OURS = {theirs: ours for ours, theirs in PRIMITIVES.items()} | {"UnlimitedNatural": "int"}
 _MANY = "[]"
+EXPOSED = ("provided", "required")
+"""Features of a port and of a component: interfaces, or references to them."""
 
 
 # -- import
@@ -38,8 +40,19 @@ def read_types(imp: Import) -> None:
 
 
 def read_interfaces(imp: Import) -> None:
-    """Read the interfaces with their operations, inherited ones included."""
-    for element in imp.file.elements("Interface"):
+    """Read the interfaces with their operations, inherited ones included.
+
+    Enterprise Architect has interfaces below the port or the component that provides or requires them; those
+    of one name are one.
+    """
+    named: dict[str, str] = {}
+    inside = [
+        each for each in imp.file.model.iter(etree.Element) if local(each) in EXPOSED and each.get("name")
+    ]
+    for element in [*(one for one in imp.file.elements("Interface") if one not in inside), *inside]:
+        if element in inside and str(element.get("name")) in named:
+            imp.names[element] = named[str(element.get("name"))]
+            continue
         written = str(element.get("name", ""))
         if written in SPECIAL_INTERFACES:
             imp.names[element] = written
@@ -47,6 +60,7 @@ def read_interfaces(imp: Import) -> None:
             continue
         interfaces = imp.section("interfaces")
         name = imp.name(element, interfaces)
+        named.setdefault(written, name)
         imp.finish(f"interface:{name}", element)
         operations = dict(_operations(imp, element, f"interface:{name}", set()))
         interfaces[name] = operations or None

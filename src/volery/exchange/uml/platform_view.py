@@ -18,7 +18,15 @@ SCHEDULERS = {
 """Schedulers of the model, and S3D's ``SchedulingPolicyKind``."""
 
 DEVICES = {"HWSensor": "sensor", "HWActuator": "actuator", "HwDevice": "device"}
-_PROCESSORS = ("HwProcessor", "HwPLD", "HwASIC", "GaExecHost", "SaExecHost")
+_PROCESSORS = (
+    "HwProcessor",
+    "HwPLD",
+    "HwASIC",
+    "GaExecHost",
+    "SaExecHost",
+    "HadoopComputationNode",
+    "SparkNode",
+)
 _QUANTITIES = ("frequency", "bandwidth", "latency", "memory")
 _MEDIA = ("HwMedia", "HwBus", "CommunicationMedia", "GaCommHost")
 

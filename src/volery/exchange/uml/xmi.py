@@ -36,6 +36,7 @@ _PROFILES = (
     re.compile(r"^http://(?P<name>essyn_Profile|PHARAON_Profile)\.UTP_Stereotypes/schemas/UTP/"),
     re.compile(r"^http:///(?P<name>essyn_Profile|PHARAON_Profile)(/.*)?\.ecore$"),
     re.compile(r"^http://www\.eclipse\.org/papyrus/(?P<name>\w+)/\d+$"),
+    re.compile(r"^http://es\.unizar\.disco\.dice/profiles/(?:\w+/)*(?P<name>\w+)/\d+\.\d+$"),
     re.compile(r"^http:///(?:MARTE/)(?:\w+/)*(?P<name>\w+)\.ecore$"),
     re.compile(r"^http:///schemas/(?P<name>\w+)/_[A-Za-z0-9_-]+/\d+$"),
     re.compile(r"^http://www\.eclipse\.org/uml2/\d+\.\d+\.\d+/UML/Profile/(?P<name>\w+)$"),
@@ -57,7 +58,7 @@ def local(element: Element) -> str:
 
 
 def _profile_of(uri: str) -> str:
-    """Return the profile of a namespace, empty if it is none of MARTE, S3D or the standard one."""
+    """Return the profile of a namespace, empty if it is none of MARTE, S3D, DICE or the standard one."""
     for pattern in _PROFILES:
         found = pattern.match(uri)
         if found:

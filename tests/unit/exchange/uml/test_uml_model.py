@@ -390,6 +390,75 @@ def test_hosts_steps_and_workloads_become_processors_times_and_arrivals():
         }
 
 
+@pytest.mark.parametrize(
+    ("technology", "host", "scenario", "workload", "step"),
+    [
+        ("Storm", "GQAM:GaExecHost", "StormScenarioTopology", "GQAM:GaWorkloadEvent", "StormBolt"),
+        ("Hadoop", "T:HadoopComputationNode", "HadoopScenario", "T:HadoopWorkloadEvent", "HadoopOperation"),
+        ("Spark", "T:SparkNode", "SparkScenario", "T:SparkWorkloadEvent", "SparkTransformation"),
+    ],
+)
+def test_steps_and_hosts_of_dice_are_those_of_marte(technology, host, scenario, workload, step):
+    elements = """<packagedElement xmi:type="uml:Node" xmi:id="n" name="board">
+ <nestedClassifier xmi:type="uml:Artifact" xmi:id="f" name="counter"/></packagedElement>
+<packagedElement xmi:type="uml:Node" xmi:id="n2" name="other"/>
+<packagedElement xmi:type="uml:Activity" xmi:id="a" name="Topology">
+ <group xmi:type="uml:ActivityPartition" xmi:id="g" name="lane" represents="f"/>
+ <node xmi:type="uml:InitialNode" xmi:id="n0" name="start"/>
+ <node xmi:type="uml:OpaqueAction" xmi:id="n1" name="count" inPartition="g"/>
+ <node xmi:type="uml:OpaqueAction" xmi:id="n3" name="sum"/></packagedElement>"""
+    applied = f"""<{host} xmi:id="x0" base_Classifier="n"/><{host} xmi:id="x1" base_Classifier="n2"/>
+<T:{scenario} xmi:id="x2" base_NamedElement="a" usedResources="x1"/>
+<{workload} xmi:id="x3" base_NamedElement="n0"/><T:{step} xmi:id="x4" base_Classifier="f"/>
+<T:{step} xmi:id="x5" base_Action="n1"><hostDemand>(expr=5,unit=ms,source=est)</hostDemand></T:{step}>
+<T:{step} xmi:id="x6" base_Action="n3"><hostDemand>(expr=2,unit=ms,source=est)</hostDemand></T:{step}>"""
+    namespace = f"http://es.unizar.disco.dice/profiles/DTSM/{technology}/1.0"
+    text = text_of(elements, applied=applied).replace(
+        b"xmlns:PAM", f'xmlns:T="{namespace}" xmlns:PAM'.encode()
+    )
+    imported = read("dice", text)
+    tree = imported.tree
+    assert tree["components"]["counter"]["operations"] == {
+        "count": {"time": "5 ms", "provenance": "estimated"}
+    }
+    assert list(tree["components"]["Topology"]["operations"]) == ["sum"]
+    assert set(tree["platform"]["processors"]) == {"board", "other"}
+    assert tree["allocations"] == {"default": {"counter_1": "board", "topology": "other"}}
+    assert not any(
+        "profile that is not read" in line or "has no counterpart" in line for line in said(imported)
+    )
+
+
+EXPOSED = """
+<packagedElement xmi:type="uml:Component" xmi:id="c1" name="Lens">
+ <ownedAttribute xmi:type="uml:Port" xmi:id="p1" name="eye">
+  <provided xmi:type="uml:Interface" xmi:id="i1" name="Scan">
+   <ownedOperation xmi:id="o" name="look"/></provided>
+ </ownedAttribute>
+</packagedElement>
+<packagedElement xmi:type="uml:Component" xmi:id="c2" name="Pilot">
+ <ownedAttribute xmi:type="uml:Port" xmi:id="p2" name="sight">
+  <required xmi:id="i2" name="Scan"/></ownedAttribute>
+ <ownedAttribute xmi:type="uml:Port" xmi:id="p3" name="book"><provided xmi:idref="i3"/></ownedAttribute>
+</packagedElement>
+<packagedElement xmi:type="uml:Component" xmi:id="c3" name="Store">
+ <provided xmi:id="i4" name="Log"/><required xmi:id="i5" name="Scan"/>
+</packagedElement>
+<packagedElement xmi:type="uml:Interface" xmi:id="i3" name="Log">
+ <ownedOperation xmi:id="o3" name="add"/></packagedElement>"""
+
+
+def test_interfaces_below_ports_and_components_as_enterprise_architect_writes_them():
+    tree = read("exposed", text_of(EXPOSED, SYSTEM)).tree
+    assert tree["interfaces"] == {"Log": {"add": {}}, "Scan": {"look": {}}}
+    assert tree["components"] == {
+        "Lens": {"language": "python", "provides": {"eye": "Scan"}},
+        "Pilot": {"language": "python", "provides": {"book": "Log"}, "requires": {"sight": "Scan"}},
+        "Store": {"language": "python", "provides": {"log": "Log"}, "requires": {"scan": "Scan"}},
+    }
+    assert tree["application"]["pilot"] == {"is": "Pilot", "sight": "lens.eye"}
+
+
 def test_a_file_without_a_component_lists_its_stereotypes():
     applied = APPLIED.replace("GaStep", "Other").replace("PaStep", "Other")
     with pytest.raises(
