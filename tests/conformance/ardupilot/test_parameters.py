@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from math import cos, radians
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 
 import volery.simulation.autopilots
+from rigs.effects import ZEROS, without_effect
 from rigs.station import TARGET
 from volery.base.errors import UsageError
 from volery.simulation.autopilots.ardupilot import FIRMWARE
@@ -238,7 +240,7 @@ def test_what_has_no_effect_is_refused(kind: str, bench: Any) -> None:
     assert kept == set(table.supported)
 
 
-def test_a_command_without_effect_is_refused(bench: Any) -> None:
+def test_calibration_and_storage_do_what_they_say_or_nothing(bench: Any) -> None:
     rig = bench()
     rig.run(0.5)
     for given in ((42424, 0), (42425, 0), (241, 0), (241, 0, 0, 0, 0, 1), (245, 0)):
@@ -250,3 +252,59 @@ def test_a_command_without_effect_is_refused(bench: Any) -> None:
     assert rig.vehicle.parameters["RTL_ALT"] == 3000.0
     rig.command(246, 1)
     assert rig.vehicle.parameters["RTL_ALT"] == 1500.0
+
+
+def at_rest(rig: Any) -> None:
+    """Nothing is done before."""
+
+
+def having(**parameters: float) -> Callable[[Any], None]:
+    """Parameters are set before."""
+
+    def prepare(rig: Any) -> None:
+        for name, value in parameters.items():
+            assert rig.vehicle.set_parameter(name, value)
+
+    return prepare
+
+
+def armed(rig: Any) -> None:
+    """It is armed in GUIDED."""
+    assert rig.command(176, 1, 15 if rig.autopilot.firmware.kind == "rover" else 4) == 0
+    assert rig.command(400, 1) == 0
+
+
+def with_a_region(rig: Any) -> None:
+    """The nose points to a place."""
+    rig.command(195, 0, 0, 0, 0, -35.0, 149.0, 600.0)
+
+
+EXAMPLES = {
+    181: ((0.0, 1.0), at_rest),
+    185: ((1.0,), armed),
+    197: (ZEROS, with_a_region),
+    216: ((1.0,), having(SPRAY_ENABLE=1.0, SERVO9_FUNCTION=22.0)),
+    218: ((4.0, 2.0), at_rest),
+    511: ((30.0, 10_000.0), at_rest),
+    2520: ((-1.0, 1.0), having(LGR_ENABLE=1.0, SERVO10_FUNCTION=29.0)),
+    42007: ((2.0,), at_rest),
+}
+ACCEPTED_WITHOUT_EFFECT = {
+    202: "AP_Camera: configuring is accepted by every backend, also where there is none",
+    203: "AP_Camera: control is accepted without a camera, too",
+    401: "reports what forbids arming, and nothing does; accepted, as recorded",
+    2001: "AP_Camera: the end of pictures is accepted without a camera, too",
+    42426: "AP_Compass: cancelling is accepted where no calibration is under way",
+}
+"""With the source: ArduPilot's libraries at 64a9c7877b, and the recordings."""
+
+
+@pytest.mark.parametrize("kind", ["copter", "rover"])
+def test_a_command_without_effect_is_refused(kind: str, bench: Any) -> None:
+    def ready() -> Any:
+        rig = bench(kind)
+        rig.send("HEARTBEAT", type=6, autopilot=8)
+        rig.run(1.52)
+        return rig
+
+    assert without_effect(ready, {"PARAM_VALUE"}, EXAMPLES) == set(ACCEPTED_WITHOUT_EFFECT)

@@ -133,4 +133,6 @@ def test_a_parameter_by_its_former_name_is_refused_with_the_new_one(bench: Any) 
 
     with pytest.raises(UsageError, match="no parameter 'WPNAV_SPEED'; it is WP_SPD now"):
         Newest(parameters={"WPNAV_SPEED": 500.0})
-    assert Newest(parameters={"MAV_SYSID": 7.0}).vehicle.parameters["SYSID_THISMAV"] == 7.0
+    assert Newest(parameters={"RTL_ALT_M": 20.0}).vehicle.parameters["RTL_ALT"] == 2000.0
+    with pytest.raises(UsageError, match="MAV_SYSID has no effect"):
+        Newest(parameters={"MAV_SYSID": 7.0})

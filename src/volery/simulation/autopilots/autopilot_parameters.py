@@ -7,7 +7,7 @@ rounds, a real type is single precision). Each firmware derives its ``Tuning`` f
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 from math import isfinite, radians
@@ -88,11 +88,14 @@ class Parameters:
 
     Args:
         defaults: All parameters with their default values, by the firmware's own names.
-        overrides: Values that replace defaults.
+        of_vehicle: Values of this vehicle that replace defaults.
+        overrides: Values that a user gives.
         renamed: Parameters that the version shows otherwise, by the firmware's own names.
+        supported: Parameters that change the behaviour, by the firmware's own names; ``None``: all do.
 
     Raises:
-        UsageError: A name in *overrides* does not exist, or its value is not finite.
+        UsageError: A name in *overrides* does not exist, its value is not finite or not of the parameter's
+            type, or a change of it has no effect.
     """
 
     def __init__(
@@ -100,6 +103,9 @@ class Parameters:
         defaults: Iterable[Parameter],
         overrides: Mapping[str, float] | None = None,
         renamed: Mapping[str, Renamed] = NOT_RENAMED,
+        *,
+        of_vehicle: Mapping[str, float] | None = None,
+        supported: Collection[str] | None = None,
     ) -> None:
         own = tuple(defaults)
         self._values = {parameter.name: parameter.value for parameter in own}
@@ -115,13 +121,35 @@ class Parameters:
         self._list()
         self.changes = 0
         """Number of values that were set so far."""
+        shown = self._index if supported is None else (self.name(one) for one in supported)
+        self._effective = frozenset(shown)
+        for name, value in (of_vehicle or {}).items():
+            self.set(self.name(name), value)
         for name, value in (overrides or {}).items():
-            if name not in self._index:
-                now = renamed.get(name)
-                hint = f"; it is {now.name} now" if now is not None else did_you_mean(name, self._index)
-                raise UsageError(f"the autopilot has no parameter {name!r}{hint}")
-            if self.set(name, value) is None:
-                raise UsageError(f"parameter {name} cannot be {value}: it takes finite numbers")
+            self._override(name, value)
+
+    def _override(self, name: str, value: float) -> None:
+        """Set a parameter as a user states it."""
+        if name not in self._index:
+            now = self._renamed.get(name)
+            hint = f"; it is {now.name} now" if now is not None else did_you_mean(name, self._index)
+            raise UsageError(f"the autopilot has no parameter {name!r}{hint}")
+        before, kind = self._now(name), self._order[self._index[name]].type
+        after = self.set(name, value)
+        if after is None:
+            raise UsageError(f"parameter {name} cannot be {value}: it takes finite numbers")
+        if kind in _BOUNDS and after.value != value:
+            low, high = _BOUNDS[kind]
+            raise UsageError(f"parameter {name} cannot be {value:g}: it is an integer from {low} to {high}")
+        if after.value != before.value and not self.has_effect(name):
+            raise UsageError(
+                f"parameter {name} has no effect in the simulation, which would fly as with"
+                f" {before.value:g}; leave it out"
+            )
+
+    def has_effect(self, name: str) -> bool:
+        """Return whether a change of the parameter of that name changes what the vehicle does."""
+        return name in self._effective
 
     def _shown(self, parameter: Parameter) -> Parameter:
         """Return a parameter of the firmware's own table as it is shown."""

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 from mypy_extensions import mypyc_attr
 
+from volery.base.errors import UsageError
 from volery.base.frames import Vector
 from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Action, Kernel
@@ -217,7 +218,7 @@ class ParameterTable(NamedTuple):
     of_vehicle: Callable[[int, Flight], Mapping[str, float]]
     """Return the values that follow from the system id and the body."""
     supported: Mapping[str, str]
-    """The parameters that change the behaviour, and what each changes. All others are only stored."""
+    """The parameters that change the behaviour, and what each changes. No other can be changed."""
     renamed: Mapping[str, Renamed] = NOT_RENAMED
     """Parameters that this version shows otherwise."""
 
@@ -290,11 +291,16 @@ class Vehicle:
         self.restart: Action
         """Restart the autopilot."""
         table = rules.parameters
-        of_vehicle = {
-            table.renamed[name].name if name in table.renamed else name: value
-            for name, value in table.of_vehicle(system, flight).items()
-        }
-        self.parameters = Parameters(table.defaults(), {**of_vehicle, **(overrides or {})}, table.renamed)
+        try:
+            self.parameters = Parameters(
+                table.defaults(),
+                overrides,
+                table.renamed,
+                of_vehicle=table.of_vehicle(system, flight),
+                supported=table.supported,
+            )
+        except UsageError as error:
+            raise UsageError(f"{name}: {error}") from None
         self.tuning = Tuning()
         self._tune()
         self.rc = RcChannels(rules.rc.transmitter)

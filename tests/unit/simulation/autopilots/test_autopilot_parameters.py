@@ -81,11 +81,18 @@ def test_an_override_replaces_the_default() -> None:
     [
         ({"A_SECONT": 1.0}, "no parameter 'A_SECONT'.*A_SECOND"),
         ({"A_SECOND": float("nan")}, "A_SECOND cannot be nan"),
+        ({"B_FIRST": 1.5}, "B_FIRST cannot be 1.5: it is an integer from -128 to 127"),
+        ({"B_FIRST": 300.0}, "B_FIRST cannot be 300"),
+        ({"C_THIRD": 4.0}, "C_THIRD has no effect"),
     ],
 )
 def test_a_wrong_override_is_explained(overrides: dict[str, float], words: str) -> None:
     with pytest.raises(UsageError, match=words):
-        Parameters(LISTED, overrides)
+        Parameters(LISTED, overrides, supported=("A_SECOND", "B_FIRST"))
+
+
+def test_a_parameter_without_effect_may_be_given_its_own_value() -> None:
+    assert Parameters(LISTED, {"A_SECOND": 0.5}, supported=())["A_SECOND"] == 0.5
 
 
 SUBSYSTEM = (

@@ -406,7 +406,6 @@ def copter(version: Version) -> Firmware:
     """Return ArduCopter in one version."""
     mavlink = ardupilot_mavlink(
         version=version,
-        supported=COPTER_SUPPORTED,
         start=LinkStart(
             boot_bytes=boot.bytes_at(
                 (0.0, boot.banner("ArduCopter", version)),

@@ -348,7 +348,6 @@ def telemetry_policy(
 def ardupilot_mavlink(
     *,
     version: Version,
-    supported: Mapping[str, str],
     start: LinkStart,
     sent: TelemetryPolicy,
     commands: Mapping[int, Handler],
@@ -356,7 +355,6 @@ def ardupilot_mavlink(
     on_parameter_list: VehicleAction,
 ) -> MavlinkFirmware:
     """Return the MAVLink rules of one kind of vehicle: the shared ones, and the arguments."""
-    effective = {version.renamed[name].name if name in version.renamed else name for name in supported}
 
     def on_banner(vehicle: Vehicle, _command: Command) -> int:
         on_parameter_list(vehicle)
@@ -390,10 +388,7 @@ def ardupilot_mavlink(
             points_changed=fence_points.points_changed,
             writes_parts=True,
         ),
-        parameters=ParameterPolicy(
-            refuses=lambda name: name not in effective,
-            reports_missing=version.reports_missing_parameters,
-        ),
+        parameters=ParameterPolicy(reports_missing=version.reports_missing_parameters),
         logs=LogPolicy(partial(dataflash.encode, version=version), first=1, while_armed=False),
         files=files.FILES,
         on_parameter_list=on_parameter_list,

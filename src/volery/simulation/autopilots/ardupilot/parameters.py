@@ -1,6 +1,6 @@
 """ArduPilot's parameters: which ones change the behaviour, and the tuning that follows from their values.
 
-All other parameters are only stored, listed and read back.
+All other parameters are listed and read, and keep their values.
 """
 
 from __future__ import annotations

@@ -294,7 +294,6 @@ def rover(version: Version) -> Firmware:
     """Return ArduRover in one version."""
     mavlink = ardupilot_mavlink(
         version=version,
-        supported=ROVER_SUPPORTED,
         start=LinkStart(
             boot_bytes=boot.bytes_at(
                 (0.0, boot.banner("ArduRover", version)), (1.83, b"Init Gyro"), (2.0, b"*"), (2.35, b"*\n")

@@ -43,8 +43,6 @@ GO_HOME, TAKE_OFF, LAND = 1, 4, 6
 
 _AUTHORITY = f"{OLD_NAMES}/srv/SDKControlAuthority"
 _TASK = f"{OLD_NAMES}/srv/DroneTaskControl"
-STOP_FILM = 2
-"""The last action of a camera."""
 MAIN_GIMBAL = 0
 GIMBAL_PERIOD: Ns = 2 * S
 """Time after which the node of 4.1 answers a command to its gimbal."""
@@ -154,9 +152,11 @@ class Services:
         return Reply(message_class(f"{OLD_NAMES}/srv/QueryDroneVersion_Response")(version, hardware))
 
     def _camera_action(self, request: Any) -> int:
-        """Handle camera_action: pictures are counted; films start and stop without an effect."""
-        self._controller.gimbal.pictures += request.camera_action == TAKE_PICTURE
-        return TaskAck.OK if request.camera_action <= STOP_FILM else NO_CODE
+        """Handle camera_action: pictures are counted; films are refused, because none is simulated."""
+        if request.camera_action != TAKE_PICTURE:
+            return NO_CODE
+        self._controller.gimbal.pictures += 1
+        return TaskAck.OK
 
     def _authority(self, request: Any) -> Reply:
         wanted = bool(request.control_enable)

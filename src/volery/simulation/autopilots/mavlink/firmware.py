@@ -58,8 +58,6 @@ class ParameterPolicy(NamedTuple):
     """Whether a value outside of a list carries its own index; else 65535."""
     typed: bool = False
     """Whether a PARAM_SET with another type than the parameter's is ignored."""
-    refuses: Callable[[str], bool] = _never
-    """Whether a parameter of that name has no effect and keeps its value; a text says so."""
     reports_missing: bool = False
     """Whether PARAM_ERROR answers what asks for a parameter that does not exist or cannot have a value."""
     checksum: str = ""

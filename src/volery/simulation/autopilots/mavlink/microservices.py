@@ -221,7 +221,7 @@ class ParameterService:
             return
         value = from_bytewise(found.type, value) if self._policy.bytewise else value
         changes = isfinite(value) and quantised(found.type, value) != found.value
-        if changes and self._policy.refuses(name):
+        if changes and not self._vehicle.parameters.has_effect(name):
             self._vehicle.send_text(4, f"Param write denied ({name})")
             self._report(peer, fields, PERMISSION_DENIED)
             self._vehicle.output.parameter_changed(name)

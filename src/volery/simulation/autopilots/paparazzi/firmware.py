@@ -242,6 +242,8 @@ ROTORCRAFT = Firmware(
 ASSUMED: Mapping[str, str] = {
     "aircraft": "the stock rotorcraft: blocks, waypoints and the first six of some 85 settings, in "
     "`links/stock_rotorcraft`",
+    "settings": "`video_periodic_status` and `gps_periodic_status` keep their values: nothing follows from "
+    "them",
     "switching on": "a fix at once, attitude aligned after 0.3 s",
     "Geo init": "sets origin and home position at the vehicle; in the air it has no effect",
     "transmitter": "none; manual control by RC_UP (roll, pitch, yaw, throttle, mode) or "

@@ -128,13 +128,20 @@ def _set_telemetry_mode(vehicle: Vehicle, value: float) -> None:
 
 
 def _stored(number: int) -> Variable:
-    """Return a setting that is only stored: beyond the known numbers, or without a model."""
+    """Return what answers for a number without a setting: it is stored, as observed."""
 
     def write(vehicle: Vehicle, value: float) -> None:
         vehicle.firmware_state.stored_settings[number] = value
 
     return Variable(lambda vehicle: vehicle.firmware_state.stored_settings.get(number, 0.0), write)
 
+
+def _keep(_vehicle: Vehicle, _value: float) -> None:
+    """Leave a setting as it is."""
+
+
+WITHOUT_MODEL = Variable(lambda _vehicle: 0.0, _keep)
+"""A setting that would change nothing that is simulated: it keeps its value, and the answer says so."""
 
 VARIABLES = {
     "telemetry_mode_Main": Variable(
@@ -151,7 +158,7 @@ VARIABLES = {
 }
 """Settings by the variables of the stock rotorcraft."""
 
-NUMBERED = {one.number: VARIABLES.get(one.variable, _stored(one.number)) for one in stock_aircraft().settings}
+NUMBERED = {one.number: VARIABLES.get(one.variable, WITHOUT_MODEL) for one in stock_aircraft().settings}
 
 
 def read_setting(vehicle: Vehicle, number: int) -> float:

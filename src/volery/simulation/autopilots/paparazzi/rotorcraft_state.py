@@ -87,7 +87,7 @@ class RotorcraftState:
     telemetry_mode: int = 0
     """Setting ``telemetry_mode_Main``: 0 is the default list of periodic messages."""
     stored_settings: dict[int, float] = field(default_factory=dict)
-    """Values of settings without an effect, by number."""
+    """What was written to numbers without a setting."""
     mode_since_ns: Ns = NEVER
     """Time of the last change of mode."""
     battery_good_ns: Ns = NEVER

@@ -311,9 +311,7 @@ def copter(version: Version) -> Firmware:
         arming=ArmingTimes(spool_up=1 * S, abandoned_after=1500 * MS, landed_after=LANDED_AFTER),
         parameters=ParameterTable(copter_parameters, copter_tuning, own_parameters, COPTER_SUPPORTED),
         on_step=_on_step,
-        endpoint=partial(
-            MavlinkEndpoint, px4_mavlink(QUADROTOR, commands.COPTER_COMMANDS, COPTER_SUPPORTED, version)
-        ),
+        endpoint=partial(MavlinkEndpoint, px4_mavlink(QUADROTOR, commands.COPTER_COMMANDS, version)),
         version=version,
     )
 
@@ -457,8 +455,6 @@ def rover(version: Version) -> Firmware:
         modes=ROVER_MODES,
         parameters=ParameterTable(rover_parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
         on_step=on_step,
-        endpoint=partial(
-            MavlinkEndpoint, px4_mavlink(GROUND_ROVER, ROVER_COMMANDS, ROVER_SUPPORTED, version)
-        ),
+        endpoint=partial(MavlinkEndpoint, px4_mavlink(GROUND_ROVER, ROVER_COMMANDS, version)),
         version=version,
     )

@@ -5,7 +5,7 @@ All times are recorded.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from volery.base.time import MS, Ns, S
@@ -204,15 +204,12 @@ def _link_uses(version: Version) -> Mapping[str, Mapping[str, Ns]]:
     return {use: {**rates, "MISSION_CURRENT": version.mission_period} for use, rates in USES.items()}
 
 
-def px4_mavlink(
-    mav_type: int, commands: Mapping[int, Handler], supported: Collection[str], version: Version
-) -> MavlinkFirmware:
+def px4_mavlink(mav_type: int, commands: Mapping[int, Handler], version: Version) -> MavlinkFirmware:
     """Return the MAVLink rules of one version, for a kind of vehicle.
 
     Args:
         mav_type: MAV_TYPE.
         commands: Its commands.
-        supported: Parameters that change what it does: the others cannot be changed.
         version: The version.
     """
     return MavlinkFirmware(
@@ -256,7 +253,7 @@ def px4_mavlink(
             list_id=telemetry.list_id if version.plan_ids else None,
             item_refused=mission.report_refused_item,
         ),
-        parameters=PARAMETERS._replace(refuses=lambda name: name not in supported),
+        parameters=PARAMETERS,
         texts=TEXTS,
         logs=LogPolicy(ulog.encode, first=0, while_armed=True),
         files=files.FILES,

@@ -12,7 +12,7 @@ from volery.base.frames import LocalFrame
 from volery.base.time import MS, S
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.ros.graph import EmbeddedGraph
+from volery.ros.graph import EmbeddedGraph, ServiceError
 from volery.ros.messages import new, request
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.dji import FIRMWARE
@@ -79,6 +79,18 @@ class Apron:
         full = f"/d{name}" if name.startswith("/") else f"/d/{self.package}/{name}"
         asked = request(f"{self.package}/srv/{kind}", **fields)
         return self.node.client(full, f"{self.package}/srv/{kind}").call(asked, within=120 * S)
+
+    def asked(self, name: str, kind: str, value: int) -> bool:
+        """Whether a request with that number in all of its fields is accepted."""
+        wanted = request(kind)
+        for field in wanted.__match_args__:
+            if isinstance(getattr(wanted, field), bool | int | float):
+                setattr(wanted, field, type(getattr(wanted, field))(value))
+        try:
+            response = self.node.client(name, kind).call(wanted, within=120 * S)
+        except ServiceError:
+            return False
+        return bool(getattr(response, "result", False))
 
     def task(self, number: int) -> bool:
         return bool(self.call("drone_task_control", "DroneTaskControl", task=number).result)

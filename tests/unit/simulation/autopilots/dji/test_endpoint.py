@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from math import cos, hypot, pi, radians
 from typing import Any
 
 import pytest
 
+from rigs.effects import fingerprint
 from volery.base.errors import UsageError
 from volery.base.time import S
 from volery.kernel.task import ExecutionContext
@@ -727,3 +728,36 @@ def test_where_it_may_join_a_graph(apron: Make) -> None:
         other.autopilot.join(other.graph, "/d/mavros", ExecutionContext("d"))
     with pytest.raises(UsageError, match="over a graph"):
         yard.autopilot.connect(None)
+
+
+ACCEPTED_WITHOUT_EFFECT: dict[str, set[str]] = {
+    "dji_sdk": {"sdk_control_authority"},  # released where none is held; it is not activated
+    "dji_osdk_ros": {
+        "joystick_action",  # sent to an aircraft with its motors off
+        "kill_switch",  # the motors are off
+        "set_joystick_mode",  # kept by the node for the next set-point
+    },
+}
+
+
+def answers(craft: Any, name: str, kind: str) -> Iterator[tuple[bool, bool]]:
+    """Whether a request is accepted and changes something, with all of its numbers 0, 1, 4 and 100."""
+    craft.wait(0.5)
+    vehicle = craft.autopilot.vehicle
+    for value in (0, 1, 4, 100):
+        before = fingerprint(vehicle), vehicle.parameters.changes
+        accepted = craft.asked(name, kind, value)
+        yield accepted, (fingerprint(vehicle), vehicle.parameters.changes) != before
+
+
+@pytest.mark.parametrize("package", ["dji_sdk", "dji_osdk_ros"])
+def test_a_service_without_effect_is_refused(package: str, apron: Make) -> None:
+    """Of an aircraft that has just been switched on."""
+    without = set()
+    for name, kind, _ in apron(package).graph.services():
+        craft, found = apron(package), list[tuple[bool, bool]]()
+        craft.run(lambda: found.extend(answers(craft, name, kind)))  # noqa: B023 - runs at once
+        acting = [changes for accepted, changes in found if accepted]
+        if acting and not any(acting):
+            without.add(name.rpartition("/")[2])
+    assert without == ACCEPTED_WITHOUT_EFFECT[package]

@@ -8,10 +8,12 @@ from typing import Any
 
 import pytest
 
+from rigs.effects import fingerprint
 from volery.base.frames import LocalFrame, ecef_to_geodetic
 from volery.base.time import S
 from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.links.pprzlink_codec import PPRZLINK
+from volery.simulation.autopilots.paparazzi.parameters import read_setting
 from volery.simulation.world.body_specs import Battery
 
 Make = Callable[..., Any]
@@ -126,6 +128,20 @@ def test_settings_are_read_and_written_by_number(craft: Any) -> None:
     answers = [frame.fields for frame in craft.received if frame.name == "DL_VALUE"]
     assert [one["value"] for one in answers if one["index"] == 200] == [1.0, 1.0]  # recorded: answered, too
     assert [one["value"] for one in answers if one["index"] == auto2] == [19.0]
+
+
+def test_a_setting_without_effect_keeps_its_value(craft: Any) -> None:
+    """All of the stock rotorcraft, each set to another value."""
+    vehicle, kept = craft.autopilot.vehicle, set()
+    for setting in stock_aircraft().settings:
+        now = read_setting(vehicle, setting.number)
+        before = fingerprint(vehicle), vehicle.parameters.changes
+        craft.send("SETTING", index=setting.number, value=setting.high if now == setting.low else setting.low)
+        craft.run(0.05)
+        if read_setting(vehicle, setting.number) == now:
+            kept.add(setting.name)
+        assert (fingerprint(vehicle), vehicle.parameters.changes) != before, setting.name  # it has heard it
+    assert kept == {"video_periodic_status", "gps_periodic_status"}
 
 
 def test_settings_are_numbered_as_generated_for_the_stock_aircraft() -> None:
