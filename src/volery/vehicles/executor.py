@@ -40,6 +40,9 @@ LINK_TIMEOUT: Ns = 5 * S
 MONITOR_PERIOD: Ns = 200 * MS
 """Shortest time between two checks of an operation, which are made at telemetry messages."""
 
+TAKES_BACK = "resume() takes the vehicle back, land() lands it"
+"""The remedy for a failsafe that an order of safety may end."""
+
 Check = Callable[[str, Ns], VehicleError | None]
 """``check(operation, now)`` runs each ``MONITOR_PERIOD`` and returns an error to end the step."""
 
@@ -236,18 +239,18 @@ class StepExecutor:
                 self._driver.name,
                 asked,
                 f"{telemetry.stream_lost}: the autopilot is in {telemetry.mode} (status {telemetry.status})"
-                f"{self.last_text()}; resume() takes the vehicle back, land() lands it",
+                f"{self.last_text()}; {TAKES_BACK}",
             )
         if ours:
             return
         self.release_control()
         cause = failsafe_cause(telemetry, self._kernel.now())
+        hand_over = f"to hand it over, switch the vehicle to {self._driver.offboard_mode}"
         raise (Failsafe if cause else Overridden)(
             self._driver.name,
             asked,
             f"is in {telemetry.mode} (status {telemetry.status}), which this program did not command"
-            f"{_because(cause)}{self.last_text()}; "
-            f"to hand it over, switch the vehicle to {self._driver.offboard_mode}",
+            f"{_because(cause)}{self.last_text()}; {TAKES_BACK if telemetry.failsafe_lasts else hand_over}",
         )
 
     def take_back(self) -> bool:

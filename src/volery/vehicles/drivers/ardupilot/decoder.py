@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from volery.kernel.api import Kernel
-from volery.vehicles.drivers.ardupilot.modes import RESTING, mode_name
+from volery.vehicles.drivers.ardupilot.modes import RESTING, STOPPED, mode_name
 from volery.vehicles.drivers.mavlink.decoder import Fields, TelemetryDecoder
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Telemetry
@@ -31,6 +31,12 @@ class ArduPilotDecoder(TelemetryDecoder):
         if self._telemetry.kind == DRONE_KIND:
             self._telemetry.above_home = fields["relative_alt"] / 1000.0
         self._heading(fields["hdg"])
+
+    def _heartbeat(self, fields: Fields) -> None:
+        """Decode a heartbeat. A failsafe that stopped it hovers until it is told to do something else."""
+        super()._heartbeat(fields)
+        seen = self._telemetry
+        seen.failsafe_lasts = seen.mode == STOPPED and (seen.failsafe or seen.failsafe_lasts)
 
     def _mode_name(self, number: int) -> str:
         return mode_name(self._telemetry.kind, number)

@@ -17,6 +17,8 @@ from volery.vehicles.drivers.steps import DRONE_KIND, ROVER_KIND
 GUIDED = "GUIDED"
 RESTING = "HOLD"
 """Mode in which an armed rover stands."""
+STOPPED = "BRAKE"
+"""Mode in which a copter stands that a failsafe has stopped; no pilot steers it there."""
 
 COPTER: Mapping[int, str] = {
     0: "STABILIZE",
@@ -33,7 +35,7 @@ COPTER: Mapping[int, str] = {
     14: "FLIP",
     15: "AUTOTUNE",
     16: "POSHOLD",
-    17: "BRAKE",
+    17: STOPPED,
     18: "THROW",
     19: "AVOID_ADSB",
     20: "GUIDED_NOGPS",

@@ -131,7 +131,8 @@ class PX4(MavlinkDriver):
         """Wait until ready; on the ground in Hold, because the arming checks are those of the mode."""
         seen = self.telemetry
         wait = super().ready(within)
-        if seen.armed or seen.ready or seen.mode.startswith("AUTO."):
+        arms = seen.mode.startswith("AUTO.") and seen.mode not in modes.NEVER_ARMED_IN
+        if seen.armed or seen.ready or arms:
             return wait
         return (self._change_mode(HOLD), *wait)
 

@@ -64,6 +64,9 @@ MANUAL_MODES = frozenset(
 )
 """Modes that are flown by manual control."""
 
+NEVER_ARMED_IN = frozenset({RTL, LAND, "AUTO.FOLLOW_TARGET", "AUTO.PRECLAND"})
+"""Automatic modes in which it does not arm (mode_req_prevent_arming in ModeUtil/mode_requirements.cpp)."""
+
 _NAMES = {mode.number: name for name, mode in MODES.items()}
 
 

@@ -269,6 +269,38 @@ def test_a_failsafe_is_distinguished_and_quoted(bench: Make) -> None:
     at.fly(mission)
 
 
+def test_a_failsafe_that_stopped_it_is_ended_by_an_order_of_safety(bench: Make) -> None:
+    """As FS_GCS_ENABLE 7 does; ``land`` was refused on 4.8, and nothing else would have ended the hover."""
+    at = bench()
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        at.craft.status = 5
+        at.autopilot.enter("BRAKE")
+        sleep(at.kernel, S)
+        with pytest.raises(Failsafe, match="is in BRAKE"):
+            drone.goto(NEAR)
+        at.craft.status = 4  # the ground station is back
+        sleep(at.kernel, 2 * S)
+        drone.land()
+
+    at.fly(mission)
+    assert (at.craft.mode, at.craft.armed) == ("LAND", False)
+
+
+def test_brake_of_another_station_is_no_failsafe(bench: Make) -> None:
+    at = bench()
+
+    def mission(drone: Any) -> None:
+        drone.takeoff(10)
+        at.autopilot.enter("BRAKE")
+        sleep(at.kernel, S)
+        with pytest.raises(Overridden, match="is in BRAKE"):
+            drone.land()
+
+    at.fly(mission)
+
+
 def test_guided_is_not_commanded_over_a_failsafe_that_took_our_own_mode(bench: Make) -> None:
     at = bench()
 

@@ -155,9 +155,10 @@ def test_it_waits_for_the_estimator(bench: Make) -> None:
     assert at.kernel.now() > 42 * S
 
 
-def test_on_the_ground_it_is_put_into_hold_to_become_ready(bench: Make) -> None:
+@pytest.mark.parametrize("left", [OFFBOARD, LAND])
+def test_on_the_ground_it_is_put_into_hold_to_become_ready(bench: Make, left: str) -> None:
     at = bench()
-    at.craft.mode = OFFBOARD  # where a flight in OFFBOARD leaves it
+    at.craft.mode = left  # where a flight in OFFBOARD, or an order to land on the ground, leaves it
     at.fly(lambda drone: drone.wait_ready())
     assert at.craft.mode == HOLD
 
