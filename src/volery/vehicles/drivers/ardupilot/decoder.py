@@ -33,7 +33,7 @@ class ArduPilotDecoder(TelemetryDecoder):
         self._heading(fields["hdg"])
 
     def _heartbeat(self, fields: Fields) -> None:
-        """Decode a heartbeat. A failsafe that stopped it hovers until it is told to do something else."""
+        """Decode a heartbeat. A failsafe that stopped it keeps it hovering until another command comes."""
         super()._heartbeat(fields)
         seen = self._telemetry
         seen.failsafe_lasts = seen.mode == STOPPED and (seen.failsafe or seen.failsafe_lasts)
