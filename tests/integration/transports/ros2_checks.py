@@ -7,6 +7,7 @@ import os
 import resource
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -199,6 +200,18 @@ def a_thousand_topics(site: Site, texts: list[str]) -> None:
     site.spin_until(listener, lambda: len(heard) == 500, "all are heard")
 
 
+def a_node_that_cannot_be_destroyed(site: Site, texts: list[str]) -> None:
+    """Whatever rclpy waits for in it, our node has left, and others come and go."""
+    node, goes_on = site.node("stuck"), threading.Event()
+    of_rclpy: Any = node.library._node  # type: ignore[attr-defined]
+    destroy = of_rclpy.destroy_node
+    of_rclpy.destroy_node = lambda: goes_on.wait() and destroy()
+    node.close()
+    demand(node.closed, "it is closed")
+    site.node("next").close()
+    goes_on.set()
+
+
 FAULTS = (
     a_type_without_support,
     a_type_with_other_fields,
@@ -208,6 +221,7 @@ FAULTS = (
     a_subscriber_that_never_reads,
     another_type_on_our_topic,
     a_thousand_topics,
+    a_node_that_cannot_be_destroyed,
 )
 
 

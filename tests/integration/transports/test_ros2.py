@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
@@ -28,9 +27,9 @@ FAULTS = (
     "fault-a-subscriber-that-never-reads",
     "fault-another-type-on-our-topic",
     "fault-a-thousand-topics",
+    "fault-a-node-that-cannot-be-destroyed",
     "the-end",
 )
-_DOMAINS = iter(range(20 + os.getpid() % 180, 230))
 
 
 @cache
@@ -38,7 +37,7 @@ def findings(distribution: str) -> dict[str, str]:
     """What the checks have found, by their names."""
     done = subprocess.run(
         [python_of(distribution), str(HERE / "ros2_checks.py")],
-        env=surroundings(next(_DOMAINS)),
+        env=surroundings(),
         capture_output=True,
         text=True,
         timeout=200,
@@ -56,11 +55,11 @@ def test_ros2(distribution: str, check: str) -> None:
 
 
 @contextmanager
-def our_node(distribution: str, domain: int) -> Iterator[list[str]]:
+def our_node(distribution: str, around: Mapping[str, str]) -> Iterator[list[str]]:
     """Our node in a process of its own; gives the types that it takes."""
     process = subprocess.Popen(
         [python_of(distribution), str(HERE / "ros2_ours.py")],
-        env=surroundings(domain),
+        env=around,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -83,11 +82,11 @@ def our_node(distribution: str, domain: int) -> Iterator[list[str]]:
 
 @pytest.mark.parametrize(("ours", "theirs"), [("jazzy", "jazzy"), ("kilted", "kilted"), ("jazzy", "kilted")])
 def test_plain_rclpy_exchanges_all_types_with_us(ours: str, theirs: str) -> None:
-    domain = next(_DOMAINS)
-    with our_node(ours, domain) as names:
+    around = surroundings()
+    with our_node(ours, around) as names:
         done = subprocess.run(
             [python_of(theirs), str(HERE / "rclpy_peer.py"), *names],
-            env=surroundings(domain),
+            env=around,
             capture_output=True,
             text=True,
             timeout=120,

@@ -33,8 +33,11 @@ from volery.run.ending import Ending
 if TYPE_CHECKING:
     from volery.run.assembly.simulated_fleet import SimulatedFleet
 
-JOIN_WITHIN_S, EXIT_WITHIN_S, POLL_S = 60.0, 5.0, 0.05
-"""Wall seconds: deadlines for joining the graph and for leaving, and the period of polling."""
+JOIN_WITHIN_S, EXIT_WITHIN_S, POLL_S = 180.0, 5.0, 0.05
+"""Wall seconds: deadlines for joining the graph and for leaving, and the period of polling.
+
+Nine components that start at once on two busy cores take more than a minute to join.
+"""
 STDERR = 2
 """Components print to standard error: a program may read the standard output of the run."""
 

@@ -38,6 +38,7 @@ DISCOVERY_S = 0.6
 DISCOVERY_LIMIT_S = 5.0
 """Longest wait for the nodes of endpoints that are known already; DDS repeats announcements every 3 s."""
 GOODBYE_S = 2.0
+"""Longest wait for rclpy to stop spinning, or to destroy a part of it, s."""
 WATCH_S = 1.0
 """Period of looking for topics that carry several types, s."""
 NOT_KNOWN_YET = "_NODE_NAME_UNKNOWN_"
@@ -214,9 +215,26 @@ class Ros2Library:
     def remove(self, node: Any) -> None:
         """Remove a node from the graph."""
         self._left.add(join_names(node.get_namespace(), node.get_name()))
-        self._executor.remove_node(node)
-        with suppress(Exception):  # rclpy's wait may still use it; the node is removed either way
+
+        def leave() -> None:
+            self._executor.remove_node(node)
             node.destroy_node()
+
+        self._leave(leave)
+
+    def _leave(self, act: Callable[[], None]) -> None:
+        """Run what destroys a part of rclpy, and go on after ``GOODBYE_S``: it can wait for ever.
+
+        Its errors are dropped, since rclpy's wait may still use the part; it is not used any more either way.
+        """
+
+        def run() -> None:
+            with suppress(Exception):
+                act()
+
+        leaving = threading.Thread(target=run, name="leaving", daemon=True)
+        leaving.start()
+        leaving.join(GOODBYE_S)
 
     def _wait_for_discovery(self) -> None:
         """Wait until the nodes that exist at the start of this process have been discovered.
@@ -275,10 +293,15 @@ class Ros2Library:
         self._over.set()
         self._executor.wake()
         self._thread.join(GOODBYE_S)
-        with suppress(Exception):
-            self._own.destroy_node()
-            self._executor.shutdown(timeout_sec=0)
-        self._rclpy.shutdown(context=self._context)
+
+        def leave() -> None:
+            try:
+                self._own.destroy_node()
+                self._executor.shutdown(timeout_sec=0)
+            finally:
+                self._rclpy.shutdown(context=self._context)
+
+        self._leave(leave)
 
 
 def _users(ends: list[Any]) -> tuple[str, ...]:
