@@ -122,8 +122,7 @@ class Ros2Subscription:
 
     def _adapt(self) -> None:
         with self._guard:
-            fitting = self._fitting()
-            if self._open and fitting != self._now:
+            if self._open and (fitting := self._fitting()) != self._now:
                 self._now = fitting
                 self._node.destroy_subscription(self._subscription)
                 self._repeated = self._latest
