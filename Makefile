@@ -7,6 +7,9 @@ LOOSE := $(addprefix --disable-error-code ,misc no-untyped-call import-untyped i
 ROS2 := $(VENV)/ros2-jazzy.stamp $(VENV)/ros2-kilted.stamp
 PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 
+# where it is set, as in many containers, each of the hundreds of programs that tests start compiles all its modules
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test check bench docs wheel clean
 .DEFAULT_GOAL := demo
 
@@ -16,17 +19,38 @@ demo: $(VENV)/volery.stamp ## parcels across a city, two allocations side by sid
 test: $(VENV)/test.stamp ## all tests, against real sockets, clients and a browser
 	@status=0; \
 	$(BIN)/pytest -n auto --dist worksteal --durations=5 -m "not integration" || status=1; \
-	$(BIN)/pytest -n 4 --dist loadfile --no-loadscope-reorder --durations=5 -m integration --ignore tests/integration/transports || status=1; \
-	$(BIN)/pytest --durations=5 tests/integration/transports || status=1; \
+	echo "real ROS, of whose time most is waiting, beside the other integration tests; its result comes last"; \
+	$(BIN)/pytest --durations=5 tests/integration/transports >$(VENV)/transports.log 2>&1 & transports=$$!; \
+	$(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=5 -m integration tests/integration \
+		--ignore tests/integration/transports || status=1; \
+	wait $$transports || status=1; \
+	cat $(VENV)/transports.log; \
 	exit $$status
 
-check: $(VENV)/dev.stamp ## style, types, layers, circles, words, and whether generated pages are up to date
+CHECKS := check-style check-types check-types-of-scripts check-layers check-words check-pages
+
+check: $(CHECKS) ## style, types, layers, circles, words, and whether generated pages are up to date
+
+.PHONY: $(CHECKS)
+$(CHECKS): $(VENV)/dev.stamp
+
+check-style:
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+check-types:
 	$(BIN)/mypy
-	$(BIN)/mypy $(LOOSE) bench/*.py scripts/*.py
+
+check-types-of-scripts: # with a cache of its own: other options make mypy check everything anew
+	$(BIN)/mypy --cache-dir .mypy_cache/scripts $(LOOSE) bench/*.py scripts/*.py
+
+check-layers:
 	PYTHONPATH=src $(BIN)/lint-imports
+
+check-words:
 	$(BIN)/python scripts/check_sources.py
+
+check-pages:
 	$(BIN)/python scripts/generate_docs.py --check
 
 bench: $(VENV)/bench.stamp ## every figure that the README and the docs claim

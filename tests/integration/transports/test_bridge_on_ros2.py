@@ -12,9 +12,8 @@ from typing import Any
 
 import pytest
 
-from .conftest import HERE
+from .conftest import HERE, python_of, surroundings
 from .test_dji_on_ros1 import COMMAND
-from .test_ros2 import _DOMAINS, python_of, surroundings
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(240)]
 
@@ -24,7 +23,7 @@ Beside = Callable[..., dict[str, Any]]
 @pytest.fixture
 def beside() -> Iterator[Beside]:
     """Starts a bridge with these options; runs a script beside it and gives what it printed."""
-    python, around = python_of("jazzy"), surroundings(next(_DOMAINS))
+    python, around = python_of("jazzy"), surroundings()
     started: list[subprocess.Popen[str]] = []
 
     def run(script: str, argument: str, *options: str) -> dict[str, Any]:

@@ -173,7 +173,7 @@ def test_hosts_compile_components_in_cpp_and_they_call_each_other(tmp_path: Path
 def test_pip_installs_it_and_the_entry_points_deliver_the_parcel_on_ros_2(tmp_path: Path) -> None:
     """`ros2 launch` cannot be had from PyPI: what the launch files name is started here one by one."""
     made = deployed(tmp_path / "src", 2)
-    with started_on_ros_2(made, tmp_path, 23) as (installed, env, started):
+    with started_on_ros_2(made, tmp_path) as (installed, env, started):
         assert len(started) == 9
         said = run([str(installed / "bin" / "world"), *SETTINGS, "--out", "out"], env, tmp_path)
         assert_all_end(started)
@@ -182,15 +182,17 @@ def test_pip_installs_it_and_the_entry_points_deliver_the_parcel_on_ros_2(tmp_pa
 
 @contextmanager
 def started_on_ros_2(
-    made: Deployment, folder: Path, domain: int
+    made: Deployment, folder: Path
 ) -> Iterator[tuple[Path, dict[str, str], list[subprocess.Popen[str]]]]:
     """The packages installed, with the environment for their programs, and the components of a simulation."""
     python, installed = python_of("jazzy"), folder / "installed"
     packages = [str(made.folder / one) for one in (*made.packages.values(), made.verification)]
     pip = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check", "--no-deps"]
-    run([*pip, "--prefix", str(installed), *packages], os.environ, folder)
+    tools = {**os.environ, "PYTHONPATH": str(folder / "tools")}  # once, not for each package
+    run([*pip, "--target", tools["PYTHONPATH"], "setuptools>=70.1"], os.environ, folder)
+    run([*pip, "--no-build-isolation", "--prefix", str(installed), *packages], tools, folder)
     [site] = installed.glob("lib/python*/site-packages")
-    env = {**surroundings(domain), "PYTHONPATH": str(site), "PYTHONFAULTHANDLER": "1"}
+    env = {**surroundings(), "PYTHONPATH": str(site), "PYTHONFAULTHANDLER": "1"}
     started: list[subprocess.Popen[str]] = []
     try:
         for package in made.packages.values():
@@ -201,7 +203,9 @@ def started_on_ros_2(
     finally:
         for process in started:
             process.kill()
-            process.communicate()
+            process.wait()
+            assert process.stderr is not None
+            process.stderr.close()  # it may have been read to its end
 
 
 def assert_all_end(started: list[subprocess.Popen[str]]) -> None:
@@ -292,7 +296,7 @@ def killed_after(seconds: float, process: subprocess.Popen[str]) -> Iterator[Non
 
 def test_components_end_when_their_run_was_killed(tmp_path: Path) -> None:
     made = deploy(load(pair(tmp_path / "model"), vocabulary()), tmp_path / "src", 2)
-    with started_on_ros_2(made, tmp_path, 24) as (installed, env, started):
+    with started_on_ros_2(made, tmp_path) as (installed, env, started):
         command = [installed / "bin" / "world", "--out", "out"]
         world = subprocess.Popen(command, env=env, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
         try:

@@ -139,7 +139,7 @@ def test_the_pocket_scenario_delivers_on_a_roscore_that_is_started_for_it(tmp_pa
 
 
 def test_the_pocket_scenario_delivers_on_ros_2(tmp_path: Path) -> None:
-    record = deliver(python_of("jazzy"), tmp_path / "out", "ros2", surroundings(19))
+    record = deliver(python_of("jazzy"), tmp_path / "out", "ros2", surroundings())
     assert_delivered(record, tmp_path / "out")
 
 

@@ -164,7 +164,7 @@ def test_what_is_latched_is_played_and_recorded_as_such(
     path, again = tmp_path / "latched.bag", tmp_path / "again.bag"
     with create_bag(path) as made:
         made.write("/plan", 0, new(STRING, data="once"), Offer(True, "/planner"))
-        made.write("/tick", 30 * S, new(STRING, data="on"), Offer(False, "/planner"))
+        made.write("/tick", 300 * S, new(STRING, data="on"), Offer(False, "/planner"))
     start(*VOLERY, "bag", "play", str(path), "--quiet")
     assert 'data: "once"' in ros("rostopic", "echo", "-n1", "/plan")
     told = volery("bag", "record", again, "--topic", "/plan", "--seconds", "5")
