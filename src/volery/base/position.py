@@ -7,9 +7,11 @@ converts into another without the reference that the conversion needs.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 
 from volery.base.errors import UsageError
+
+LARGEST_ALTITUDE = 1e9
+"""Metres above which an altitude, up or down, is taken for a mistake."""
 
 
 @dataclass(frozen=True)
@@ -19,14 +21,15 @@ class _Altitude:
     def __init__(self, metres: float) -> None:
         """Store the value without dataclass overhead: one is created for most messages of a vehicle."""
         try:
-            finite = isfinite(metres)
+            sensible = -LARGEST_ALTITUDE <= metres <= LARGEST_ALTITUDE
         except TypeError:
             kind = type(self).__name__
             raise UsageError(
                 f"{kind}({metres!r}): an altitude is a number of metres, as in {kind}(10)"
             ) from None
-        if not finite:
-            raise UsageError(f"an altitude of {metres} m is not finite")
+        if not sensible:
+            stated = metres if isinstance(metres, float) else "so many"
+            raise UsageError(f"an altitude of {stated} m: it is at most {LARGEST_ALTITUDE:g} m up or down")
         self.__dict__["metres"] = metres
 
     def __str__(self) -> str:

@@ -201,6 +201,8 @@ class MavlinkParser:
             if not self._accepts(raw, header.kind.name, header.system, header.component):
                 statistics.refused += 1
                 return header.length
+        elif header.trailer > CHECKSUM.size:
+            statistics.signed += 1
         if header.version_1:
             statistics.frames_v1 += 1
         else:

@@ -145,9 +145,10 @@ class Plan:
 
 def _check_item(item: Item, number: int) -> None:
     """Refuse an item that MAVLink cannot carry, or that has a place and no altitude."""
-    what = f"item {number} (command {item.command})"
     if not (0 <= item.command <= _LARGEST_COMMAND and 0 <= item.frame <= _LARGEST_FRAME):
-        raise UsageError(f"{what}, frame {item.frame}: MAVLink has no such command or frame")
+        stated = f"command {item.command:.9g}, frame {item.frame:.9g}"
+        raise UsageError(f"item {number} ({stated}): MAVLink has no such command or frame")
+    what = f"item {number} (command {item.command})"
     scale = item_scale(item.command, item.frame)
     for place, value in ((5, item.latitude), (6, item.longitude)):
         if not isfinite(value) or (scale == 1 and value != round(value)):

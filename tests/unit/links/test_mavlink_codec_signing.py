@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from volery.base.errors import UsageError
 from volery.links.frame import Frame
-from volery.links.mavlink_codec import SignedMavlink, encode, read_key
+from volery.links.mavlink_codec import MavlinkParser, SignedMavlink, encode, read_key
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.vehicles.address import listen, parse_listen
 
@@ -141,3 +141,10 @@ def test_no_change_of_a_signed_frame_passes_and_the_next_one_is_received(data: s
 @given(st.binary(max_size=300), st.binary(min_size=32, max_size=32).filter(lambda key: key != KEY))
 def test_nothing_that_was_signed_under_another_key_passes(junk: bytes, key: bytes) -> None:
     assert names(SignedMavlink(KEY), junk, SignedMavlink(key).encode(AWAY, 1), encode(AWAY, 2)) == []
+
+
+def test_a_link_without_a_key_counts_signed_frames() -> None:
+    parser = MavlinkParser()
+    raw = SignedMavlink(KEY).encode(BEAT, 7)
+    assert [frame.name for frame in parser.feed(raw + encode(BEAT, 8))] == ["HEARTBEAT"] * 2
+    assert (parser.statistics.signed, parser.statistics.frames) == (1, 2)

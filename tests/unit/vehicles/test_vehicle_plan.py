@@ -57,6 +57,7 @@ UP = entry(TAKEOFF, 0, 0, 0, None, *PLACE)
          f'"frame": 3, "params": [1{"0" * 400},0,0,null,46.0,-103.0,10]}}]}}}}', "OverflowError"),
         (document(entry(DIGICAM, *NONE, 1.5, 0, 0)), "parameter 5 = 1.5; MAVLink carries whole numbers"),
         (document(entry(70_000, *NONE, 0, 0, 0)), "MAVLink has no such command or frame"),
+        (document(entry(1e308, *NONE, 0, 0, 0)), r"item 1 \(command 1e\+308, frame 3\): MAVLink has no such"),
         (document(UP, entry(JUMP, 9, 1, 0, 0, 0, 0, 0, frame=2, doJumpId=2)), "jumps to doJumpId 9"),
         (document(entry(WAYPOINT, *NONE, 128.0, 0.0, 5.0)), "latitude 128.0 is off the globe"),
         ("QGC WPL 110\n0\t1\t0\t16\n", "line 2: '0\\\\t1\\\\t0\\\\t16' is no item"),

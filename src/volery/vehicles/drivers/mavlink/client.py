@@ -16,7 +16,7 @@ from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSile
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.links.frame import Frame
-from volery.links.link import Link, SelectiveLink
+from volery.links.link import Link, ReceiveStatistics, SelectiveLink
 from volery.links.mavlink_messages import constant, entry_name, from_bytewise, message_type
 from volery.trace.events import LinkState, Text
 from volery.vehicles.address import rate_option, records_texts, system_option
@@ -280,6 +280,7 @@ class MavlinkClient:
             parameter_rules=self.firmware.parameter_rules,
             sender=(GCS_SYSTEM, GCS_COMPONENT),
         )
+        self.services.cause = self._unsigned
         link.receive(self._receive)
         if isinstance(link, SelectiveLink):
             link.select(self._uses)
@@ -438,6 +439,13 @@ class MavlinkClient:
             self._silent = True
             detail = self._link.problem() or "the autopilot is not received"
             self._kernel.record(LinkState(now, self.telemetry.name, "silent", detail))
+
+    def _unsigned(self) -> str:
+        """Return that the vehicle signs its messages and ignores ours, if so."""
+        statistics = getattr(self._link, "statistics", None)
+        if not isinstance(statistics, ReceiveStatistics) or not statistics.signed:
+            return ""
+        return "it signs its messages, and ignores those that are not signed: state the key, ?signing=FILE"
 
     def problem(self) -> LinkError | CapabilityError | None:
         """Return what is wrong with the link, or why the vehicle is not supported, as an error to raise."""

@@ -33,9 +33,13 @@ class PendingRequests:
     Args:
         kernel: clock and tasks.
         name: name of the vehicle, for errors.
+
+    Attributes:
+        cause: returns what a missing answer is due to, if that is known.
     """
 
     def __init__(self, kernel: Kernel, name: str) -> None:
+        self.cause: Callable[[], str] = str
         self._kernel = kernel
         self._name = name
         self._listeners: list[Callable[[Frame], None]] = []
@@ -100,7 +104,12 @@ class PendingRequests:
                     if failed:
                         raise failed[0]
                     return found[0]
-        raise NotArrived(self._name, asked, f"no answer within {within / S:g} s{unanswered}")
+        raise NotArrived(self._name, asked, self._unanswered(within, unanswered))
+
+    def _unanswered(self, within: Ns, otherwise: str = "") -> str:
+        """Return that no answer came, and why: the cause that is known, or what it may mean *otherwise*."""
+        cause = self.cause()
+        return f"no answer within {within / S:g} s{f'; {cause}' if cause else otherwise}"
 
     def gather(
         self,
@@ -137,7 +146,7 @@ class PendingRequests:
                     continue
                 stalled += 1
                 if stalled > TRIES:
-                    raise NotArrived(self._name, asked, so_far())
+                    raise NotArrived(self._name, asked, "; ".join(filter(None, (so_far(), self.cause()))))
                 if not whole():
                     with self._kernel:
                         send()

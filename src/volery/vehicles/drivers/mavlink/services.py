@@ -164,9 +164,7 @@ class MavlinkServices(PendingRequests):
                 raise self._missing(name)
             found = self._ask_parameter(name, AGAIN * TRIES)
         if found is None:
-            raise NotArrived(
-                self._name, f"read the parameter {name}", f"no answer within {AGAIN * TRIES / S:g} s"
-            )
+            raise NotArrived(self._name, f"read the parameter {name}", self._unanswered(AGAIN * TRIES))
         return found
 
     def _ask_parameter(self, name: str, within: Ns) -> Parameter | None:
