@@ -80,7 +80,7 @@ class ReceiveStatistics:
     refused: int = 0
     """Frames whose signature is missing, wrong or replayed, on a signed link."""
     signed: int = 0
-    """Signed frames on a link without a key: whoever sends them ignores what is not signed."""
+    """Signed frames on a link without a key; their sender ignores what is not signed."""
     corrupt: int = 0
     text: int = 0
     garbage: int = 0
