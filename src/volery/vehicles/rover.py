@@ -22,6 +22,14 @@ class Rover(Vehicle):
         north, east, _ = self.velocity
         return north * north + east * east > 0.01
 
+    def arm(self) -> None:
+        """Arm in the present mode, which counts as commanded by this program then.
+
+        An armed rover counts as driving; in a pilot's mode, such as MANUAL, what follows would be refused.
+        """
+        super().arm()
+        self._executor.set_commanded(self._driver.telemetry.mode)
+
     def drive(self, goal: Position | tuple[float, float], speed: float | None = None) -> None:
         """Wait until ready, arm if disarmed, drive straight to *goal* and stop there.
 

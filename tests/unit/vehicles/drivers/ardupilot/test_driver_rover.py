@@ -67,6 +67,21 @@ def test_driving_by_hand_uses_steering_and_throttle_only(bench: Make) -> None:
         at.fly(lambda rover: rover.manual_control(3, 0))
 
 
+def test_what_it_armed_itself_it_may_drive(bench: Make) -> None:
+    """ArduRover arms in MANUAL, in which an armed rover counts as driving."""
+    at = bench(Rover)
+
+    def mission(rover: Any) -> None:
+        rover.wait_ready()
+        at.autopilot.enter("MANUAL")
+        sleep(at.kernel, 2 * S)
+        rover.arm()
+        sleep(at.kernel, 2 * S)
+        rover.drive(NEAR)
+
+    at.fly(mission)
+
+
 def test_a_driver_who_takes_over_is_not_fought(bench: Make) -> None:
     at = bench(Rover)
 
