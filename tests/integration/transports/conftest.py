@@ -88,7 +88,7 @@ class Ours(NamedTuple):
         self.graph.kernel.spawn(node.spin, f"spins {name}", ExecutionContext(name))
         return node
 
-    def until(self, holds: Callable[[], object], what: str, within: int = 20 * S) -> None:
+    def until(self, holds: Callable[[], object], what: str, within: int = 60 * S) -> None:
         kernel = self.graph.kernel
         end = kernel.now() + within
         while not holds():

@@ -17,7 +17,7 @@ from volery.ros.messages import message_class, new
 from volery.ros.messages.bags import create_bag, open_bag
 from volery.ros.messages.containers import Offer
 
-from .conftest import HERE, Ours, Run, Start
+from .conftest import HERE, LIMIT_S, Ours, Run, Start
 
 pytestmark = pytest.mark.integration
 
@@ -137,7 +137,7 @@ def test_our_record_of_rospys_talker(
 def test_the_graph_of_a_roscore(roscore: Any, start: Start, volery: Volery, tmp_path: Path) -> None:
     start(*LISTENER, "_listeners:=0")
     start(*TALKER, "__name:=talker", "_listeners:=1")
-    end = time.monotonic() + 20
+    end = time.monotonic() + LIMIT_S
     picture: dict[str, Any] = {"topics": []}
     while not any(one["name"] == "/heard" and one["rate"] for one in picture["topics"]):
         assert time.monotonic() < end, picture
