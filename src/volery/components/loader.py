@@ -1,29 +1,38 @@
-"""Import of a component's file and of the modules beside it, for one run.
+"""Import of a component's file and of the modules that it imports, for one run.
 
 Files are executed as they are, with three differences that the file cannot see. Modules that depend on the
 run (``time``, ``random``, ``queue``, ``threading``, ``rospy`` and so on) are replaced, for these files only.
-Modules beside the component's file are loaded in the same way. Where code is counted, counters are compiled
-in. Nothing global is changed: patching ``sys.modules`` would affect the simulation itself.
+Modules of components are loaded in the same way. Where code is counted, counters are compiled in. Nothing
+global is changed: patching ``sys.modules`` would affect the simulation itself.
 
-Each instance executes its own copy of the component's file, as its own process would. Modules beside it are
-executed once a run, so that all components see the same classes: types that components exchange belong into
-a file of their own.
+Modules live in a ``Space``. Plain components share one: each instance executes its own copy of the
+component's file, and the modules beside it are executed once a run, so that all components see the same
+classes: types that components exchange belong into a file of their own. A script is a process of its own,
+with its own copies of all modules. It finds them where Python and ROS do: beside the script, in its package,
+in the workspace, and on ``PYTHONPATH``. A client library or an interface package is never a real one,
+whatever is installed.
 """
 
 from __future__ import annotations
 
 import ast
 import builtins
+import os
+import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, MutableMapping
 from dataclasses import dataclass, field
+from importlib.machinery import EXTENSION_SUFFIXES
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from volery.base.errors import ComponentError, Location, ModelError
+from volery.base.errors import ComponentError, Location, ModelError, VoleryError, did_you_mean
 from volery.components.instance import COMPONENT_MARK, describe
 from volery.cost import StepCounter
+from volery.ros.messages import Workspace, define_packages, modules
+from volery.ros.messages.workspace import module_file
 
 _PREFIX = "volery.user"
 USER_MODULE_PREFIX = f"{_PREFIX}."
@@ -36,6 +45,21 @@ COMPUTING_MODULES = {
     *("marshal", "pickle", "re", "sqlite3", "statistics", "tarfile", "xml", "zipfile", "zlib"),
 }
 """Modules of Python whose calls take a time that grows with their arguments: their code is not counted."""
+
+
+_DEFINITIONS = (
+    *(
+        ast.FunctionDef,
+        ast.AsyncFunctionDef,
+        ast.ClassDef,
+        ast.Import,
+        ast.ImportFrom,
+        ast.Assign,
+        ast.AnnAssign,
+    ),
+    *(ast.Try, ast.Pass),
+)
+"""Statements of a file that does nothing when it is executed. ``try`` is for imports."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +82,22 @@ class SourceFile:
         tests = (node.test for node in self.tree.body if isinstance(node, ast.If))
         return any("__main__" in ast.unparse(test) for test in tests)
 
+    def defines(self, function: str) -> bool:
+        """Return whether the file defines or imports a function (or another name) at top level."""
+        return function in self.class_names() or any(
+            isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == function
+            for node in self.tree.body
+        )
+
+    def only_defines(self, function: str) -> bool:
+        """Return whether the file defines a function, and its top level calls nothing for its effect."""
+        defined = any(isinstance(node, ast.FunctionDef) and node.name == function for node in self.tree.body)
+        return defined and all(
+            isinstance(node, _DEFINITIONS)
+            or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant))
+            for node in self.tree.body
+        )
+
     def line_of(self, class_name: str, method: str = "") -> int:
         """Return the line of a top-level class or of its method; 1 if the file does not contain it."""
         for node in self.tree.body:
@@ -69,9 +109,41 @@ class SourceFile:
         return 1
 
 
+_PYTHON_2 = (
+    (r"call to 'print'|'print' is an invalid", r"", "a print statement"),
+    (r"call to 'exec'", r"", "an exec statement"),
+    (r"multiple exception types", r"", "'except A, e'"),
+    (r"", r"^\s*except\b[^:(]+,\s*\w+\s*:", "'except A, e'"),
+    (r"", r"^\s*raise\s+[\w.]+\s*,", "'raise A, text'"),
+    (r"leading zeros|invalid decimal literal", r"\b(0[0-7]+|\d+[lL])\b", "a number as Python 2 writes it"),
+    (r"invalid syntax", r"<>", "the operator <>"),
+    (r"invalid syntax", r"`", "a backtick"),
+    (r"invalid syntax", r"^\s*print\s+[^=(\s]", "a print statement"),
+    (
+        r"inconsistent use of tabs|unindent does not match|unexpected indent",
+        r"\t",
+        "indented by tabs and spaces",
+    ),
+)
+"""What only Python 2 takes: the words of Python's compiler, the line, and how a message calls it."""
+
+
 def not_python(path: Path, error: SyntaxError) -> ModelError:
     """Return the error of the user's file, with the line that Python's compiler names."""
-    return ModelError(f"not Python: {error.msg}", where=Location(str(path), error.lineno or 1))
+    line = error.lineno or 1
+    words, text = error.msg or "", _line_of(path, line)
+    for said, written, name in _PYTHON_2:
+        if re.search(said, words) and re.search(written, text):
+            what = f"Python 2: line {line} is {name}; convert it with 2to3"
+            return ModelError(what, where=Location(str(path), line))
+    return ModelError(f"not Python: {words}", where=Location(str(path), line))
+
+
+def _line_of(path: Path, line: int) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace").splitlines()[line - 1]
+    except (OSError, IndexError):
+        return ""
 
 
 TOO_DEEP = "an expression is nested too deeply to be compiled; split it into several"
@@ -155,52 +227,49 @@ class Loader:
     """Loads the files of one run.
 
     Attributes:
-        replacements: Modules that are imported in place of others, by dotted name.
+        replacements: Modules that are imported in place of others, by dotted name. Interface packages are
+            added when they are first imported.
         steps: Counter of the code, or None where code is not counted.
         libraries: Top-level names of imported libraries whose code is not counted: those outside Python's
             own, and ``COMPUTING_MODULES``.
+        workspace: The packages that scripts can import.
     """
 
-    replacements: Mapping[str, ModuleType] = field(default_factory=dict)
+    replacements: MutableMapping[str, ModuleType] = field(default_factory=dict)
     steps: StepCounter | None = None
     libraries: set[str] = field(default_factory=set)
+    workspace: Workspace = field(default_factory=Workspace)
 
     def __post_init__(self) -> None:
         self._codes: dict[Path, CodeType] = {}
-        self._shared: dict[Path, ModuleType] = {}
+        self.shared = Space(self, SHARED_MODULE_PREFIX)
 
-    def load(self, source: SourceFile, name: str, as_main: bool = False) -> ModuleType:
+    def load(self, source: SourceFile, name: str) -> ModuleType:
         """Execute a component's file for the instance ``name`` and return its module.
 
-        Args:
-            source: The file.
-            name: Name of the instance.
-            as_main: Execute it with ``__name__ == "__main__"``, as a script, which may block.
-
         Raises:
-            ComponentError: The file raises an exception, unless it is executed ``as_main``.
+            ComponentError: The file raises an exception.
         """
-        full_name = f"{_PREFIX}.{name}.{source.path.stem}"
-        code = self._compile(source)
-        module = self._module(full_name, source.path)
-        if as_main:
-            module.__name__ = "__main__"
+        module = self.shared.module(f"{USER_MODULE_PREFIX}{name}.{source.path.stem}", source.path)
+        try:
+            self.execute(source, module)
+        except VoleryError:
+            raise
+        except Exception as error:
+            raise ComponentError(name, f"{module.__file__} cannot be loaded: {describe(error)}") from error
+        return module
+
+    def execute(self, source: SourceFile, module: ModuleType) -> None:
+        """Execute a file in its module; loading is not charged."""
+        code = self.compile(source, module)
+        try:
             exec(code, module.__dict__)
-            return module
-        self._execute(code, module, name)
-        return module
+        finally:
+            if self.steps:
+                self.steps.take()
 
-    def _module(self, full_name: str, path: Path) -> ModuleType:
-        module = ModuleType(full_name)
-        module.__file__ = str(path)
-        module.__dict__[COMPONENT_MARK] = True
-        module.__dict__["__builtins__"] = self._builtins(path.parent)
-        if self.steps:
-            module.__dict__.update(self.steps.names())
-        sys.modules[full_name] = module  # dataclasses and typing look a class's module up there
-        return module
-
-    def _compile(self, source: SourceFile) -> CodeType:
+    def compile(self, source: SourceFile, module: ModuleType) -> CodeType:
+        """Return the code of a file, to be executed in its module; with counters if code is counted."""
         code = self._codes.get(source.path)
         if code is None:
             try:
@@ -211,52 +280,236 @@ class Loader:
             except RecursionError as error:
                 raise ModelError(TOO_DEEP, where=Location(str(source.path), 1)) from error
             self._codes[source.path] = code
+        if self.steps:
+            module.__dict__.update(self.steps.names())
         return code
 
-    def _execute(self, code: CodeType, module: ModuleType, name: str) -> None:
-        try:
-            exec(code, module.__dict__)
-        except Exception as error:
-            raise ComponentError(name, f"{module.__file__} cannot be loaded: {describe(error)}") from error
-        finally:
-            if self.steps:
-                self.steps.take()  # loading is not charged
-
-    def _builtins(self, folder: Path) -> dict[str, Any]:
-        names = vars(self.replacements.get("builtins", builtins))
-        return {**names, "__import__": _Import(self, folder)}
-
     def sibling(self, name: str, folder: Path) -> ModuleType | None:
-        """Return the module or package ``name`` (dotted) beside the importing file, or None."""
-        base = folder.joinpath(*name.split("."))
-        for path in (base.with_name(base.name + ".py"), base / "__init__.py"):
-            if path.is_file():
-                return self._load_shared(path, name)
+        """Return the shared module or package ``name`` (dotted) in *folder*, or None."""
+        return self.shared.find(name, folder)
+
+
+class Space:
+    """Modules that are executed once, for one process or for all plain components.
+
+    Args:
+        loader: The run's loader.
+        prefix: Prefix of the modules' names.
+    """
+
+    def __init__(self, loader: Loader, prefix: str) -> None:
+        self.loader = loader
+        self._prefix = prefix
+        self._modules: dict[Path, ModuleType] = {}
+
+    def replaced(self, name: str) -> ModuleType | None:
+        """Return the module that replaces *name*, or None."""
+        return self.loader.replacements.get(name)
+
+    def places(self, top: str, folder: Path) -> list[Path]:
+        """Return the folders that a file in *folder* imports the top-level module *top* from, in order."""
+        return [folder]
+
+    def module(self, full_name: str, path: Path) -> ModuleType:
+        """Return a new, empty module for the file *path*."""
+        module = ModuleType(full_name)
+        module.__file__ = str(path)
+        module.__dict__[COMPONENT_MARK] = True
+        names = vars(self.replaced("builtins") or builtins)
+        module.__dict__["__builtins__"] = {**names, "__import__": _Import(self, path)}
+        sys.modules[full_name] = module  # dataclasses and typing look a class's module up there
+        return module
+
+    def imported(self, name: str, folder: Path, bare: bool = False) -> ModuleType | None:
+        """Return the module *name* (dotted) as a file in *folder* imports it; None for one of Python's.
+
+        The client libraries are replaced as a whole. An interface package may have Python code, too.
+        """
+        found = self.replaced(name)
+        if found is not None and ("." in name or _is_closed(found)):
+            return found
+        if _is_closed(self.replaced(name.partition(".")[0])):
+            return None
+        own = self.find(name, folder, bare)
+        if own is not None and found is not None:
+            for kind in ("msg", "srv", "action"):
+                if hasattr(found, kind):
+                    setattr(own, kind, getattr(found, kind))
+        return own or found
+
+    def find(self, name: str, folder: Path, bare: bool = False) -> ModuleType | None:
+        """Return the component's module *name* (dotted) for a file in *folder*, or None.
+
+        Packages above it are executed first, as Python does. With *bare*, a folder without ``__init__.py`` is
+        a package, too.
+        """
+        parent, _, last = name.rpartition(".")
+        if parent:
+            above = self.imported(parent, folder, bare=True)
+            places = [Path(one) for one in vars(above).get("__path__", ())] if above is not None else []
+        else:
+            places = self.places(last, folder)
+        for place in places:
+            file = module_file(place, last) or _extension_file(place, last)
+            if file is not None:
+                return self._load(file, name)
+        if bare:
+            for place in places:
+                if (place / last).is_dir():
+                    found = ModuleType(name)
+                    found.__path__ = [str(place / last)]
+                    return found
         return None
 
-    def _load_shared(self, path: Path, name: str) -> ModuleType:
-        known = self._shared.get(path)
+    def beside(self, name: str, folder: Path) -> ModuleType | None:
+        """Return the module *name* (dotted, or empty for the package itself) in *folder*, or None."""
+        found = None
+        parts = name.split(".") if name else ["__init__"]
+        for length in range(1, len(parts) + 1):
+            *above, last = parts[:length]
+            file = module_file(folder.joinpath(*above), last) or _extension_file(
+                folder.joinpath(*above), last
+            )
+            found = self._load(file, _dotted_name(file)) if file is not None else None
+        return found
+
+    def _load(self, path: Path, name: str) -> ModuleType:
+        key = path.resolve()
+        known = self._modules.get(key)
         if known is not None:
             return known
-        code = self._compile(parse(path))
-        module = self._module(f"{SHARED_MODULE_PREFIX}{name}", path)
+        if path.suffix != ".py":
+            return self._load_extension(path, name)
+        source = parse(path)
+        module = self.module(f"{self._prefix}{name}", path)
         if path.name == "__init__.py":
             module.__path__ = [str(path.parent)]
-        self._shared[path] = module  # before it runs, as Python does: modules may import each other
+        self._modules[key] = module  # before it runs, as Python does: modules may import each other
         try:
-            self._execute(code, module, name)
+            self.loader.execute(source, module)
         except BaseException:
-            del self._shared[path]
+            del self._modules[key]
             raise
+        is_package = path.name == "__init__.py"
+        package = self._modules.get((path.parents[1 if is_package else 0] / "__init__.py").resolve())
+        if package is not None:
+            setattr(package, path.parent.name if is_package else path.stem, module)
+        return module
+
+    def _load_extension(self, path: Path, name: str) -> ModuleType:
+        spec = spec_from_file_location(name.rpartition(".")[2], path)
+        assert spec is not None, "it has a suffix of Python's extension modules"
+        assert spec.loader is not None, "it is a file"
+        module = self._modules[path.resolve()] = module_from_spec(spec)
+        spec.loader.exec_module(module)
         return module
 
 
-class _Import:
-    """``__import__`` for the files in one folder."""
+def _is_closed(module: ModuleType | None) -> bool:
+    """Return whether a module answers for all names below it, as a replaced library does."""
+    return module is not None and "__getattr__" in vars(module)
 
-    def __init__(self, loader: Loader, folder: Path) -> None:
-        self._loader = loader
-        self._folder = folder
+
+def _extension_file(folder: Path, name: str) -> Path | None:
+    return next((path for end in EXTENSION_SUFFIXES if (path := folder / f"{name}{end}").is_file()), None)
+
+
+def _dotted_name(path: Path) -> str:
+    """Return the name of a module by the packages that its file is in."""
+    parts = [] if path.name == "__init__.py" else [path.name.partition(".")[0]]
+    folder = path.parent
+    while (folder / "__init__.py").is_file():
+        parts.insert(0, folder.name)
+        folder = folder.parent
+    return ".".join(parts) or "__init__"
+
+
+class ScriptSpace(Space):
+    """The modules of one script, which is a process of its own.
+
+    Args:
+        loader: The run's loader.
+        name: Name of the instance.
+        script: Its file.
+    """
+
+    def __init__(self, loader: Loader, name: str, script: Path) -> None:
+        super().__init__(loader, f"{USER_MODULE_PREFIX}{name}.")
+        self._script = script
+        self.path = [str(script.parent), *sys.path]
+        """``sys.path`` of the process."""
+        self._uses_ros: dict[str, bool] = {}
+
+    def run(self, source: SourceFile, function: str = "") -> object:
+        """Execute the script as ``__main__``, then call *function* of it, if one is named."""
+        module = self.module(f"{self._prefix}__main__", source.path)
+        module.__name__ = "__main__"
+        exec(self.loader.compile(source, module), module.__dict__)
+        return getattr(module, function)() if function else None
+
+    def places(self, top: str, folder: Path) -> list[Path]:
+        """See ``Space``."""
+        if top == FRAMEWORK_PACKAGE:
+            return []
+        before = set(sys.path)
+        found = [Path(one or ".") for one in self.path if one not in before]  # the script's folder
+        if top in sys.stdlib_module_names:
+            return found
+        package = self.loader.workspace.python_folder(top, self._script)
+        if package is not None:
+            found.append(package)
+        return found + [one for one in _python_path() if self._is_ros_code(one, top)]
+
+    def _is_ros_code(self, folder: Path, top: str) -> bool:
+        """Return whether a module on ``PYTHONPATH`` imports ROS, itself or by others."""
+        file = module_file(folder, top)
+        if file is None:
+            return False
+        if top not in self._uses_ros:
+            self._uses_ros[top] = False  # while its own imports are followed
+            files = file.parent.rglob("*.py") if file.name == "__init__.py" else (file,)
+            names = {name for one in files for name in _IMPORTED.findall(_text_of(one))}
+            self._uses_ros[top] = any(self._is_ros(name) for name in names)
+        return self._uses_ros[top] and _RELAY not in _text_of(file)
+
+    def _is_ros(self, name: str) -> bool:
+        top = name.partition(".")[0]
+        if top in sys.stdlib_module_names or top == FRAMEWORK_PACKAGE:
+            return False
+        if top in self.loader.replacements or _interface_kind(name):
+            return True
+        return any(self._is_ros_code(one, top) for one in _python_path())
+
+
+_IMPORTED = re.compile(r"^\s*(?:import|from)\s+(\w[\w.]*)", re.MULTILINE)
+_RELAY = "__extended_path"
+"""In the ``__init__.py`` that catkin generates to lead to the sources, which are found without it."""
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+
+
+def _python_path() -> list[Path]:
+    return [Path(one) for one in os.environ.get("PYTHONPATH", "").split(os.pathsep) if one]
+
+
+def _interface_kind(name: str) -> bool:
+    """Return whether a dotted name is that of interfaces, such as ``std_msgs.msg``."""
+    return name.partition(".")[2].partition(".")[0] in ("msg", "srv", "action")
+
+
+class _Import:
+    """``__import__`` for one file."""
+
+    def __init__(self, space: Space, file: Path) -> None:
+        self._space = space
+        self._loader = space.loader
+        self._file = file
+        self._folder = file.parent
 
     def __call__(
         self,
@@ -268,25 +521,74 @@ class _Import:
     ) -> ModuleType:
         if level:
             return self._relative(name, fromlist or (), level)
+        if _interface_kind(name):
+            self._define(name.partition(".")[0])
         found = self._find(name)
         if found is None:
-            return self._real(name, globals_, fromlist)
+            real = self._python_module(name, globals_, fromlist)
+            if real is not None:
+                return real
+            found = self._last_found(name)
         if fromlist:
             self._submodules(found, name, fromlist)
             return found
         return self._top_of(name, found)
 
     def _find(self, name: str) -> ModuleType | None:
-        return self._loader.replacements.get(name) or self._loader.sibling(name, self._folder)
+        return self._space.imported(name, self._folder)
 
-    def _real(
+    def _define(self, package: str) -> bool:
+        """Define the interfaces of a package if they are not known and are found; return whether they are."""
+        if package in self._loader.replacements or package in sys.stdlib_module_names:
+            return False
+        if not define_packages(self._file, [package], self._loader.workspace):
+            return False
+        self._loader.replacements.update(modules(package))
+        return True
+
+    def _python_module(
         self, name: str, globals_: Mapping[str, Any] | None, fromlist: tuple[str, ...] | None
-    ) -> ModuleType:
-        module = builtins.__import__(name, globals_, None, fromlist or ())
+    ) -> ModuleType | None:
+        """Import one of Python's own modules or a library; None if there is none."""
         top = name.partition(".")[0]
+        if top not in sys.stdlib_module_names:
+            if _is_closed(self._space.replaced(top)):
+                raise ModuleNotFoundError(self._missing_below(top, name), name=name)
+            if top in self._loader.replacements or _interface_kind(name):
+                return None
+        try:
+            module = builtins.__import__(name, globals_, None, fromlist or ())
+        except ModuleNotFoundError as error:
+            if error.name is None or error.name.partition(".")[0] != top:
+                raise
+            return None
         if top in COMPUTING_MODULES or (top not in sys.stdlib_module_names and top != FRAMEWORK_PACKAGE):
             self._loader.libraries.add(top)
         return module
+
+    def _last_found(self, name: str) -> ModuleType:
+        """Return an interface package that is imported by its bare name, or a folder; else raise."""
+        top = name.partition(".")[0]
+        found = self._loader.replacements[name] if name == top and self._define(top) else None
+        found = found or self._space.find(name, self._folder, bare=True)
+        if found is not None:
+            return found
+        if _interface_kind(name):
+            why = (
+                "no package of that name defines interfaces beside the file or in ROS_PACKAGE_PATH or "
+                "AMENT_PREFIX_PATH; source its workspace"
+            )
+        else:
+            why = (
+                "it is not beside the file, in a package of the workspace (ROS_PACKAGE_PATH, "
+                "AMENT_PREFIX_PATH, PYTHONPATH), or installed"
+            )
+        missing = name if top in self._loader.replacements else top
+        raise ModuleNotFoundError(f"No module named {missing!r}: {why}", name=missing)
+
+    def _missing_below(self, top: str, name: str) -> str:
+        below = [one for one in self._loader.replacements if one.startswith(f"{top}.")]
+        return f"{name} is not there on the embedded graph{did_you_mean(name, below)}; see docs/ros.md"
 
     def _submodules(self, package: ModuleType, name: str, wanted: tuple[str, ...]) -> None:
         """Load the modules of ``from package import module`` before the names are looked up."""
@@ -307,7 +609,8 @@ class _Import:
         parts = name.split(".")
         module = found
         for length in range(len(parts) - 1, 0, -1):
-            parent = self._find(".".join(parts[:length])) or ModuleType(".".join(parts[:length]))
+            above = ".".join(parts[:length])
+            parent = self._space.imported(above, self._folder, bare=True) or ModuleType(above)
             setattr(parent, parts[length], module)
             module = parent
         return module
@@ -317,12 +620,15 @@ class _Import:
         folder = self._folder
         for _ in range(level - 1):
             folder = folder.parent
-        package = self._loader.sibling(name or "__init__", folder)
-        if package is None and name:
+        package = self._space.beside(name, folder)
+        inside = folder.joinpath(*name.split(".")) if name else folder
+        if package is None and name and not inside.is_dir():
             raise ImportError(f"no module {'.' * level}{name} in {folder}")
-        found = package or ModuleType(folder.name)
+        found = package or ModuleType(inside.name)
         for attribute in fromlist:
-            module = self._loader.sibling(f"{name}.{attribute}" if name else attribute, folder)
-            if module is not None and attribute not in vars(found):
+            if attribute == "*" or attribute in vars(found):
+                continue
+            module = self._space.beside(attribute, inside)
+            if module is not None:
                 setattr(found, attribute, module)
         return found

@@ -16,13 +16,16 @@ from typing import Any, Protocol
 from volery.base.errors import Location, ModelError, choices, did_you_mean
 from volery.base.time import Ns
 from volery.components.component_api import register_kernel
+from volery.components.entry_points import entry_function
 from volery.components.instance import Instance, OnFailure
-from volery.components.loader import Loader, SourceFile, parse
+from volery.components.loader import Loader, ScriptSpace, SourceFile, parse
 from volery.kernel.api import Kernel
 from volery.kernel.task import Scope, Task
 from volery.kernel.waiting import Rate, sleep
 
 RUN = "run"
+ENTRY = "main"
+"""The usual name of the function that an entry point calls."""
 
 
 class Program(Protocol):
@@ -135,12 +138,21 @@ class ClassProgram:
 
 
 class ScriptProgram:
-    """A plain script that runs as ``__main__`` in the component's flow of control, without operations."""
+    """A plain script that runs as ``__main__`` in the component's flow of control, without operations.
 
-    def __init__(self, loader: Loader, source: SourceFile, name: str) -> None:
+    Args:
+        loader: The run's loader.
+        source: The script.
+        name: Name of the instance.
+        function: Function that is called after the file has been executed, as an entry point of its package
+            does; empty for a file that calls what it defines by itself.
+    """
+
+    def __init__(self, loader: Loader, source: SourceFile, name: str, function: str = "") -> None:
         self._loader = loader
         self._source = source
         self._name = name
+        self._function = function
 
     def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
         """See ``Program``: a script takes no arguments and provides no operations."""
@@ -158,6 +170,12 @@ class ScriptProgram:
             raise ModelError(
                 "a script without a class runs by itself: state 'active' in the model", where=where
             )
+        if not self._function and self._source.only_defines(ENTRY):
+            raise ModelError(
+                f"it defines {ENTRY}() and calls nothing; state 'main: {ENTRY}' in the model, or an entry "
+                "point (console_scripts) in the setup.py, setup.cfg or pyproject.toml of its package",
+                where=where,
+            )
 
     def make(self, given: Mapping[str, Any]) -> object:
         """See ``Program``."""
@@ -165,11 +183,16 @@ class ScriptProgram:
 
     def run(self, thing: object) -> None:
         """See ``Program``."""
-        self._loader.load(self._source, self._name, as_main=True)
+        ScriptSpace(self._loader, self._name, self._source.path).run(self._source, self._function)
 
 
 def load_program(
-    loader: Loader, name: str, path: Path, class_name: str, where: Location | None = None
+    loader: Loader,
+    name: str,
+    path: Path,
+    class_name: str,
+    where: Location | None = None,
+    function: str = "",
 ) -> Program:
     """Load the program of an instance.
 
@@ -179,14 +202,18 @@ def load_program(
         path: File of the component.
         class_name: Class in the file; empty for a script.
         where: Line of the model that names the file.
+        function: Function of a script that is called; by default, that of its package's entry point.
 
     Raises:
-        ModelError: The file is missing, is not Python or does not contain the class.
+        ModelError: The file is missing, is not Python or does not contain the class or the function.
         ComponentError: The file raises an exception while it is loaded.
     """
     source = parse(path, where)
     if not class_name:
-        return ScriptProgram(loader, source, name)
+        if function and not source.defines(function):
+            raise ModelError(f"no function {function!r}, which 'main' names", where=Location(str(path), 1))
+        called = function or ("" if source.is_script() else entry_function(source))
+        return ScriptProgram(loader, source, name, called)
     _require_class(source, class_name)
     module = loader.load(source, name)
     cls = getattr(module, class_name, None)
@@ -200,11 +227,13 @@ def load_program(
 def script_or_class(path: Path, class_name: str, where: Location | None = None) -> str:
     """Return the class name of a file that is written for ROS, or "" if it is a script.
 
-    A script has an ``if __name__ == "__main__":`` or does not contain the class. Errors as of
-    ``load_program``.
+    A script has an ``if __name__ == "__main__":``, a ``main`` or an entry point, or does not contain the
+    class. Errors as of ``load_program``.
     """
     source = parse(path, where)
-    return "" if source.is_script() or class_name not in source.class_names() else class_name
+    if source.is_script() or source.defines(ENTRY) or class_name not in source.class_names():
+        return ""
+    return "" if entry_function(source) else class_name
 
 
 def load_class(path: Path, class_name: str, loader: Loader | None = None) -> type:

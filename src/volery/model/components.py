@@ -448,6 +448,12 @@ class Component:
     stated_class: Annotated[
         str, Key("class"), TEXT, "Class in the file; by default, the name of the component in camel case."
     ] = ""
+    main: Annotated[
+        str,
+        TEXT,
+        "Function of a script that is called after the file was executed; by default, that of an entry point "
+        "of its package.",
+    ] = ""
     build: Annotated[Build, Record(Build), "How C++ is compiled."] = Build()
     files: Annotated[
         Mapping[str, str],

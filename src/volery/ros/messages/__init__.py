@@ -33,12 +33,14 @@ from volery.ros.messages.store import (
     type_hash,
     types,
 )
+from volery.ros.messages.workspace import Workspace
 
 __all__ = [
     "Message",
     "Ros1Service",
     "Ros1Type",
     "ServiceType",
+    "Workspace",
     "cdr_size",
     "define",
     "define_all",

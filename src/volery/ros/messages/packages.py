@@ -8,7 +8,6 @@ likewise.
 from __future__ import annotations
 
 import ast
-import os
 import re
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 
 from volery.base.errors import Location, ModelError, UsageError, choices, did_you_mean
 from volery.ros.messages.store import action_types, define_all, message_class, service, service_types, types
+from volery.ros.messages.workspace import Workspace, entries
 
 ROS1_SPELLING = {"mavros_msgs": {"VFR_HUD": "VfrHud"}}
 """Types with another spelling in ROS 1: by package, ROS 1's name and ROS 2's."""
@@ -81,13 +81,15 @@ _MAKERS: dict[str, Callable[[str], type]] = {
 }
 
 
-def modules() -> dict[str, ModuleType]:
-    """Return the modules of all packages (``std_msgs``, ``std_msgs.msg``, ...), by their import names."""
+def modules(only: str = "") -> dict[str, ModuleType]:
+    """Return the modules of all packages (``std_msgs``, ``std_msgs.msg``, ...), or of one, by import name."""
     found: dict[str, ModuleType] = {}
     for kind, names in (("msg", types()), ("srv", service_types()), ("action", action_types())):
         by_package: dict[str, list[str]] = {}
         for full in names:
-            by_package.setdefault(full.split("/")[0], []).append(full.split("/")[-1])
+            package = full.split("/")[0]
+            if only in ("", package):
+                by_package.setdefault(package, []).append(full.split("/")[-1])
         for package, listed in by_package.items():
             parent = found.setdefault(package, ModuleType(package))
             parent.__path__ = []
@@ -104,25 +106,28 @@ _FIELD = re.compile(r"^\s*(\w+)/(?:msg/)?\w+(?:\[[^]]*\])?\s+\w", re.MULTILINE)
 _NAME = re.compile(r"<name>\s*([\w-]+)\s*</name>")
 
 
-def define_imported(file: Path) -> list[str]:
+def define_imported(file: Path, workspace: Workspace | None = None) -> list[str]:
     """Define the interfaces that a Python file imports; see ``define_packages``."""
-    return define_packages(file, _imported(file))
+    return define_packages(file, _imported(file), workspace)
 
 
-def define_packages(file: Path, packages: Iterable[str]) -> list[str]:
+def define_packages(file: Path, packages: Iterable[str], workspace: Workspace | None = None) -> list[str]:
     """Define the interfaces of `packages`, used in `file`, unless they are known; return those found.
+
+    They are searched beside the file and in `workspace`, by default what the environment names now.
 
     Raises ``ModelError`` at the interface's file if it is no definition. Packages that are not found are
     ignored.
     """
     known = {name.partition("/")[0] for name in (*types(), *service_types(), *action_types())}
     known -= _from_files.keys()  # another file may mean another package by the same name
+    workspace = workspace or Workspace()
     texts: dict[str, str] = {}
     found: list[str] = []
     wanted = [name for name in packages if name not in known]
     while wanted:
         package = wanted.pop(0)
-        folder = _folder_of(package, file)
+        folder = _folder_of(package, file, workspace)
         if folder is None or package in found:
             continue
         found.append(package)
@@ -169,25 +174,24 @@ def _texts(package: str, folder: Path) -> Iterator[tuple[str, str]]:
             yield f"{package}/{kind}/{path.stem}", path.read_text(encoding="utf-8")
 
 
-def _folder_of(package: str, file: Path) -> Path | None:
-    """Return the folder of a package's interfaces, searched from `file` and the environment."""
-    return next((folder for folder in _candidates(package, file) if _is_package(folder, package)), None)
+def _folder_of(package: str, file: Path, workspace: Workspace) -> Path | None:
+    """Return the folder of a package's interfaces, searched from `file` and in the workspace."""
+    candidates = _candidates(package, file, workspace)
+    return next((folder for folder in candidates if _is_package(folder, package)), None)
 
 
-def _candidates(package: str, file: Path) -> Iterator[Path]:
-    above = file.resolve().parents[: _LEVELS + 1]
-    for folder in above:
+def _candidates(package: str, file: Path, workspace: Workspace) -> Iterator[Path]:
+    for folder in file.resolve().parents[: _LEVELS + 1]:
         yield folder / package
         yield folder
-    for entry in _entries("ROS_PACKAGE_PATH"):
+    found = workspace.find(package, file)
+    if found is not None:
+        yield found.folder
+    for entry in entries("ROS_PACKAGE_PATH"):  # folders without a manifest
         yield entry / package
         yield entry
-    for entry in _entries("AMENT_PREFIX_PATH"):
+    for entry in entries("AMENT_PREFIX_PATH"):
         yield entry / "share" / package
-
-
-def _entries(variable: str) -> list[Path]:
-    return [Path(entry) for entry in os.environ.get(variable, "").split(os.pathsep) if entry]
 
 
 def _is_package(folder: Path, package: str) -> bool:

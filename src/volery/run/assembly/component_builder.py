@@ -35,7 +35,7 @@ from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
 from volery.ros.graph.embedded_graph import record_all
 from volery.ros.graph.graph_context import Records
-from volery.ros.messages import define_imported
+from volery.ros.messages import Workspace, define_imported
 from volery.run.assembly.computers import Platform, commanded_by, is_node
 from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.assembly.fences import fence_of
@@ -217,14 +217,15 @@ class Builder:
         """
         check_code(replace(self._system, instances=self._models))
         steps = StepCounter(libraries=library_table()) if fidelity == "code" else None
+        workspace = Workspace()
         for model in self._models:
             if model.component.path and model.component.language in PYTHON_ROS:
-                define_imported(self._system.file_of(model.component))
+                define_imported(self._system.file_of(model.component), workspace)
         launches = self._launches()
         ready = compile_all(self._system, self._models, fidelity, traced=traces is not None)
         self._cpp = CppPrograms(self._kernel, self._graph, ready, launches, self._nodes, traces)
         modules = importable_modules(self._graph, launches, self._nodes, self._ending.farewell)
-        loader = Loader({**virtual_modules(self._kernel, seed), **modules}, steps)
+        loader = Loader({**virtual_modules(self._kernel, seed), **modules}, steps, workspace=workspace)
         self._instances = {model.name: self._instance(model, steps) for model in self._models}
         starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in self._models))
         doubts = tuple(self._cpp.warnings(self._models))
@@ -376,9 +377,11 @@ def python_program(system: System, model: InstanceModel, loader: Loader) -> Prog
     component = model.component
     path = system.file_of(component)
     chosen = component.class_name
-    if component.language in PYTHON_ROS and not component.stated_class:
+    if component.main:
+        chosen = ""
+    elif component.language in PYTHON_ROS and not component.stated_class:
         chosen = script_or_class(path, chosen, component.where)
-    program = load_program(loader, model.name, path, chosen, component.where)
+    program = load_program(loader, model.name, path, chosen, component.where, component.main)
     if isinstance(program, ClassProgram):
         for signature in provided_operations(system, model).values():
             program.check_signature(signature.name, [one.name for one in signature.arguments])
