@@ -195,8 +195,13 @@ def read_parameter_file(file: str | Path) -> dict[str, float]:
         name, value = _name_and_value(line)
         if not name:
             continue
+        if name.startswith("@"):
+            what = (
+                f"{line.strip()!r} is for ArduPilot's build; load that file by itself and leave the line out"
+            )
+            raise UsageError(f"{path}:{number}: {what}")
         try:
-            found[name] = float(value)
+            found[name] = float(int(value, 16)) if _HEX.fullmatch(value) else float(value)
         except ValueError:
             raise UsageError(f"{path}:{number}: {value!r} is no value of {name!r}") from None
         if not isfinite(found[name]) or not re.fullmatch(r"[A-Za-z_][\w.\[\]>-]*", name):
@@ -206,9 +211,13 @@ def read_parameter_file(file: str | Path) -> dict[str, float]:
     return found
 
 
+_HEX = re.compile(r"0[xX][0-9A-Fa-f]{1,16}")
+"""A mask as ArduPilot's own files have it."""
+
+
 def _name_and_value(line: str) -> tuple[str, str]:
     """Return what a line of a file states; an empty name for a comment or a row of another component."""
-    words = re.split(r"[\s,]+", line.split("#", 1)[0].strip())
+    words = re.split(r"[\s,=]+", line.split("#", 1)[0].strip())
     if len(words) != 5:
         return words[0], words[1] if len(words) > 1 else ""
     _, component, name, value, _ = words

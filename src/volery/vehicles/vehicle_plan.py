@@ -151,7 +151,8 @@ def _check_item(item: Item, number: int) -> None:
     what = f"item {number} (command {item.command})"
     scale = item_scale(item.command, item.frame)
     for place, value in ((5, item.latitude), (6, item.longitude)):
-        if not isfinite(value) or (scale == 1 and value != round(value)):
+        placed = scale == 1 and has_global_place(item.command, 0)  # DO_LAND_START in the frame MISSION
+        if not isfinite(value) or (scale == 1 and not placed and value != round(value)):
             raise UsageError(f"{what}: parameter {place} = {value:g}; MAVLink carries whole numbers there")
     if has_global_place(item.command, item.frame) and (item.latitude or item.longitude):
         Position(item.latitude, item.longitude, AMSL(0.0))

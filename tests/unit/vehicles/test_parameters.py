@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from rigs.missions import carried_out
-from volery.base.errors import NotArrived, Refused, VehicleError
+from volery.base.errors import NotArrived, Refused, UsageError, VehicleError
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
@@ -244,3 +244,29 @@ def test_what_the_autopilot_writes_itself_is_no_setting(tmp_path: Path) -> None:
     file.write_text("MIS_TOTAL,0\nWP_SPD,5\n")
     assert [one.name for one in craft.run(lambda: craft.parameters.load(file))] == ["WP_SPD"]
     assert craft.values["MIS_TOTAL"] == 5.0
+
+
+def test_a_file_of_ardupilots_own_has_equal_signs_and_masks(tmp_path: Path) -> None:
+    file = tmp_path / "defaults.parm"
+    file.write_text(
+        "# board\nSERVO1_FUNCTION = 33\nBATT_MONITOR=8\nCAN_D1_UC_ESC_BM 0x0F\nRTL_ALT 1500 @READONLY\n"
+    )
+    assert read_parameter_file(file) == {
+        "SERVO1_FUNCTION": 33.0,
+        "BATT_MONITOR": 8.0,
+        "CAN_D1_UC_ESC_BM": 15.0,
+        "RTL_ALT": 1500.0,
+    }
+    for text, said in (
+        ("@include ../other.parm\n", "'@include ../other.parm' is for ArduPilot's build"),
+        ("A 0xG\n", "'0xG' is no value of 'A'"),
+        ("A = \n", "'' is no value of 'A'"),
+        ("A 1e400\n", "is no parameter and its value"),
+        ("A " + "9" * 400 + "\n", "is no parameter and its value"),
+        ("\0\0\0", "is no value"),
+    ):
+        file.write_text(text)
+        with pytest.raises(UsageError) as caught:
+            read_parameter_file(file)
+        assert str(caught.value).startswith(f"{file}:1: ")
+        assert said in str(caught.value)

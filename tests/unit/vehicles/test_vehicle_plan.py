@@ -93,6 +93,8 @@ def test_parameters_of_a_command_without_a_place_are_none(read: Any) -> None:
     assert [(one["x"], one["y"]) for one in fields] == [(1, 7), (128, 0)]
     there = item_fields(Item(WAYPOINT, 3, NONE, *PLACE), 0, 0)
     assert (there["x"], there["y"]) == (460_825_000, -1_038_995_000)
+    start = read(document(entry(189, *NONE, 47.397, 8.5, 0, frame=2))).mission[0]  # a place that PX4 ignores
+    assert (start.latitude, item_fields(start, 0, 0)["x"]) == (47.397, 47)
     local = item_fields(Item(WAYPOINT, 1, NONE, 12.5, -3.0, 5.0), 0, 0)
     assert (local["x"], local["y"]) == (125_000, -30_000)
 

@@ -225,7 +225,9 @@ def convert(
 def _note_reading(output: Output, bag: Bag) -> None:
     if bag.remark:
         output.note(bag.remark)
-    if not bag.complete:
+    if not bag.complete and all(part.complete for part in bag.parts) and bag.parts:
+        output.note(f"{bag.path} may have had more files than are there")
+    elif not bag.complete:
         output.note(f"{bag.path} is truncated; only its complete part is read")
 
 
