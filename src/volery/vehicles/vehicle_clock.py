@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from volery.base.time import Ns, S
+from volery.base.time import MS, Ns, S
 
 COMPARED_AFTER: Ns = 5 * S
 """Shortest time over which the clocks are compared."""
@@ -18,6 +18,11 @@ TOLERANCE = 0.25
 """Share by which the clocks of vehicle and program may differ before that of the vehicle counts."""
 REBOOTED_BEFORE: Ns = 10 * S
 """A time since boot that is this much less than the last one is that of another boot."""
+
+WRAP: Ns = 2**32 * MS
+"""Period of MAVLink's ``time_boot_ms``: 49.7 days."""
+WRAPPED_WITHIN: Ns = 60 * S
+"""A report is taken for one after a wrap, and not after another boot, if it is this near to what is expected."""
 
 
 class Moment(NamedTuple):
@@ -35,16 +40,25 @@ class VehicleClock:
         self._boot: Ns = -1
         """The last report, on both clocks."""
         self._older = self._newer = Moment(-1, -1)
+        self._wrapped: Ns = 0
 
     def note(self, boot: Ns, now: Ns, *, fresh: bool = True) -> None:
         """Note the time since boot in a message that arrives now, unless it was overtaken on the way.
 
         Args:
-            boot: time since boot, ns.
+            boot: time since boot, ns, modulo 2**32 ms.
             now: the program's time, ns.
             fresh: the message cannot have been held back on the way: the clocks may be compared from now on.
         """
         last = self._boot
+        boot += self._wrapped
+        if boot - last > WRAP // 2 and boot >= WRAP:  # sent before the wrap
+            boot -= WRAP
+        elif boot < last and abs(boot + WRAP - self.time(now)) <= WRAPPED_WITHIN:
+            boot += WRAP
+            self._wrapped += WRAP
+        elif boot < last - REBOOTED_BEFORE:
+            boot, self._wrapped = boot - self._wrapped, 0
         if last - REBOOTED_BEFORE <= boot <= last:
             return
         self._at, self._boot = now, boot

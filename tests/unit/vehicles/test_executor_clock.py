@@ -16,6 +16,7 @@ from volery.trace.events import Event, Text
 from volery.vehicles.driver import Step
 from volery.vehicles.executor import StepExecutor
 from volery.vehicles.telemetry import Telemetry
+from volery.vehicles.vehicle_clock import WRAP, Moment, VehicleClock
 
 
 @dataclass
@@ -46,7 +47,7 @@ def timed_out_after(
     def report() -> None:
         seen.note_message(kernel.now())
         if sends_its_clock:
-            seen.update_clock(booted_before + round(rate * kernel.now()) // MS * MS)
+            seen.update_clock((booted_before + round(rate * kernel.now()) // MS * MS) % WRAP)
         seen.changed.notify()
 
     def wait() -> None:
@@ -96,3 +97,24 @@ def test_a_vehicle_that_was_switched_on_before_the_program() -> None:
     after, texts = timed_out_after(10.0, 100 * S, booted_before=1000 * S)
     assert after == pytest.approx(10.0, abs=0.3)
     assert re.search(r"(9\.\d|10\.0) times as fast", texts[0].text)
+
+
+@pytest.mark.parametrize("rate", [0.4, 1.0, 3.0])
+def test_time_since_boot_begins_anew_after_49_days(rate: float) -> None:
+    """A step that is under way then, on a vehicle whose clock is its own, ends when it would have ended."""
+    (as_ever, _), (at_the_wrap, _) = (
+        timed_out_after(rate, 60 * S, booted_before=before) for before in (0, WRAP - 40 * S)
+    )
+    assert at_the_wrap == as_ever
+
+
+def test_a_report_from_before_the_wrap_is_old_and_one_long_after_it_is_a_reboot() -> None:
+    clock = VehicleClock()
+    clock.note(WRAP - S, 0)
+    clock.note(S, 2 * S)
+    clock.note(WRAP - S // 2, 2 * S + MS)  # overtaken on the way
+    assert clock.time(3 * S) == WRAP + 2 * S
+    assert clock.elapsed(Moment(0, WRAP - S), 3 * S) == 3 * S
+    clock.note(20 * S, 21 * S)
+    clock.note(S, 100 * S)
+    assert clock.time(100 * S) == S
