@@ -22,7 +22,7 @@ REBOOTED_BEFORE: Ns = 10 * S
 WRAP: Ns = 2**32 * MS
 """Period of MAVLink's ``time_boot_ms``: 49.7 days."""
 WRAPPED_WITHIN: Ns = 60 * S
-"""A report is taken for one after a wrap, and not after another boot, if it is this near to what is expected."""
+"""How near to what is expected a report after a wrap must be; else it is one after another boot."""
 
 
 class Moment(NamedTuple):

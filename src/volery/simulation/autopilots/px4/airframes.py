@@ -7,7 +7,7 @@ rover: what it shares with the multirotor is recorded, its driving is assumed.
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache, partial
 from math import ceil, hypot, isfinite, radians
 from types import MappingProxyType
@@ -16,7 +16,7 @@ from volery.base.elementary import atan2
 from volery.base.frames import Vector
 from volery.base.time import MS, S
 from volery.simulation.autopilots.autopilot import Firmware
-from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter, Parameters, Tuning, load
+from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter, Parameters, Tuning
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.guided_flight import Turn
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
@@ -292,15 +292,21 @@ def _stay_here(vehicle: Vehicle) -> None:
         vehicle.manoeuvre.point = here
 
 
-@cache
-def copter_parameters() -> tuple[Parameter, ...]:
-    """Return the recorded parameters."""
-    return load("volery.simulation.autopilots.px4", "data/copter.parameters")
-
-
 LANDED_AFTER = 2 * S
 """PX4's landed detector passes three states, each for LNDMC_TRIG_TIME; the first second is that of the
 flight stack's detector. Logged of seven landings: 3.0 s."""
+
+
+def table_of(
+    version: Version,
+    defaults: Callable[[], tuple[Parameter, ...]],
+    tuning: Callable[[Parameters], Tuning],
+    supported: Mapping[str, str],
+) -> ParameterTable:
+    """Return the parameters of one version: those that it has."""
+    gone = version.gone_parameters()
+    there = {name: what for name, what in supported.items() if name not in gone}
+    return ParameterTable(defaults, tuning, own_parameters, there, version.renamed)
 
 
 def copter(version: Version) -> Firmware:
@@ -309,7 +315,7 @@ def copter(version: Version) -> Firmware:
         kind="multirotor",
         modes=COPTER_MODES,
         arming=ArmingTimes(spool_up=1 * S, abandoned_after=1500 * MS, landed_after=LANDED_AFTER),
-        parameters=ParameterTable(copter_parameters, copter_tuning, own_parameters, COPTER_SUPPORTED),
+        parameters=table_of(version, cache(version.parameters), copter_tuning, COPTER_SUPPORTED),
         on_step=_on_step,
         endpoint=partial(MavlinkEndpoint, px4_mavlink(QUADROTOR, commands.COPTER_COMMANDS, version)),
         version=version,
@@ -438,12 +444,11 @@ ROVER_MODES = modes.mode_table(
 )
 
 
-@cache
-def rover_parameters() -> tuple[Parameter, ...]:
+def rover_parameters(version: Version) -> tuple[Parameter, ...]:
     """Return the multirotor's recorded parameters with a rover's MAV_TYPE and a rover's additions."""
     shared = (
         parameter._replace(value=float(GROUND_ROVER)) if parameter.name == "MAV_TYPE" else parameter
-        for parameter in copter_parameters()
+        for parameter in version.parameters()
     )
     return (*shared, *ASSUMED)
 
@@ -453,7 +458,9 @@ def rover(version: Version) -> Firmware:
     return px4_firmware(
         kind="rover",
         modes=ROVER_MODES,
-        parameters=ParameterTable(rover_parameters, rover_tuning, own_parameters, ROVER_SUPPORTED),
+        parameters=table_of(
+            version, cache(partial(rover_parameters, version)), rover_tuning, ROVER_SUPPORTED
+        ),
         on_step=on_step,
         endpoint=partial(MavlinkEndpoint, px4_mavlink(GROUND_ROVER, ROVER_COMMANDS, version)),
         version=version,

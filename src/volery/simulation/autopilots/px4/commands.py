@@ -373,8 +373,9 @@ def on_region(vehicle: Vehicle, command: Command) -> int:
 
 
 def on_gripper(vehicle: Vehicle, command: Command) -> int | None:
-    """Handle DO_GRIPPER, which needs PD_GRIPPER_EN; without it nothing answers."""
-    if not vehicle.parameters["PD_GRIPPER_EN"]:
+    """Handle DO_GRIPPER, which needs PD_GRIPPER_EN where there is one; without it nothing answers."""
+    enabling = "PD_GRIPPER_EN"
+    if enabling in vehicle.parameters and not vehicle.parameters[enabling]:
         return None
     return ACCEPTED if to_integer(command.param2) in GRIPPER_ACTIONS else DENIED
 

@@ -8,11 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib.resources import files
 
 from volery.base.time import MS, Ns, S
+from volery.simulation.autopilots.autopilot_parameters import (
+    NOT_RENAMED,
+    Parameter,
+    Renamed,
+    load,
+)
 from volery.simulation.autopilots.mavlink.messages import FAILED
 from volery.simulation.autopilots.px4 import event_interface
 from volery.simulation.autopilots.px4.event_interface import Event
+
+PACKAGE = "volery.simulation.autopilots.px4"
 
 VERTICAL_ABOVE_GROUND, CONSTANT_POSITION = 64, 128
 """ESTIMATOR_STATUS_FLAGS. 1.16 and newer set the second one of a vehicle at rest, with a valid position."""
@@ -117,6 +126,30 @@ class Version:
     """What is said about disarming in flight."""
     events: Mapping[Event, Event | None] = field(default_factory=dict)
     """Events that have another number, or ``None`` where the firmware does not send them."""
+    differences: str = ""
+    """Start of the names of two files beside 1.14's list: ``.parameters`` are new or have another type or
+    default, ``.gone`` are not there.
+    """
+    renamed: Mapping[str, Renamed] = field(default_factory=lambda: NOT_RENAMED)
+    """Names of 1.14 that the simulated one reads, to those of this version."""
+
+    def gone_parameters(self) -> frozenset[str]:
+        """Return the names of 1.14 that are not there."""
+        if not self.differences:
+            return frozenset()
+        return frozenset(files(PACKAGE).joinpath(f"{self.differences}.gone").read_text("ascii").split())
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return the parameters of a multirotor in the order of their indices, by the names of 1.14."""
+        found = {one.name: one for one in load(PACKAGE, "data/copter.parameters")}
+        if self.differences:
+            found |= {one.name: one for one in load(PACKAGE, f"{self.differences}.parameters")}
+        shown, gone = {name: one.name for name, one in self.renamed.items()}, self.gone_parameters()
+        return tuple(
+            one
+            for _, name, one in sorted((shown.get(name, name), name, one) for name, one in found.items())
+            if name not in gone
+        )
 
 
 V1_14 = Version(
@@ -210,6 +243,8 @@ V1_17 = Version(
         event_interface.MINIMUM_TAKEOFF: Event(0x013B2FC7, 0x66),
         event_interface.FENCE_DISTANCE: None,
     },
+    differences="data/copter-1.17",
+    renamed={"MPC_HOLD_DZ": Renamed("MAN_DEADZONE", None)},
 )
 """1.17.0 of 24 April 2026."""
 
