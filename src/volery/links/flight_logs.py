@@ -7,10 +7,11 @@ not by their names. The libraries of the autopilots' projects decode DataFlash (
 
 from __future__ import annotations
 
+import os
 import struct
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
@@ -245,6 +246,29 @@ class _Resilient:
 
 class _BinaryReader(_Resilient, DFReader.DFReader_binary):  # type: ignore[misc]  # pymavlink states no types
     """pymavlink's reader of binary logs, which takes definitions of messages anywhere in a damaged log."""
+
+    def init_arrays_fast(self, progress_callback: Any = None) -> None:
+        """Index the log. The index is made in C, which prints a line for each damaged byte."""
+        with _without_stderr():
+            super().init_arrays_fast(progress_callback)
+
+
+@contextmanager
+def _without_stderr() -> Iterator[None]:
+    """Drop what is written to the descriptor of standard error, also by C."""
+    try:
+        kept = os.dup(2)
+    except OSError:  # it is closed
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
 
 
 class _TextReader(_Resilient, DFReader.DFReader_text):  # type: ignore[misc]

@@ -193,22 +193,28 @@ def read_parameter_file(file: str | Path) -> dict[str, float]:
     found: dict[str, float] = {}
     for number, line in enumerate(lines, 1):
         name, value = _name_and_value(line)
-        if not name:
-            continue
-        if name.startswith("@"):
-            what = (
-                f"{line.strip()!r} is for ArduPilot's build; load that file by itself and leave the line out"
-            )
-            raise UsageError(f"{path}:{number}: {what}")
-        try:
-            found[name] = float(int(value, 16)) if _HEX.fullmatch(value) else float(value)
-        except ValueError:
-            raise UsageError(f"{path}:{number}: {value!r} is no value of {name!r}") from None
-        if not isfinite(found[name]) or not re.fullmatch(r"[A-Za-z_][\w.\[\]>-]*", name):
-            raise UsageError(f"{path}:{number}: {line.strip()!r} is no parameter and its value")
+        if name:
+            try:
+                found[name] = _checked(name, value, line.strip())
+            except UsageError as error:
+                raise UsageError(f"{path}:{number}: {error}") from None
     if not found:
         raise UsageError(f"{path}: there is no parameter of an autopilot in it (component {COMPONENT})")
     return found
+
+
+def _checked(name: str, value: str, line: str) -> float:
+    """Return the value that a *line* states; raise ``UsageError`` if it is none."""
+    if name.startswith("@"):
+        what = "is for ArduPilot's build; load that file by itself and leave the line out"
+        raise UsageError(f"{line!r} {what}")
+    try:
+        number = float(int(value, 16)) if _HEX.fullmatch(value) else float(value)
+    except ValueError:
+        raise UsageError(f"{value!r} is no value of {name!r}") from None
+    if not isfinite(number) or not re.fullmatch(r"[A-Za-z_][\w.\[\]>-]*", name):
+        raise UsageError(f"{line!r} is no parameter and its value")
+    return number
 
 
 _HEX = re.compile(r"0[xX][0-9A-Fa-f]{1,16}")

@@ -141,11 +141,12 @@ def test_a_log_that_was_cut_is_read_up_to_the_cut(copter: Path, px4: Path, stati
         assert 3 < len(part["time"]) <= len(whole["time"])
 
 
-def test_damage_inside_a_log_does_not_end_it(copter: Path) -> None:
+def test_damage_inside_a_log_does_not_end_it(copter: Path, capfd: pytest.CaptureFixture[str]) -> None:
     data = bytearray(copter.read_bytes())
     data[400:410] = bytes(10)
-    copter.write_bytes(data)
-    assert len(read_flight_log(copter)["ATT"]["time"]) >= 15
+    copter.write_bytes(data + bytes(20) + data)
+    assert len(read_flight_log(copter)["ATT"]["time"]) >= 30
+    assert capfd.readouterr() == ("", "")  # the index in C has a line for each damaged byte
 
 
 @pytest.mark.parametrize("length", [0, 2])
