@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Mapping
 from math import copysign, hypot, isfinite, nan
+from typing import NamedTuple
 
 from volery.control.actuation import Command, Measured
 from volery.control.laws import Law, PidLaw, wrap
@@ -80,11 +81,21 @@ class ErrorWatch:
         return f"kp {law.gains.kp:.3g}, ki {law.gains.ki:.3g}, kd {law.gains.kd:.3g}"
 
 
+class _Sums(NamedTuple):
+    """What was asked for, and what came by position and by velocity, up to a time; by axis."""
+
+    at_s: float
+    asked: list[float]
+    came: list[float]
+    felt: list[float]
+
+
 class FollowWatch:
     """Notices a vehicle that does not move as it is commanded.
 
     Judged is a command that has kept its sign for ``WINDOW_S``: what came in the second half of that time,
-    against what was asked for in either half.
+    against what was asked for in either half. It came if the position says so, or the vehicle's velocity: an
+    estimator may hold both apart for a while (PX4 1.15 in SIH: 10 s at -0.4 m/s, with a height that rose).
     """
 
     AXES = ("north", "east", "up", "turn")
@@ -95,11 +106,11 @@ class FollowWatch:
     def reset(self) -> None:
         """Begin anew, after a takeover."""
         self._now_s = 0.0
-        self._asked, self._came = [0.0] * 4, [0.0] * 4
+        self._asked, self._came, self._felt = [0.0] * 4, [0.0] * 4, [0.0] * 4
         self._steady_s = [0.0] * 4
         self._command = Command()
         self._last: Measured | None = None
-        self._seen: deque[tuple[float, list[float], list[float]]] = deque()
+        self._seen: deque[_Sums] = deque()
 
     def check(self, command: Command, measured: Measured, sample_s: float) -> str:
         """Return what was asked and what came, if the vehicle does not follow; else an empty text.
@@ -111,15 +122,17 @@ class FollowWatch:
         """
         self._now_s += sample_s
         moved = self._motion(measured)
-        for axis, way in enumerate(moved):
+        speeds = measured.velocity_north, measured.velocity_east, measured.velocity_up, nan
+        for axis, (way, speed) in enumerate(zip(moved, speeds, strict=True)):
             asked, before = command[axis], self._command[axis]
             kept = isfinite(way) and asked * before > 0.0
             self._steady_s[axis] = self._steady_s[axis] + sample_s if kept else 0.0
             self._asked[axis] += before * sample_s
             self._came[axis] += way if isfinite(way) else 0.0
+            self._felt[axis] += speed * sample_s if isfinite(speed) else 0.0
         self._command, self._last = command, measured
-        self._seen.append((self._now_s, list(self._asked), list(self._came)))
-        while self._seen[0][0] < self._now_s - max(WINDOW_S):
+        self._seen.append(_Sums(self._now_s, list(self._asked), list(self._came), list(self._felt)))
+        while self._seen[0].at_s < self._now_s - max(WINDOW_S):
             self._seen.popleft()
         return next(filter(None, map(self._judged, range(4))), "")
 
@@ -132,9 +145,10 @@ class FollowWatch:
         window_s = WINDOW_S[axis]
         if self._steady_s[axis] < window_s:
             return ""
-        (_, first, _), (_, middle, came_before) = self._before(window_s), self._before(window_s / 2.0)
-        asked = min(middle[axis] - first[axis], self._asked[axis] - middle[axis], key=abs)
-        came = self._came[axis] - came_before[axis]
+        first, middle = self._before(window_s), self._before(window_s / 2.0)
+        asked = min(middle.asked[axis] - first.asked[axis], self._asked[axis] - middle.asked[axis], key=abs)
+        ways = self._came[axis] - middle.came[axis], self._felt[axis] - middle.felt[axis]
+        came = max(ways, key=lambda way: way * copysign(1.0, asked))
         unit = "deg" if axis == 3 else "m"
         if abs(asked) < LEAST_ASKED[axis] or came * copysign(1.0, asked) >= FOLLOWED * abs(asked):
             return ""
@@ -143,9 +157,9 @@ class FollowWatch:
             f"{window_s / 2.0:g} s, {came:.1f} {unit} came"
         )
 
-    def _before(self, seconds: float) -> tuple[float, list[float], list[float]]:
+    def _before(self, seconds: float) -> _Sums:
         """Return what was noted that long ago; samples follow each other evenly."""
-        span = self._now_s - self._seen[0][0]
+        span = self._now_s - self._seen[0].at_s
         share = min(1.0, seconds / span) if span > 0.0 else 1.0
         return self._seen[round((1.0 - share) * (len(self._seen) - 1))]
 

@@ -39,12 +39,17 @@ def test_a_step_an_approach_and_a_jump_are_no_growth() -> None:
     assert all(watch.check([sample("north", 50.0, goal=50.0)], SAMPLE_S) == "" for _ in range(100))
 
 
-def followed(command: Command, share: float, seconds: float = 12.0, north: float | None = None) -> str:
-    """Return what the watch says of a vehicle that does a *share* of what it is commanded."""
+def followed(
+    command: Command, share: float, seconds: float = 12.0, north: float | None = None, climbs: float = 0.0
+) -> str:
+    """Return what the watch says of a vehicle that does a *share* of what it is commanded.
+
+    By its own velocity it *climbs*, m/s.
+    """
     watch, place = FollowWatch(), [0.0] * 4
     for _ in range(round(seconds / SAMPLE_S)):
         measured = Measured(
-            place[3] % 360.0, place[0] if north is None else north, *place[1:3], 0.0, 0.0, 0.0
+            place[3] % 360.0, place[0] if north is None else north, *place[1:3], 0.0, 0.0, climbs
         )
         wrong = watch.check(command, measured, SAMPLE_S)
         if wrong:
@@ -65,6 +70,12 @@ def test_a_command_without_effect_is_told(command: Command, said: str) -> None:
     assert said in followed(command, 0.0)
     assert followed(command, 0.5) == ""
     assert followed(command, 0.0, seconds=4.0) == ""
+
+
+def test_an_estimate_whose_height_and_climb_disagree_is_not_judged() -> None:
+    """A PX4 1.15 in SIH that sank at 0.4 m/s by its velocity was landed, because its height rose."""
+    assert followed(Command(up=-0.45), -0.1, climbs=-0.4) == ""
+    assert "does not follow" in followed(Command(up=-0.45), -0.1, climbs=0.0)
 
 
 def test_small_commands_and_lost_positions_are_not_judged() -> None:
