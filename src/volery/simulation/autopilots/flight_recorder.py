@@ -6,17 +6,14 @@ so that a flight whose log is never read costs next to nothing. Logs persist ove
 
 from __future__ import annotations
 
-from struct import Struct
-
 from volery.base.time import US
-from volery.simulation.autopilots.onboard_log import FlightLog, LogSample
+from volery.simulation.autopilots.onboard_log import SAMPLE, FlightLog
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 EACH = 2
 """One tick of the autopilot in so many is recorded."""
 MOST_SAMPLES, MOST_LOGS = 18_000, 8
 """Samples of a log, an hour: a longer flight goes on in another one. Logs that are kept; the oldest go."""
-_SAMPLE = Struct(f"{len(LogSample._fields)}d")
 
 
 class FlightRecorder:
@@ -43,7 +40,7 @@ class FlightRecorder:
         if self._open is None:
             self._open = self._begin()
         if self._ticks % EACH == 0:
-            self._open.values.frombytes(self._sample())
+            self._open.values += self._sample()
             self._open.extras.append(self._vehicle.rules.log_extras(self._vehicle))
         self._ticks += 1
 
@@ -67,7 +64,7 @@ class FlightRecorder:
         roll, pitch, yaw = estimate.attitude
         roll_rate, pitch_rate, yaw_rate = estimate.rates
         latitude, longitude, amsl = estimate.geodetic
-        return _SAMPLE.pack(
+        return SAMPLE.pack(
             vehicle.uptime() / US,
             vehicle.mode.number,
             north,

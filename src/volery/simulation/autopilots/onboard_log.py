@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from struct import Struct
 from typing import NamedTuple
 
 from volery.base.frames import Vector
@@ -45,6 +45,9 @@ class LogSample(NamedTuple):
     amsl: float
 
 
+SAMPLE = Struct("=d20f2d1f")
+"""A ``LogSample`` as it is kept: single precision, but for its time and its place."""
+
 LogRow = tuple[str, tuple[float, ...]]
 """A row that only one firmware logs: name of the message, and its values after the time."""
 
@@ -66,7 +69,8 @@ class FlightLog:
     origin: Vector
     home_down: float
     parameters: tuple[Parameter, ...]
-    values: array[float] = field(default_factory=lambda: array("d"))
+    values: bytearray = field(default_factory=bytearray)
+    """Samples, each a ``SAMPLE``."""
     extras: list[tuple[LogRow, ...]] = field(default_factory=list)
     """Rows of the firmware's own beside each sample."""
     encoded: bytes | None = None
@@ -75,15 +79,11 @@ class FlightLog:
     @property
     def ended_at(self) -> Ns:
         """Time of the run of the last sample [ns]."""
-        width = len(LogSample._fields)
-        return (
-            self.started_at + round(self.values[-width] - self.values[0]) * US
-            if self.values
-            else self.started_at
-        )
+        if not self.values:
+            return self.started_at
+        first, last = (SAMPLE.unpack_from(self.values, at)[0] for at in (0, len(self.values) - SAMPLE.size))
+        return self.started_at + round(last - first) * US
 
     def samples(self) -> Iterator[LogSample]:
-        """Yield the samples in order."""
-        width = len(LogSample._fields)
-        for at in range(0, len(self.values), width):
-            yield LogSample(*self.values[at : at + width])
+        """Return the samples in order."""
+        return map(LogSample._make, SAMPLE.iter_unpack(self.values))
