@@ -3,8 +3,8 @@
     PYTHONPATH=tests python tests/golden/ardupilot/extract.py FOLDER
 
 FOLDER holds the telemetry logs (8-byte big-endian microseconds, then a MAVLink frame). Writes
-``facts.json`` beside this file. Times are seconds after the boot, worked out from the messages that
-carry it.
+``facts.json`` of 4.5.6 and ``replays-4.8.json`` beside this file. Times are seconds after the boot, from
+the messages that carry it.
 """
 
 from __future__ import annotations
@@ -302,7 +302,7 @@ def rover(rows: list[Row]) -> dict[str, Any]:
 
 
 def main(folder: Path) -> None:
-    logs = {path.stem: read(path) for path in sorted(folder.glob("ardu*.tlog"))}
+    logs = {path.stem: read(path) for path in sorted(folder.glob("ardu*.tlog")) if "4.8" not in path.stem}
     copter = {name: rows for name, rows in logs.items() if name.startswith("arducopter")}
     flight = logs["arducopter-guided-flight"]
     refused = logs["arducopter-arm-refused"]
@@ -341,6 +341,14 @@ def main(folder: Path) -> None:
         "mission": mission(logs["arducopter-params-mission"]),
         "rover": rover(logs["ardurover-drive"]),
     }
+    newer = {
+        "guided": replay(
+            read(folder / "arducopter-4.8dev-guided.tlog"),
+            ("SET_POSITION_TARGET_LOCAL_NED", "SET_ATTITUDE_TARGET", "COMMAND_INT"),
+        )
+    }
+    at = Path(__file__).with_name("replays-4.8.json")
+    at.write_text(json.dumps(newer) + "\n", encoding="utf-8")
     target = Path(__file__).with_name("facts.json")
     lines = ",\n".join(
         f"{json.dumps(key)}: {json.dumps(value, allow_nan=False)}" for key, value in facts.items()

@@ -81,7 +81,8 @@ class FlightLog:
         """Time of the run of the last sample [ns]."""
         if not self.values:
             return self.started_at
-        first, last = (SAMPLE.unpack_from(self.values, at)[0] for at in (0, len(self.values) - SAMPLE.size))
+        first: float = SAMPLE.unpack_from(self.values)[0]
+        last: float = SAMPLE.unpack_from(self.values, len(self.values) - SAMPLE.size)[0]
         return self.started_at + round(last - first) * US
 
     def samples(self) -> Iterator[LogSample]:

@@ -423,6 +423,7 @@ def copter(version: Version) -> Firmware:
                 "ESC_TELEMETRY_1_TO_4": telemetry.esc_telemetry,
                 "TERRAIN_REPORT": telemetry.terrain_report,
                 "WIND": telemetry.wind,
+                **({"ATTITUDE_TARGET": telemetry.attitude_target} if version.sends_attitude_target else {}),
             },
             streams=streams((), ("WIND", "TERRAIN_REPORT", "ESC_TELEMETRY_1_TO_4")),
         ),

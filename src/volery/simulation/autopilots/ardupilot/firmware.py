@@ -168,6 +168,7 @@ BUILDERS: Mapping[str, Builder] = {
 ORDER: Sequence[str] = (
     "ATTITUDE",
     "ATTITUDE_QUATERNION",
+    "ATTITUDE_TARGET",
     "GLOBAL_POSITION_INT",
     "HOME_POSITION",
     "GPS_GLOBAL_ORIGIN",

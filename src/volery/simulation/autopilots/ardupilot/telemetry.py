@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import degrees, hypot, nan, pi
 
 from volery.base.elementary import atan2
-from volery.base.frames import attitude_enu_to_ned, quaternion_to_euler
+from volery.base.frames import attitude_enu_to_ned, euler_to_quaternion, quaternion_to_euler
 from volery.base.time import US, S
 from volery.simulation.autopilots.ardupilot import airspeed, proximity
 from volery.simulation.autopilots.ardupilot.sensor_status import FIX_AFTER, NO_FIX_AFTER, receiver_is_lost
@@ -488,6 +488,13 @@ def terrain_report(vehicle: Vehicle) -> Fields:
         "current_height": amsl,
         "pending": 504,
     }
+
+
+def attitude_target(vehicle: Vehicle) -> Fields:
+    """Return ATTITUDE_TARGET of a copter, without body rates."""
+    estimate = vehicle.estimate
+    q = euler_to_quaternion(*estimate.target_attitude)
+    return {"time_boot_ms": boot_ms(vehicle), "q": q, "thrust": estimate.throttle if vehicle.armed else 0.0}
 
 
 def esc_telemetry(vehicle: Vehicle) -> Fields | None:

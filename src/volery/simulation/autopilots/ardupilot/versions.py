@@ -29,6 +29,8 @@ class Version:
     """Whether PARAM_ERROR answers a request for a parameter that does not exist; else nothing does."""
     rates_all_or_none: bool
     """Whether SET_ATTITUDE_TARGET must state all body rates or none (from 4.6 on); else the copter stops."""
+    sends_attitude_target: bool
+    """Whether a copter sends ATTITUDE_TARGET when it is requested."""
     receiver_found: tuple[str, ...]
     """Texts when the receiver of satellites is found."""
 
@@ -158,6 +160,7 @@ V4_5 = Version(
     commit="7ce11b41",
     reports_missing_parameters=False,
     rates_all_or_none=False,
+    sends_attitude_target=False,
     receiver_found=("GPS 1: detected as u-blox at 230400 baud",),
 )
 
@@ -168,6 +171,7 @@ V4_8 = Version(
     renamed=RENAMED_IN_4_7,
     reports_missing_parameters=True,
     rates_all_or_none=True,
+    sends_attitude_target=True,
     receiver_found=("GPS 1: probing for u-blox at 230400 baud", "GPS 1: detected u-blox"),
 )
 
