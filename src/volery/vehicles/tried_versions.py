@@ -73,9 +73,9 @@ TABLE: Sequence[Row] = (
         "mission-that-returns failed 1 of 4 times, before its mend",
     ),
     Row("PX4", (1, 13), "PX4 1.13", "v1.13.0", "2022-06-20", _ONLY_READ, "estimator and modes only"),
-    Row("PX4", (1, 14), "PX4 1.14.0", "main of 2023-05-31", "2026-11-28", _ALL),
-    Row("PX4", (1, 15), "PX4 1.15.4", "v1.15.4", "2026-11-28", _ALL),
-    Row("PX4", (1, 16), "PX4 1.16.2", "v1.16.2", "2026-11-28", _ALL),
+    Row("PX4", (1, 14), "PX4 1.14.3", "1dacb4cdef2d; main of 2023-05-31", "2026-11-28", _ALL),
+    Row("PX4", (1, 15), "PX4 1.15.4", "99c40407ffd7", "2026-11-28", _ALL),
+    Row("PX4", (1, 16), "PX4 1.16.2", "54f0455ffcd7", "2026-11-28", _ALL),
     Row(
         "PX4",
         (1, 17),
@@ -89,7 +89,7 @@ TABLE: Sequence[Row] = (
     Row(
         *("Paparazzi", None, "rotorcraft firmware, master", "f19834aaa, pprzlink ac28897", "2026-11-28"),
         (_FLOWN, _FLOWN, _UNTRIED, _UNTRIED, _FLOWN, _FLOWN),
-        "in NPS; settings stand for parameters, blocks of the flight plan for missions",
+        "in NPS, volery go by set-points too; settings stand for parameters, blocks of its plan for missions",
     ),
     Row(
         *("DJI", None, "Onboard SDK 3.8 and 4.1", "definitions and nodes of both", "2026-11-28"),
