@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import NoReturn
 
-from volery.ros.client_libraries import message_filters, rclpy, rospy, tf2
+from volery.ros.client_libraries import actionlib, message_filters, rclpy, rospy, tf2
 from volery.ros.client_libraries.library_base import AtEnd, Launch, ignore_end
 from volery.ros.graph import Node, RosGraph
 
 _UNAVAILABLE = {
-    "actionlib": "make topics and services of it, or use rclpy.action",
     "dynamic_reconfigure": "ask rospy.get_param each time, as a parameter may be set while it runs",
     "dynamic_reconfigure.client": "use rospy.set_param",
     "dynamic_reconfigure.server": "ask rospy.get_param each time, as a parameter may be set while it runs",
@@ -31,6 +30,7 @@ def importable_modules(
     return {
         **found,
         **tf2.modules(graph.kernel, found["rospy"], found["rclpy.executors"]),
+        **actionlib.modules(found["rospy"]),
         **message_filters.modules(found["rospy"], found["rclpy.time"]),
         **{name: _unavailable_module(name, instead) for name, instead in _UNAVAILABLE.items()},
     }

@@ -15,7 +15,15 @@ from types import ModuleType
 from typing import Any
 
 from volery.base.errors import Location, ModelError, UsageError, choices, did_you_mean
-from volery.ros.messages.store import action_types, define_all, message_class, service, service_types, types
+from volery.ros.messages.store import (
+    action_types,
+    define_all,
+    define_ros1_action,
+    message_class,
+    service,
+    service_types,
+    types,
+)
 from volery.ros.messages.workspace import Workspace, entries
 
 ROS1_SPELLING = {"mavros_msgs": {"VFR_HUD": "VfrHud"}}
@@ -39,6 +47,8 @@ class _Definitions(ModuleType):
             if self._kind == "srv" and wanted.endswith(ending) and wanted not in self._known:
                 pair = getattr(self, wanted.removesuffix(ending).removesuffix("_"))
                 return getattr(pair, ending)
+        if wanted not in self._known and self._kind == "msg" and define_ros1_action(self._package, wanted):
+            self._known.append(wanted)
         if wanted not in self._known:
             hint = did_you_mean(name, self._known)
             raise AttributeError(f"{self.__name__} has no {name!r}{hint}; it has {choices(self._known)}")

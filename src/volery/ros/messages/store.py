@@ -178,6 +178,36 @@ def parse_definition(name: str, text: str, *, idl: bool = False) -> dict[str, An
     return parsed
 
 
+_ROS1_ENDINGS = ("ActionGoal", "ActionResult", "ActionFeedback", "Action", "Goal", "Result", "Feedback")
+
+
+def define_ros1_action(package: str, name: str) -> bool:
+    """Define the messages that ROS 1 makes of an action, if *name* is one of them; return whether it is.
+
+    Of the action ``Dock`` these are ``DockGoal``, ``DockResult`` and ``DockFeedback``, the three of them with
+    header and status, ``DockActionGoal`` and so on, and ``DockAction``, which has all.
+    """
+    known = store().fielddefs
+    full = f"{package}/msg/{name}"
+    labels = (name.removesuffix(ending) for ending in _ROS1_ENDINGS if name.endswith(ending))
+    label = next((one for one in labels if f"{package}/action/{one}_FeedbackMessage" in known), None)
+    if label is None or full in known:
+        return label is not None
+    inner = f"{package}/msg/{label}"
+    parts = ("Goal", "Result", "Feedback")
+    store().register(
+        {f"{inner}{part}": known[f"{inner}_{part}"] for part in parts if f"{inner}{part}" not in known}
+    )
+    texts: dict[str, str] = {}
+    for part in parts:
+        of = "GoalID goal_id" if part == "Goal" else "GoalStatus status"
+        own = f"{package}/{label}{part} {part.lower()}"
+        texts[f"{inner}Action{part}"] = f"std_msgs/Header header\nactionlib_msgs/{of}\n{own}"
+    whole = (f"{package}/{label}Action{part} action_{part.lower()}" for part in parts)
+    _register(store(), {**texts, f"{inner}Action": "\n".join(whole)})
+    return True
+
+
 def _register(into: rosbags.Typestore, texts: dict[str, str]) -> None:
     parsed = {}
     for name, text in texts.items():

@@ -148,11 +148,15 @@ class Session:
         except ROSInterruptException:
             pass
         except Exception as error:
-            text = f"{what} raised {_description(error)}"
-            self.log(ERROR, f"bad callback: {text}")
-            if text not in self.failures:
-                self.failures.add(text)
-                self.kernel.record(Failure(self.kernel.now(), self.node.context.component, text))
+            self.report_failure(what, error)
+
+    def report_failure(self, what: str, error: Exception) -> None:
+        """Log what a callback has raised; each text is a failure of the component once."""
+        text = f"{what} raised {_description(error)}"
+        self.log(ERROR, f"bad callback: {text}")
+        if text not in self.failures:
+            self.failures.add(text)
+            self.kernel.record(Failure(self.kernel.now(), self.node.context.component, text))
 
 
 def _description(error: Exception) -> str:
