@@ -442,7 +442,7 @@ def _is_cut(file: Path) -> bool:
     """Return whether a file is not even JSON: a full disk has cut it off."""
     try:
         json.loads(read_text(file))
-    except ValueError:
+    except (ValueError, RecursionError):
         return True
     except OSError:
         return False

@@ -194,9 +194,10 @@ def test_a_record_that_a_full_disk_has_cut_off_is_made_again(tmp_path: Path, lef
     recover(folder)
     record = folder / "run.json"
     whole = record.read_bytes()
-    record.write_bytes(whole[:left])
-    recover(folder)
-    assert record.read_bytes() == whole
+    for spoilt in (whole[:left], b"[" * 100_000):
+        record.write_bytes(spoilt)
+        recover(folder)
+        assert record.read_bytes() == whole
 
 
 def test_a_parcel_is_drawn_with_the_vehicle_of_the_component_that_has_it(tmp_path: Path) -> None:

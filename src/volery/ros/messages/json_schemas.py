@@ -82,11 +82,11 @@ class JsonType:
         self.left_out: dict[str, None] = {}
         try:
             self._schema = json.loads(schema)
-        except ValueError as error:
+            if not isinstance(self._schema, dict):
+                raise UsageError("its JSON schema is no object")
+            kind, self._read = self._message_type(self._label, self._schema, whole=True)
+        except (ValueError, RecursionError) as error:
             raise UsageError(f"its JSON schema cannot be read: {error}") from None
-        if not isinstance(self._schema, dict):
-            raise UsageError("its JSON schema is no object")
-        kind, self._read = self._message_type(self._label, self._schema, whole=True)
         own = self._texts.pop(kind.rpartition("/")[2])
         parts = (f"{'=' * 80}\nMSG: {self._package}/{label}\n{text}" for label, text in self._texts.items())
         self.definition = "".join((own, *parts))
@@ -100,7 +100,7 @@ class JsonType:
         self._types = types
         try:
             return self._read(json.loads(data))
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise UsageError(f"these {len(data)} bytes are no JSON of its schema: {error}") from error
 
     # -- types of schemas
@@ -111,7 +111,7 @@ class JsonType:
         reference = schema.get("$ref")
         if isinstance(reference, str):
             return self._referred(reference)
-        kind = schema.get("type")
+        kind = str(schema.get("type"))
         if kind == "string" and schema.get("contentEncoding") == "base64":
             return "uint8[]", _bytes
         if kind in _SIMPLE:

@@ -377,7 +377,10 @@ def test_json_that_does_not_fit_is_left_out_and_named(tmp_path: Path) -> None:
     path = json_recording(tmp_path / "more.mcap", schema, '{"n": 1, "other": 2}')
     status, result, _ = converted(path, tmp_path / "more")
     assert (status, result["written"], list(result["fields_left_out"])) == (3, 1, ["/seen"])
-    for schema_of_no_object in ([], 7, {"type": "object", "properties": 7}):
+    deep: object = {}
+    for _ in range(400):
+        deep = {"type": "object", "properties": {"a": deep}}
+    for schema_of_no_object in ([], 7, deep, {"properties": 7}, {"properties": {"a": {"type": {"b": []}}}}):
         path = json_recording(tmp_path / "s.mcap", schema_of_no_object, '{"n": 1}')
         assert open_bag(path).complete
 
