@@ -270,3 +270,10 @@ def test_a_file_of_ardupilots_own_has_equal_signs_and_masks(tmp_path: Path) -> N
             read_parameter_file(file)
         assert str(caught.value).startswith(f"{file}:1: ")
         assert said in str(caught.value)
+
+
+def test_a_missing_answer_says_what_it_is_due_to() -> None:
+    silent = Autopilot({"A": 1.0}, lost=lambda name, number: True)
+    silent.services.cause = lambda: "it signs its messages"
+    with pytest.raises(NotArrived, match="no answer; it signs its messages"):
+        silent.run(lambda: silent.parameters.get("A"))
