@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from traceback import walk_stack, walk_tb
 from types import FrameType
+from typing import Protocol
 
 from volery.base.errors import ComponentError, VoleryError
 from volery.base.time import Ns
@@ -25,6 +26,14 @@ COMPONENT_MARK = "__volery_user__"
 
 OnFailure = Callable[[str, Exception], None]
 """Called with the name of a component whose flow of control has ended with an error, and the error."""
+
+
+class Joinable(Protocol):
+    """A thread of component code."""
+
+    def join(self) -> None:
+        """Wait until it has ended."""
+
 
 ReadSteps = Callable[[], int]
 """Returns the steps of counted code since the last call."""
@@ -93,6 +102,7 @@ class Instance:
         self.object: object | None = None  # until its constructor has returned
         self.scope: Scope | None = None
         self.on_failure: OnFailure = lambda name, error: None
+        self.threads: list[Joinable] = []  # those that the end of a script waits for
         self._unavailable = ""  # why there will never be an object
         self._read_steps = read_steps
         self._uncharged: Ns = 0
@@ -121,7 +131,8 @@ class Instance:
         self._constructed.notify()
 
     def set_unavailable(self, reason: str) -> None:
-        """Record that there will be no object; waiting and later calls raise ``ComponentError``."""
+        """Record that there is no object any more; waiting and later calls raise ``ComponentError``."""
+        self.object = None
         self._unavailable = reason
         self._constructed.notify()
 
@@ -157,11 +168,18 @@ class Instance:
     def run_guarded(self, body: Callable[[], object], doing: str) -> bool:
         """Run component code at the root of a task; record and report its errors.
 
+        ``sys.exit()`` ends it, which is an error if the exit status is not 0.
+
         Returns:
             Whether the code ended without an error.
         """
         try:
             body()
+        except SystemExit as end:
+            status = exit_status(end)
+            if not status:
+                return True
+            self.report_exit(status, end)
         except VoleryError as error:
             with self.kernel as kernel:
                 kernel.record(Failure(kernel.now(), self.name, str(error)))
@@ -173,6 +191,14 @@ class Instance:
         else:
             return True
         return False
+
+    def report_exit(self, status: int, end: SystemExit | None = None) -> None:
+        """Record and report that the component has ended with an exit status that is not 0."""
+        text = f": {end.code}" if end is not None and isinstance(end.code, str) else ""
+        what = f"ended with exit status {status}{text}{place_of(end) if end is not None else ''}"
+        with self.kernel as kernel:
+            kernel.record(Failure(kernel.now(), self.name, what))
+        self.on_failure(self.name, ComponentError(self.name, what))
 
     @contextmanager
     def serving(self, task: Task, operation: str) -> Iterator[object]:
@@ -213,6 +239,13 @@ class ForeignError(Exception):
         super().__init__(f"{kind}: {what}" if what else kind)
 
 
+def exit_status(end: SystemExit) -> int:
+    """Return the exit status of a process that ends by ``sys.exit()``, as Python does."""
+    if end.code is None:
+        return 0
+    return end.code if isinstance(end.code, int) else 1
+
+
 def describe(error: BaseException) -> str:
     """Return what was raised, and the line of the component's code that did it or made the call.
 
@@ -222,15 +255,20 @@ def describe(error: BaseException) -> str:
     if isinstance(error, ForeignError):
         return str(error)
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return f"{text}{place_of(error)}"
+
+
+def place_of(error: BaseException) -> str:
+    """Return the line of the component's code that raised an error, as `` (part.py:41)``, or ""."""
     raised = [(frame, line) for frame, line in walk_tb(error.__traceback__)]
     outer = walk_stack(raised[0][0].f_back) if raised else ()
     own = [one for one in raised if _is_component_code(one[0])]
     own = own or [one for one in outer if _is_component_code(one[0])][:1]
     own = own or [one for one in raised if not one[0].f_globals.get("__name__", "").startswith(_FRAMEWORK)]
     if not own:
-        return text
+        return ""
     frame, line = own[-1]
-    return f"{text} ({frame.f_code.co_filename.rpartition('/')[2]}:{line})"
+    return f" ({frame.f_code.co_filename.rpartition('/')[2]}:{line})"
 
 
 _FRAMEWORK = "volery."

@@ -20,8 +20,9 @@ import builtins
 import os
 import re
 import sys
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.machinery import EXTENSION_SUFFIXES
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -29,8 +30,10 @@ from types import CodeType, ModuleType
 from typing import Any
 
 from volery.base.errors import ComponentError, Location, ModelError, VoleryError, did_you_mean
-from volery.components.instance import COMPONENT_MARK, describe
+from volery.components.instance import COMPONENT_MARK, Instance, describe
+from volery.components.virtual_stdlib.process_modules import ProcessModules
 from volery.cost import StepCounter
+from volery.kernel.task import ExecutionContext
 from volery.ros.messages import Workspace, define_packages, modules
 from volery.ros.messages.workspace import module_file
 
@@ -222,6 +225,22 @@ def _module_files(folder: Path, name: str) -> Iterator[Path]:
         yield module
 
 
+class Host:
+    """What a script reaches of its run when it ends. This one reaches nothing."""
+
+    def at_end(self, context: ExecutionContext, last: Callable[[], object]) -> None:
+        """Call *last* in *context* when the component or the run ends."""
+
+    def leave(self, component: str) -> None:
+        """Call what is left to be called of a component whose script has ended, and remove it from the run.
+
+        Called in the script's flow of control.
+        """
+
+    def kill(self, component: str) -> None:
+        """Remove a component from the run at once."""
+
+
 @dataclass
 class Loader:
     """Loads the files of one run.
@@ -233,12 +252,14 @@ class Loader:
         libraries: Top-level names of imported libraries whose code is not counted: those outside Python's
             own, and ``COMPUTING_MODULES``.
         workspace: The packages that scripts can import.
+        host: What a script reaches of the run by its end.
     """
 
     replacements: MutableMapping[str, ModuleType] = field(default_factory=dict)
     steps: StepCounter | None = None
     libraries: set[str] = field(default_factory=set)
     workspace: Workspace = field(default_factory=Workspace)
+    host: Host = field(default_factory=Host)
 
     def __post_init__(self) -> None:
         self._codes: dict[Path, CodeType] = {}
@@ -429,30 +450,90 @@ class ScriptSpace(Space):
 
     Args:
         loader: The run's loader.
-        name: Name of the instance.
-        script: Its file.
+        instance: The component.
+        source: Its file.
+        arguments: Its arguments.
     """
 
-    def __init__(self, loader: Loader, name: str, script: Path) -> None:
-        super().__init__(loader, f"{USER_MODULE_PREFIX}{name}.")
-        self._script = script
-        self.path = [str(script.parent), *sys.path]
-        """``sys.path`` of the process."""
+    def __init__(
+        self, loader: Loader, instance: Instance, source: SourceFile, arguments: Sequence[str] = ()
+    ) -> None:
+        super().__init__(loader, f"{USER_MODULE_PREFIX}{instance.name}.")
+        self._instance = instance
+        self._source = source
+        self._script = source.path
+        self._path = [str(source.path.parent), *sys.path]
+        self._process = ProcessModules(
+            instance.kernel,
+            instance.name,
+            arguments=[str(source.path), *arguments],
+            path=self._path,
+            at_end=partial(loader.host.at_end, instance.context),
+            leave=self._exit_at_once,
+            import_module=self._import_module,
+        )
         self._uses_ros: dict[str, bool] = {}
 
-    def run(self, source: SourceFile, function: str = "") -> object:
-        """Execute the script as ``__main__``, then call *function* of it, if one is named."""
-        module = self.module(f"{self._prefix}__main__", source.path)
+    def run(self, function: str = "") -> None:
+        """Execute the script as ``__main__``, then call *function* of it, if one is named.
+
+        At the end its threads are awaited, but for daemons, and its final functions are called, as by Python.
+
+        Raises:
+            SystemExit: The script has ended with a status; also that which *function* returns.
+        """
+        module = self.module(f"{self._prefix}__main__", self._script)
         module.__name__ = "__main__"
-        exec(self.loader.compile(source, module), module.__dict__)
-        return getattr(module, function)() if function else None
+        self._process.sys.modules["__main__"] = module
+        try:
+            exec(self.loader.compile(self._source, module), module.__dict__)
+            if function:
+                raise SystemExit(getattr(module, function)())
+        except (Exception, SystemExit):
+            self._finish()
+            raise
+        self._finish()
+
+    def _finish(self) -> None:
+        for thread in self._instance.threads:
+            thread.join()
+        self._process.over = True
+        self.loader.host.leave(self._instance.name)
+        self._process.finish()
+
+    def _exit_at_once(self, status: int) -> None:
+        self._process.finish()
+        if status:
+            self._instance.report_exit(status)
+        self.loader.host.kill(self._instance.name)
+
+    def _import_module(self, name: str, package: str | None = None) -> ModuleType:
+        level = len(name) - len(name.lstrip("."))
+        folder = Path(self._script.parent)
+        if level:
+            above = self.imported(package or "", folder)
+            if above is None:
+                raise TypeError(f"the 'package' argument is required to import {name!r}")
+            folder = Path(vars(above)["__file__"]).parent
+        import_ = _Import(self, folder / "__init__.py")
+        return import_(name.lstrip("."), fromlist=("__name__",), level=level)
+
+    def replaced(self, name: str) -> ModuleType | None:
+        """See ``Space``. Modules that are the process's own come first."""
+        return self._process.get(name) or super().replaced(name)
+
+    def module(self, full_name: str, path: Path) -> ModuleType:
+        """See ``Space``."""
+        made = super().module(full_name, path)
+        self._process.sys.modules[full_name] = made
+        return made
 
     def places(self, top: str, folder: Path) -> list[Path]:
         """See ``Space``."""
         if top == FRAMEWORK_PACKAGE:
             return []
         before = set(sys.path)
-        found = [Path(one or ".") for one in self.path if one not in before]  # the script's folder
+        found = [Path(one or ".") for one in self._path if one not in before]  # the script's folder
         if top in sys.stdlib_module_names:
             return found
         package = self.loader.workspace.python_folder(top, self._script)

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 from volery.base.errors import Location, ModelError, choices, did_you_mean
 from volery.base.time import Ns
-from volery.components.component_api import register_kernel
+from volery.components.component_api import caller, component_of, register_kernel
 from volery.components.entry_points import entry_function
 from volery.components.instance import Instance, OnFailure
 from volery.components.loader import Loader, ScriptSpace, SourceFile, parse
@@ -143,15 +143,17 @@ class ScriptProgram:
     Args:
         loader: The run's loader.
         source: The script.
-        name: Name of the instance.
+        arguments: Its command-line arguments.
         function: Function that is called after the file has been executed, as an entry point of its package
             does; empty for a file that calls what it defines by itself.
     """
 
-    def __init__(self, loader: Loader, source: SourceFile, name: str, function: str = "") -> None:
+    def __init__(
+        self, loader: Loader, source: SourceFile, arguments: Sequence[str] = (), function: str = ""
+    ) -> None:
         self._loader = loader
         self._source = source
-        self._name = name
+        self._arguments = arguments
         self._function = function
 
     def check(self, given: Iterable[str], operations: Iterable[str], active: bool) -> None:
@@ -183,7 +185,9 @@ class ScriptProgram:
 
     def run(self, thing: object) -> None:
         """See ``Program``."""
-        ScriptSpace(self._loader, self._name, self._source.path).run(self._source, self._function)
+        instance = component_of(caller("a script")[1])
+        assert instance is not None, "a script runs in the flow of control of its component"
+        ScriptSpace(self._loader, instance, self._source, self._arguments).run(self._function)
 
 
 def load_program(
@@ -192,6 +196,8 @@ def load_program(
     path: Path,
     class_name: str,
     where: Location | None = None,
+    *,
+    arguments: Sequence[str] = (),
     function: str = "",
 ) -> Program:
     """Load the program of an instance.
@@ -202,6 +208,7 @@ def load_program(
         path: File of the component.
         class_name: Class in the file; empty for a script.
         where: Line of the model that names the file.
+        arguments: Command-line arguments of a script.
         function: Function of a script that is called; by default, that of its package's entry point.
 
     Raises:
@@ -213,7 +220,7 @@ def load_program(
         if function and not source.defines(function):
             raise ModelError(f"no function {function!r}, which 'main' names", where=Location(str(path), 1))
         called = function or ("" if source.is_script() else entry_function(source))
-        return ScriptProgram(loader, source, name, called)
+        return ScriptProgram(loader, source, arguments, called)
     _require_class(source, class_name)
     module = loader.load(source, name)
     cls = getattr(module, class_name, None)

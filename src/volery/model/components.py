@@ -368,7 +368,7 @@ class _RequiredPort(Syntax):
         return {"type": "string"}
 
 
-INSTANCE_KEYS = ("is", "component", "parameters", "active", "namespace", "remap")
+INSTANCE_KEYS = ("is", "component", "parameters", "arguments", "active", "namespace", "remap")
 """Keys of an instance. Every other key of an instance is a required port."""
 
 
@@ -433,6 +433,27 @@ class Build:
     ] = ()
 
 
+STOP, RESTART, END_RUN = "stop", "restart", "end_run"
+
+
+@dataclass(frozen=True, slots=True)
+class OnFailure:
+    """What follows when a component fails. Without ``most``, it is started again each time."""
+
+    action: Annotated[
+        str,
+        OneOf((STOP, RESTART, END_RUN)),
+        "`stop`: it is stopped and the run goes on; `restart`: it is started again; `end_run`: the run ends.",
+    ] = STOP
+    most: Annotated[
+        int | None, Key("max"), Whole(least=1), "Starts again at most; any number if it is not given."
+    ] = None
+    delay_ns: Annotated[Ns, TIME, "Time until it is started again."] = 0
+
+
+ON_FAILURE = Shorter(Record(OnFailure), key="action")
+
+
 @dataclass(frozen=True, slots=True)
 class Component:
     """A kind of component: its language and file, its ports, and what it takes in fidelity `times`.
@@ -454,6 +475,12 @@ class Component:
         "Function of a script that is called after the file was executed; by default, that of an entry point "
         "of its package.",
     ] = ""
+    arguments: Annotated[
+        tuple[str, ...],
+        ListOf(TEXT, bare=True),
+        "Command-line arguments of a script; those of ROS (`a:=b`, `--ros-args`) among them.",
+    ] = ()
+    on_failure: Annotated[OnFailure, ON_FAILURE, "What follows when it fails."] = OnFailure()
     build: Annotated[Build, Record(Build), "How C++ is compiled."] = Build()
     files: Annotated[
         Mapping[str, str],

@@ -263,6 +263,11 @@ class Instance:
     activity: Annotated[
         Activity | None, Key("active"), ACTIVITY, "Its flow of control, on top of the component's."
     ] = None
+    arguments: Annotated[
+        tuple[str, ...],
+        ListOf(TEXT, bare=True),
+        "Command-line arguments of a script, in place of the component's.",
+    ] = ()
     processor: str | None = None
     memory_space: str | None = None
     namespace: Annotated[str, TEXT, "Its ROS namespace."] = "/"
@@ -283,7 +288,7 @@ def _with_component(node: Node, path: Path, reading: Reading) -> Node:
     if component is None or component_of(reading, str(path[-1])) is None:
         return node
     merged = dict(node.items)
-    for key in ("parameters", "active"):
+    for key in ("parameters", "active", "arguments"):
         own, default = merged.get(key), component.items.get(key)
         if default is None or default.value in (None, False):
             continue

@@ -44,6 +44,10 @@ class Landable(Protocol):
         """Block until every armed vehicle that no operator controls has landed."""
 
 
+def _reason(who: str, error: Exception) -> str:
+    return f"{error}" if who in str(error) else f"{who}: {error}"
+
+
 class Ending:
     """Ends a run, for the first reason that is reported."""
 
@@ -57,34 +61,78 @@ class Ending:
         self.error: VoleryError | None = None
         self.begun = False
         self._farewells: list[tuple[ExecutionContext, Callable[[], object]]] = []
+        self._failures: list[str] = []
+        self._landing: set[str] = set()
         self._pending = 0
 
     def failed(self, who: str, error: Exception) -> None:
         """End the run because a task of *who* has raised *error*."""
+        self._keep(error)
+        self.begin("failed", _reason(who, error))
+
+    def component_failed(self, who: str, error: Exception) -> None:
+        """Let the run's outcome be failed because component *who* has; the others go on."""
+        self._keep(error)
+        self._failures.append(_reason(who, error))
+
+    def check_over(self) -> None:
+        """End the run if a component has failed and none is left that runs."""
+        if self._failures and all(task.scope.cancelled for task in self.users.all_tasks()):
+            self.begin("failed", "")
+
+    def _keep(self, error: Exception) -> None:
         if isinstance(error, VoleryError) and self.error is None:
             self.error = error
-        self.begin("failed", f"{error}" if who in str(error) else f"{who}: {error}")
 
     def begin(self, status: Status, reason: str) -> None:
         """End the run. Later calls have no effect."""
         if self.begun:
             return
         self.begun = True
+        if self._failures and status == "completed":
+            status = "failed"
+        if self._failures and status == "failed":
+            more = f" (and {len(self._failures) - 1} more failures)" if len(self._failures) > 1 else ""
+            reason = f"{self._failures[0]}{more}"
         self.status, self.reason = status, reason
         self._kernel.cancel(self.users, reason)
         self._pending = len(self.vehicles) + len(self._farewells)
         for vehicle in self.vehicles:
-            name = f"safety of {vehicle.name}"
-            self._kernel.spawn(partial(self._land, vehicle), name, ExecutionContext(name), self._safety)
+            self.land(vehicle)
         for context, last in self._farewells:
             self._run_farewell(context, last)
         if not self._pending:
             self._kernel.cancel(self._kernel.root, reason)
         self._kernel.call_at(self._kernel.now() + SAFETY_WITHIN, self._give_up)
 
+    def land(self, vehicle: Landable) -> None:
+        """Bring a vehicle to rest; the run need not have ended."""
+        if vehicle.name not in self._landing:
+            self._landing.add(vehicle.name)
+            name = f"safety of {vehicle.name}"
+            self._kernel.spawn(partial(self._land, vehicle), name, ExecutionContext(name), self._safety)
+
     def farewell(self, context: ExecutionContext, last: Callable[[], object]) -> None:
         """Call *last* in *context* when the run ends, after the components have been cancelled."""
         self._farewells.append((context, last))
+
+    def say_farewell(self, component: str) -> None:
+        """Execute the final callbacks of a component now, in its own flow, the last one first."""
+        while own := [one for one in self._farewells if one[0].component == component]:
+            self._farewells.remove(own[-1])
+            try:
+                own[-1][1]()
+            except (Exception, SystemExit) as error:
+                self._record_farewell(component, error)
+
+    def forget_farewells(self, component: str) -> None:
+        """Forget the final callbacks of a component that was killed."""
+        self._farewells = [one for one in self._farewells if one[0].component != component]
+
+    def _record_farewell(self, who: str, error: BaseException) -> None:
+        if not isinstance(error, SystemExit):
+            what = f"failed at the end of the run: {type(error).__name__}: {error}"
+            self._kernel.record(Failure(self._kernel.now(), who, what))
 
     def _run_farewell(self, context: ExecutionContext, last: Callable[[], object]) -> None:
         who = context.component
@@ -93,9 +141,8 @@ class Ending:
         def body() -> None:
             try:
                 last()
-            except Exception as error:
-                what = f"failed at the end of the run: {type(error).__name__}: {error}"
-                self._kernel.record(Failure(self._kernel.now(), who, what))
+            except (Exception, SystemExit) as error:
+                self._record_farewell(who, error)
             finally:
                 self._finish_one()
 
@@ -115,7 +162,9 @@ class Ending:
             vehicle.come_to_rest()
         except VoleryError as error:
             self._kernel.record(Failure(self._kernel.now(), vehicle.name, f"not brought down: {error}"))
-        self._finish_one()
+        self._landing.discard(vehicle.name)
+        if self.begun:
+            self._finish_one()
 
     def _finish_one(self) -> None:
         self._pending -= 1

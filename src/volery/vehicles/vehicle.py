@@ -227,6 +227,10 @@ class Vehicle(ServicedVehicle, Session, ABC):
     def come_to_rest(self) -> str:
         """Land or stop the vehicle unless another station has control; return what was done."""
 
+    def take_over(self) -> None:
+        """Take the present mode as commanded by this program: the station that commanded it is gone."""
+        self._executor.set_commanded(self._driver.telemetry.mode)
+
     def disconnect(self) -> None:
         """Stop all communication. The vehicle goes on with its present operation."""
         with self.kernel.guard:

@@ -2,21 +2,44 @@
 
 from __future__ import annotations
 
+import os
+import re
+import signal
+import sys
 import textwrap
 
 import pytest
 
-from volery.base.errors import ModelError
+from volery.base.errors import ComponentError, ModelError
 from volery.base.time import S
 from volery.components.entry_points import EntryPoint, entry_points
 from volery.components.instance import Allocation, Instance
-from volery.components.loader import Loader, parse
+from volery.components.loader import Host, Loader, parse
 from volery.components.programs import load_program, script_or_class, start
 from volery.components.virtual_stdlib import virtual_modules
 from volery.cost.instrumentation import StepCounter
 from volery.kernel.virtual import VirtualKernel
 from volery.ros.client_libraries.library_base import library_module
 from volery.ros.messages import Workspace, modules
+from volery.trace.events import Text
+
+
+class RecordingHost(Host):
+    """Calls what is left when a component ends, as a run does, and keeps it."""
+
+    def __init__(self, kernel):
+        self.kernel = kernel
+        self.last = []
+
+    def at_end(self, context, last):
+        self.last.append(last)
+
+    def leave(self, component):
+        for last in reversed(self.last):
+            last()
+
+    def kill(self, component):
+        self.kernel.cancel(self.kernel.root, "killed")
 
 
 class Workbench:
@@ -27,12 +50,14 @@ class Workbench:
         self.events = []
         self.kernel = VirtualKernel(self.events.append)
         self.log = []
+        self.host = RecordingHost(self.kernel)
         self.failures = []
         log = library_module("log", {"tell": self.log.append, "__file__": "replaced"})
         rospy = library_module("rospy", {"tell": self.log.append})
         self.loader = Loader(
             {**virtual_modules(self.kernel, 1), **modules(), "log": log, "rospy": rospy, "rospy.msg": log},
             steps,
+            host=self.host,
         )
 
     def write(self, name, text=""):
@@ -44,8 +69,8 @@ class Workbench:
     def package(self, folder):
         self.write(f"{folder}/package.xml", f"<package><name>{folder.rpartition('/')[2]}</name></package>")
 
-    def start(self, path, name="node", function=""):
-        program = load_program(self.loader, name, path, "", function=function)
+    def start(self, path, name="node", function="", arguments=()):
+        program = load_program(self.loader, name, path, "", arguments=arguments, function=function)
         instance = Instance(self.kernel, name, Allocation(priority=0))
         start(instance, program, {}, self.kernel.root, lambda *failure: self.failures.append(failure))
         return instance
@@ -250,6 +275,113 @@ def test_functions_of_counted_scripts_are_counted(bench):
         "def total(them):\n    found = 0\n    for one in them:\n        found += one\n    return found\n",
     )
     assert counted.run(bench.write("node.py", text)) == [3]
+
+
+# -- a process of its own
+
+
+def test_arguments_are_those_of_the_component(bench):
+    text = """
+        import argparse, log, sys
+        from os import path
+        parser = argparse.ArgumentParser()
+        parser.add_argument("--rate", type=float)
+        parser.add_argument("places", nargs="*")
+        given = parser.parse_args()
+        log.tell((path.basename(sys.argv[0]), sys.argv[1:], given.rate, given.places, parser.prog))
+        """
+    found = bench.run(bench.write("node.py", text), arguments=("--rate", "2", "a", "b"))
+    assert found == [("node.py", ["--rate", "2", "a", "b"], 2.0, ["a", "b"], "node.py")]
+
+
+def test_wrong_arguments_end_the_component_with_the_status_of_argparse(bench):
+    script = bench.write("node.py", "import argparse\nargparse.ArgumentParser(prog='n').parse_args()\n")
+    with pytest.raises(ComponentError, match=r"node: ended with exit status 2 \(node\.py:2\)"):
+        bench.run(script, arguments=("--what",))
+    printed = [event.text for event in bench.events if isinstance(event, Text)]
+    assert printed == ["usage: n [-h]", "n: error: unrecognized arguments: --what"]
+
+
+@pytest.mark.parametrize(
+    ("end", "reported"),
+    [
+        ("sys.exit()", None),
+        ("sys.exit(0)", None),
+        ("exit(0)", None),
+        ("os._exit(0)", None),
+        ("sys.exit(3)", r"node: ended with exit status 3 \(node\.py:6\)"),
+        ("sys.exit('no link')", r"node: ended with exit status 1: no link \(node\.py:6\)"),
+        ("os._exit(4)", "node: ended with exit status 4"),
+        ("os.kill(os.getpid(), 15)", "node: ended with exit status 143"),
+        ("return 5", r"node: ended with exit status 5"),
+    ],
+)
+def test_the_exit_status_decides_whether_it_has_failed(bench, end, reported):
+    text = f"""
+        import log, os, sys, time
+        def main():
+            time.sleep(1)
+            log.tell("once")
+            {end}
+        """
+    script = bench.write("node.py", textwrap.dedent(text).lstrip("\n").replace("import", "\nimport", 1))
+    bench.start(script, function="main")
+    bench.kernel.run(5 * S)
+    assert bench.log == ["once"]
+    assert bool(bench.failures) == bool(reported)
+    if reported:
+        assert re.fullmatch(reported, str(bench.failures[0][1]))
+
+
+def test_the_end_waits_for_threads_and_then_calls_what_is_left(bench):
+    text = """
+        import atexit, log, sys, threading, time
+        atexit.register(log.tell, "last")
+        atexit.register(lambda: log.tell(time.time() - 1.7e9))
+        def work(seconds):
+            time.sleep(seconds)
+            log.tell(seconds)
+            sys.exit(9)
+        threading.Thread(target=work, args=(2,)).start()
+        threading.Thread(target=work, args=(3,), daemon=True).start()
+        sys.stdout.write("begun")
+        """
+    bench.start(bench.write("node.py", text))
+    bench.kernel.run(2 * S + 1)
+    assert (bench.log, bench.failures) == ([2, 2.0, "last"], [])
+    assert [event.text for event in bench.events if isinstance(event, Text)] == ["begun"]
+
+
+def test_signals_reach_their_handlers(bench):
+    text = """
+        import log, os, signal
+        log.tell(signal.signal(signal.SIGINT, lambda number, frame: log.tell(signal.Signals(number).name)))
+        os.kill(os.getpid(), signal.SIGINT)
+        try:
+            signal.alarm(3)
+        except Exception as error:
+            log.tell(str(error)[:29])
+        """
+    bench.run(bench.write("node.py", text))
+    assert bench.log == [signal.SIG_DFL, "SIGINT", "signal.alarm is not available"]
+    for last in reversed(bench.host.last):
+        last()
+    assert len(bench.log) == 3  # its process is over: no signal reaches it
+
+
+def test_a_process_changes_nothing_of_the_run(bench):
+    before = (list(sys.argv), list(sys.path), dict(os.environ))
+    text = """
+        import importlib, os, sys, log
+        sys.argv.append("x"); sys.path.insert(0, "here"); os.environ["X_OF_NODE"] = "1"
+        sys.modules["made_up"] = log
+        log.tell(importlib.import_module("helper").NAME)
+        log.tell(sys.modules[importlib.import_module("helper").__name__].NAME)
+        """
+    bench.write("helper.py", "NAME = 'found'\n")
+    assert bench.run(bench.write("node.py", text)) == ["found", "found"]
+    assert (list(sys.argv), list(sys.path), dict(os.environ)) == before
+    assert "made_up" not in sys.modules
 
 
 # -- Python 2

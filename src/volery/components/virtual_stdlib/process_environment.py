@@ -157,6 +157,20 @@ def random_module(kernel: Kernel, seed: int) -> ModuleType:
     return make_module("random", {**names, "Random": Random, "SystemRandom": Random})
 
 
+def record_output(kernel: Kernel, text: str) -> None:
+    """Write text that a component prints, and record it as a line of the trace."""
+    sys.stderr.write(text)
+    with kernel:
+        task = kernel.current()
+        if task is not None and text.strip():
+            kernel.record(Text(kernel.now(), task.context.component, INFO, text.rstrip()))
+
+
+def _exit(code: object = None) -> NoReturn:
+    """Raise ``SystemExit``, as ``exit`` and ``quit`` do."""
+    raise SystemExit(code)
+
+
 def builtins_module(kernel: Kernel) -> ModuleType:
     """Return the replacement of ``builtins``, which is also used for names without an import."""
 
@@ -168,13 +182,8 @@ def builtins_module(kernel: Kernel) -> ModuleType:
             return
         written = StringIO()
         real_builtins.print(*values, sep=sep, end=end, file=written)
-        text = written.getvalue()
-        sys.stderr.write(text)
-        with kernel:
-            task = kernel.current()
-            if task is not None and text.strip():
-                kernel.record(Text(kernel.now(), task.context.component, INFO, text.rstrip()))
+        record_output(kernel, written.getvalue())
 
     module = ModuleType("builtins", real_builtins.__doc__)
-    module.__dict__.update(vars(real_builtins), print=record_print)
+    module.__dict__.update(vars(real_builtins), print=record_print, exit=_exit, quit=_exit)
     return module

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from ast import literal_eval
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple, NoReturn
 
 from volery.base.errors import UsageError, choices, did_you_mean
-from volery.kernel.task import ExecutionContext
+from volery.kernel.task import ExecutionContext, Scope
 from volery.kernel.waiting import current_task
 from volery.ros.graph import EmbeddedGraph, Node, Publisher, QoS, RosGraph
 from volery.ros.messages import message_class
@@ -19,11 +20,65 @@ from volery.ros.messages import message_class
 
 
 class Launch(NamedTuple):
-    """Namespace, remappings and private parameters of a node, as in a launch file."""
+    """Namespace, remappings, private parameters and arguments of a node, as in a launch file."""
 
     namespace: str = "/"
     remaps: Mapping[str, str] = {}
     parameters: Mapping[str, Any] = {}
+    arguments: tuple[str, ...] = ()
+    """The whole command line: the path of the program, and all arguments, those for ROS among them."""
+
+    def given(self, arguments: Sequence[str], ros: int) -> Launch:
+        """Return these settings with a command line on top, as rospy or rclpy reads it.
+
+        Those of ROS 1 have a ``:=``: ``a:=b``, ``_parameter:=1``, ``__ns:=/n``. Those of ROS 2 follow
+        ``--ros-args`` up to ``--``: ``-r a:=b``, ``-r __ns:=/n``, ``-p parameter:=1``.
+        """
+        made = self
+        for key, value in _ros_2_arguments(arguments) if ros == 2 else _ros_1_arguments(arguments):
+            if key.startswith("_parameter:"):
+                parameter = key.removeprefix("_parameter:")
+                made = made._replace(parameters={**made.parameters, parameter: _scalar(value)})
+            elif key == "__ns":
+                made = made._replace(namespace=value)
+            elif not key.startswith("__"):  # the name is the component's, and logging the run's
+                made = made._replace(remaps={**made.remaps, key: value})
+        return made._replace(arguments=tuple(arguments))
+
+
+def _ros_1_arguments(arguments: Iterable[str]) -> Iterator[tuple[str, str]]:
+    for argument in arguments:
+        key, mark, value = argument.partition(":=")
+        if mark:
+            private = key.startswith("_") and not key.startswith("__")
+            yield (f"_parameter:{key[1:]}" if private else key), value
+
+
+def _ros_2_arguments(arguments: Iterable[str]) -> Iterator[tuple[str, str]]:
+    inside, option = False, ""
+    for argument in arguments:
+        if argument in ("--ros-args", "--"):
+            inside = argument == "--ros-args"
+        elif inside and ":=" in argument:
+            key, _, value = argument.partition(":=")
+            key = key.rpartition(":")[2]  # of another node than the first, too: there is one in a component
+            if option in ("-p", "--param"):
+                yield f"_parameter:{key}", value
+            elif option in ("-r", "--remap"):
+                yield ("__name" if key == "__node" else key), value
+        elif inside:
+            option = argument
+
+
+def _scalar(text: str) -> Any:
+    """Return the value that YAML reads from a text of a command line, for numbers, truth values and lists."""
+    words = {"true": True, "false": False, "yes": True, "no": False, "on": True, "off": False}
+    if text.lower() in words:
+        return words[text.lower()]
+    try:
+        return literal_eval(text)
+    except (ValueError, SyntaxError):
+        return text
 
 
 AtEnd = Callable[[ExecutionContext, Callable[[], object]], None]
@@ -57,6 +112,11 @@ class LaunchedComponents:
     def component(self) -> str:
         """Component of the current task."""
         return current_task(self.kernel).context.component
+
+    def started_again(self, scope: Scope) -> bool:
+        """Return whether the current task's component has been started again since it ran in *scope*."""
+        own = current_task(self.kernel).scope
+        return bool(scope.cancelled) and own is not scope and own.parent is scope.parent
 
     def launch_of(self, component: str) -> Launch | None:
         """Return the launch settings of *component*, or None."""

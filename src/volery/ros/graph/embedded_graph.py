@@ -415,6 +415,10 @@ class EmbeddedGraph:
         """Return the names of all nodes, sorted."""
         return sorted(self._nodes)
 
+    def nodes_of(self, component: str) -> list[EmbeddedNode]:
+        """Return the nodes that are charged to a component."""
+        return [node for node in self._nodes.values() if node.context.component == component]
+
     def topics(self) -> list[TopicState]:
         """Return the topics that have a publisher or a subscription, by name."""
         states = []

@@ -19,7 +19,6 @@ from volery.components.programs import (
     StubProgram,
     load_program,
     script_or_class,
-    start,
 )
 from volery.components.virtual_stdlib import virtual_modules
 from volery.cost import StepCounter, library_table
@@ -36,6 +35,7 @@ from volery.ros.graph import EmbeddedGraph, Node, RosGraph
 from volery.ros.graph.embedded_graph import record_all
 from volery.ros.graph.graph_context import Records
 from volery.ros.messages import Workspace, define_imported
+from volery.run.assembly.component_ends import ComponentEnds
 from volery.run.assembly.computers import Platform, commanded_by, is_node
 from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.assembly.fences import fence_of
@@ -51,19 +51,25 @@ if TYPE_CHECKING:
 class UnattendedVehicle:
     """Vehicle that components command by ROS messages only, without a port.
 
-    At the end of the run it joins *graph* and lands through the driver that ``open_on`` opens there.
+    At the end of the run it joins *graph* and lands through the driver that ``open_on`` opens there. Earlier,
+    it is ``abandoned``: its only commander has failed, so that what it still does is no one's will.
     """
 
     def __init__(self, graph: RosGraph, name: str, open_on: Callable[[Node], Vehicle]) -> None:
         self.name = name
         self._graph = graph
         self._open_on = open_on
+        self._vehicle: Vehicle | None = None
+        self.abandoned = False
 
     def come_to_rest(self) -> str:
         """Land the vehicle if it is armed and no operator controls it. Return what was done."""
-        vehicle = self._open_on(self._graph.node(f"safety_of_{self.name}"))
-        vehicle.wait_connected()
-        return vehicle.come_to_rest()
+        if self._vehicle is None:
+            self._vehicle = self._open_on(self._graph.node(f"safety_of_{self.name}"))
+            self._vehicle.wait_connected()
+        if self.abandoned:
+            self._vehicle.take_over()
+        return self._vehicle.come_to_rest()
 
 
 INTERFACES = {kind: interface for interface, kind in VEHICLE_INTERFACES.items()}
@@ -208,6 +214,7 @@ class Builder:
         self._nodes: dict[str, Node] = dict(part.nodes) if part else {}
         self._landable: dict[str, Landable] = {}
         self._instances: dict[str, Instance] = {}
+        self._ends = ComponentEnds(kernel, self._graph, ending, self._commanded_alone)
 
     def build(self, fidelity: str, seed: int, traces: Path | None = None) -> BuiltComponents:
         """Load every file, create every instance, connect every port.
@@ -225,7 +232,9 @@ class Builder:
         ready = compile_all(self._system, self._models, fidelity, traced=traces is not None)
         self._cpp = CppPrograms(self._kernel, self._graph, ready, launches, self._nodes, traces)
         modules = importable_modules(self._graph, launches, self._nodes, self._ending.farewell)
-        loader = Loader({**virtual_modules(self._kernel, seed), **modules}, steps, workspace=workspace)
+        loader = Loader(
+            {**virtual_modules(self._kernel, seed), **modules}, steps, workspace=workspace, host=self._ends
+        )
         self._instances = {model.name: self._instance(model, steps) for model in self._models}
         starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in self._models))
         doubts = tuple(self._cpp.warnings(self._models))
@@ -233,7 +242,10 @@ class Builder:
 
     def _launches(self) -> dict[str, Launch]:
         return {
-            model.name: Launch(model.namespace, model.remap, dict(model.parameters))
+            model.name: Launch(model.namespace, model.remap, dict(model.parameters)).given(
+                (str(self._system.file_of(model.component)), *model.arguments),
+                ros=2 if "rcl" in model.component.language else 1,
+            )
             for model in self._models
             if is_node(model)
         }
@@ -262,8 +274,38 @@ class Builder:
             commands = [one for one in model.connections.values() if _kind(one) is TargetKind.VEHICLE]
             names = [one.port for one in commands]
             program = LateBoundProgram(program, names, lambda: self._connect(model, commands))
-        scope = self._ending.users.child(model.name)
-        return lambda: start(instance, program, given, scope, self._ending.failed)
+        return self._ends.starter(instance, model.component.on_failure, program, given)
+
+    def _commanded_alone(self, component: str) -> list[Landable]:
+        """Return the vehicles that a component commands, by its ports or by topics, and no other one does."""
+        others = [one for one in self._models if one.name != component and self._ends.runs(one.name)]
+        by_ports = {name for one in others for name in commanded_by(one)}
+        found = []
+        for name, vehicle in self._landable.items():
+            commanders = self._publishers_to(name)
+            flown = component in commanders or name in commanded_by(self._system.instance(component))
+            if flown and name not in by_ports and not commanders & {one.name for one in others}:
+                if isinstance(vehicle, UnattendedVehicle):
+                    vehicle.abandoned = True
+                found.append(vehicle)
+        return found
+
+    def _publishers_to(self, vehicle: str) -> set[str]:
+        """Return the components that publish topics in the names of a vehicle."""
+        if not isinstance(self._graph, EmbeddedGraph):
+            return set()
+        below = f"{graph_access(self._autopilot(vehicle), vehicle).namespace.rstrip('/')}/"
+        nodes = {
+            name
+            for topic in self._graph.topics()
+            if topic.name.startswith(below)
+            for name in topic.publishers
+        }
+        return {
+            model.name
+            for model in self._models
+            if any(node.name in nodes for node in self._graph.nodes_of(model.name))
+        }
 
     def _program(self, model: InstanceModel, loader: Loader) -> Program:
         component = model.component
@@ -381,7 +423,15 @@ def python_program(system: System, model: InstanceModel, loader: Loader) -> Prog
         chosen = ""
     elif component.language in PYTHON_ROS and not component.stated_class:
         chosen = script_or_class(path, chosen, component.where)
-    program = load_program(loader, model.name, path, chosen, component.where, component.main)
+    program = load_program(
+        loader,
+        model.name,
+        path,
+        chosen,
+        component.where,
+        arguments=model.arguments,
+        function=component.main,
+    )
     if isinstance(program, ClassProgram):
         for signature in provided_operations(system, model).values():
             program.check_signature(signature.name, [one.name for one in signature.arguments])

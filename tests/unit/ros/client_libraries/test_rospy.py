@@ -275,6 +275,36 @@ out(rospy.get_param_names())
     ]
 
 
+def test_the_command_line_remaps_and_sets_parameters(stage: Any) -> None:
+    given = (
+        "node.py",
+        "3",
+        "cmd:=/fast/cmd",
+        "_height:=2.5",
+        "_names:=[1, 2]",
+        "__ns:=/b",
+        "__log:=x.log",
+        "y",
+    )
+    stage.launched["n"] = Launch("/a", parameters={"height": 1, "/scale": 7}).given(given, ros=1)
+    stage.component(
+        "n",
+        """
+rospy.init_node("n")
+out((rospy.get_name(), rospy.resolve_name("cmd"), rospy.get_param("~height"), rospy.get_param("~names")))
+out((rospy.myargv(), rospy.myargv(["p", "a:=b"]), rospy.get_param("/scale")))
+""",
+    )
+    assert stage.run() == [("/b/n", "/fast/cmd", 2.5, [1, 2]), (["node.py", "3", "y"], ["p"], 7)]
+
+
+def test_arguments_of_ros_2_are_between_its_marks() -> None:
+    line = "node.py a:=1 --ros-args -r n:cmd:=/fast -p on:=true --remap __ns:=/b __node:=x -p k:=c -- -p z:=1"
+    made = Launch().given(line.split(), ros=2)
+    assert made[:3] == ("/b", {"cmd": "/fast"}, {"on": True, "k": "c"})
+    assert made.arguments == tuple(line.split())
+
+
 def test_a_launched_component_names_its_node(stage: Any) -> None:
     for name in ("left", "right"):
         stage.launched[name] = Launch("/fleet", remaps={"cmd": f"{name}/cmd"})

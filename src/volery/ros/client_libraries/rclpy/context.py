@@ -270,7 +270,7 @@ class Contexts(LaunchedComponents):
         """Return the context of the component that the current task belongs to."""
         component = self.component
         found = self._contexts.get(component)
-        if found is None:
+        if found is None or self.started_again(found.task.scope):
             launch, node = self.launch_of(component), self.node_of(component)
             found = self._contexts[component] = Context(self.graph, component, launch, node)
             found.at_end = self.at_end

@@ -6,7 +6,7 @@ under the name of the component.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from types import ModuleType
 from typing import Any
@@ -228,7 +228,7 @@ def _functions(sessions: Sessions) -> dict[str, Callable[..., Any]]:
     """Return the functions of rospy, bound to the sessions of one run."""
     found: tuple[Any, ...] = (
         init_node, is_shutdown, signal_shutdown, on_shutdown, spin, sleep, wait_for_message, wait_for_service,
-        get_name, get_namespace, get_time, get_rostime, resolve_name, get_published_topics,
+        get_name, get_namespace, get_time, get_rostime, resolve_name, get_published_topics, myargv,
         *FUNCTIONS,
     )  # fmt: skip
     bound: dict[str, Callable[..., Any]] = {one.__name__: partial(one, sessions) for one in found}
@@ -236,7 +236,6 @@ def _functions(sessions: Sessions) -> dict[str, Callable[..., Any]]:
         **bound,
         "get_caller_id": bound["get_name"],
         "remap_name": bound["resolve_name"],
-        "myargv": myargv,
     }
 
 
@@ -325,6 +324,8 @@ def get_published_topics(sessions: Sessions, namespace: str = "/") -> list[list[
     return [[one.name, one.type.replace("/msg/", "/")] for one in states if one.name.startswith(below)]
 
 
-def myargv(argv: list[str] | None = None) -> list[str]:
-    """Return the command line without the arguments of ROS; components have none."""
-    return [one for one in argv or [] if ":=" not in one]
+def myargv(sessions: Sessions, argv: Sequence[str] | None = None) -> list[str]:
+    """Return the command line, by default that of this component, without the arguments of ROS."""
+    launch = sessions.launch_of(sessions.component)
+    given = launch.arguments if argv is None and launch is not None else argv or ()
+    return [one for one in given if ":=" not in one]

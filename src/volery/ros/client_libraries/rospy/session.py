@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -139,7 +140,12 @@ class Session:
 
     def _spawn(self, body: Callable[[], None], label: str) -> None:
         context = replace(self.node.context, deadline=None, period=None, on_release=None)
-        self.kernel.spawn(body, f"{context.component} ({label})", context, self.scope)
+
+        def run() -> None:
+            with suppress(SystemExit):  # it ends the thread alone, as in rospy
+                body()
+
+        self.kernel.spawn(run, f"{context.component} ({label})", context, self.scope)
 
     def _guarded(self, run: Callable[[], object], what: str) -> None:
         """Run a callback. An exception is logged, as in rospy, and is a failure of the component."""
@@ -177,7 +183,7 @@ class Sessions(LaunchedComponents):
 
     def join(self, name: str, anonymous: bool) -> None:
         """Execute ``init_node``; a second call of the same component changes nothing."""
-        session = self._open.get(self.component) or self._open_session(name, anonymous)
+        session = self.find() or self._open_session(name, anonymous)
         session.initialised = True
 
     def _open_session(self, name: str, anonymous: bool) -> Session:
@@ -191,7 +197,7 @@ class Sessions(LaunchedComponents):
             label, launch.namespace, remaps=launch.remaps, anonymous=anonymous
         )
         for key, value in launch.parameters.items():
-            node.set_parameter(f"~{key}", value)
+            node.set_parameter(key if key.startswith("/") else f"~{key}", value)
         ended = Signal(self.kernel, f"{component} (rospy.spin)")
         rosout = Rosout(self.graph, node, "rosgraph_msgs/msg/Log", LATCHED)
         made = self._open[component] = Session(
@@ -215,8 +221,12 @@ class Sessions(LaunchedComponents):
         return self.find() or self._open_session(self.component, anonymous=False)
 
     def find(self) -> Session | None:
-        """Return the session of the current task's component, or None before it has joined the graph."""
-        return self._open.get(self.component)
+        """Return the session of the current task's component, or None before it has joined the graph.
+
+        A component that was started again has none.
+        """
+        found = self._open.get(self.component)
+        return None if found is None or self.started_again(found.scope) else found
 
     def now(self) -> Ns:
         """Return ROS time. An interaction point."""

@@ -1,0 +1,150 @@
+"""What follows when a component of a model ends: the others, the vehicles, the outcome of the run."""
+
+import json
+
+import pytest
+
+from volery.run.result import Options
+from volery.run.simulate import simulate
+from volery.trace.events import Failure, Operation, Text
+from volery.trace.reader import Reading
+
+SPEAKER = """
+import rospy
+from std_msgs.msg import String
+rospy.init_node("speaker")
+said = rospy.Publisher("/said", String, queue_size=1)
+rospy.Subscriber("/heard", String, lambda message: print("speaker hears", message.data))
+rospy.on_shutdown(lambda: print("speaker leaves at", rospy.get_time() // 1))
+rospy.sleep(1.0)
+said.publish("hello")
+"""
+LISTENER = """
+import rospy
+from std_msgs.msg import String
+rospy.init_node("listener")
+heard = rospy.Publisher("/heard", String, queue_size=1)
+rate = rospy.Rate(1)
+while not rospy.is_shutdown():
+    heard.publish("%d, connected: %d" % (rospy.get_time(), heard.get_num_connections()))
+    rate.sleep()
+"""
+
+
+@pytest.fixture
+def runs(tmp_path):
+    """Run rospy scripts by name for 4 s; return the run, its lines of text and its failures."""
+
+    def run(components=None, environment=None, duration="4 s", **scripts):
+        for name, text in scripts.items():
+            (tmp_path / f"{name}.py").write_text(text)
+        model = {
+            "volery": 1,
+            "name": "ends",
+            "components": {
+                name: {
+                    "language": "rospy",
+                    "path": f"{name}.py",
+                    "active": True,
+                    **(components or {}).get(name, {}),
+                }
+                for name in scripts
+            },
+            "application": {name: {"is": name} for name in scripts},
+            "platform": {"processors": {"pc": {"is": "intel-i5-3470", "frequency": "3000 MHz"}}},
+            "allocations": {
+                "only": dict.fromkeys([*scripts, *(environment or {}).get("vehicles", ())], "pc")
+            },
+            "run": {"duration": duration},
+        }
+        if environment:
+            model["environment"] = environment
+        (tmp_path / "model.yaml").write_text(json.dumps(model))
+        done = simulate(tmp_path, Options(out=tmp_path / "run"))
+        with Reading(tmp_path / "run" / "trace.mcap") as reading:
+            events = list(reading.events())
+        lines = [event.text for event in events if isinstance(event, Text) and event.source in scripts]
+        return done, lines, events
+
+    return run
+
+
+@pytest.mark.parametrize("end", ["", "import sys; sys.exit(0)", "import os; os._exit(0)"])
+def test_a_script_that_ends_by_itself_leaves_the_graph_and_the_others_go_on(runs, end):
+    done, lines, _ = runs(speaker=SPEAKER + end, listener=LISTENER)
+    assert done.completed, done.record.outcome.reason
+    assert done.record.sim_s == 4.0
+    assert [line for line in lines if "leaves" in line] == (
+        [] if "_exit" in end else ["speaker leaves at 1.0"]
+    )
+    assert not [line for line in lines if line.startswith("speaker hears") and int(line[14]) > 1]
+
+
+@pytest.mark.parametrize(
+    ("end", "reason"),
+    [
+        ("import sys; sys.exit(3)", "speaker: ended with exit status 3 (speaker.py:10)"),
+        ("raise ValueError('lost')", "speaker: run raised ValueError: lost (speaker.py:10)"),
+    ],
+)
+def test_a_script_that_fails_is_stopped_and_the_outcome_is_failed(runs, end, reason):
+    done, _, events = runs(speaker=SPEAKER + end, listener=LISTENER)
+    assert (done.record.outcome.status, done.record.outcome.reason) == ("failed", reason)
+    assert str(done.error) == reason
+    assert done.record.sim_s == 4.0
+    assert [event.who for event in events if isinstance(event, Failure)] == ["speaker"]
+
+
+def test_a_failed_run_in_which_nothing_is_left_ends_at_once(runs):
+    done, _, _ = runs(speaker=SPEAKER + "raise ValueError('lost')")
+    assert done.record.outcome.status == "failed"
+    assert 1.0 < done.record.sim_s < 1.1
+
+
+def test_the_model_may_let_a_failure_end_the_run(runs):
+    policy = {"speaker": {"on_failure": "end_run"}}
+    done, _, _ = runs(policy, speaker=SPEAKER + "raise ValueError('lost')", listener=LISTENER)
+    assert done.record.outcome.status == "failed"
+    assert done.record.sim_s < 1.1
+
+
+def test_a_component_is_started_again_as_often_as_the_model_says(runs):
+    policy = {"speaker": {"on_failure": {"action": "restart", "max": 2, "delay": "100 ms"}}}
+    often = SPEAKER.replace("sleep(1.0)", "sleep(0.4)") + "print('again'); raise ValueError('lost')"
+    done, lines, events = runs(policy, speaker=often, listener=LISTENER)
+    assert lines.count("again") == 3
+    assert len([event for event in events if isinstance(event, Failure)]) == 3
+    assert done.record.outcome.status == "failed"  # the last failure is not followed by a start
+
+
+FLIES = """
+import rospy, sys
+from geometry_msgs.msg import PoseStamped
+from mavros_msgs.srv import CommandBool, SetMode
+rospy.init_node("flier")
+out = rospy.Publisher("/drone/setpoint_position/local", PoseStamped, queue_size=1)
+where = PoseStamped()
+where.pose.position.z = 2.0
+rate = rospy.Rate(20)
+for step in range(300):
+    out.publish(where)
+    rate.sleep()
+    if step == 100:
+        rospy.ServiceProxy("/drone/set_mode", SetMode)(custom_mode="OFFBOARD")
+        rospy.ServiceProxy("/drone/cmd/arming", CommandBool)(True)
+sys.exit(1)
+"""
+PAD = {
+    "origin": {"latitude": 47.3977, "longitude": 8.5456, "amsl": "488 m"},
+    "places": {"pad": {"east": "0 m", "north": "0 m", "role": "pad"}},
+    "vehicles": {"drone": {"autopilot": "px4", "kind": "multirotor", "at": "pad", "battery": "5 Ah"}},
+}
+
+
+def test_a_vehicle_whose_only_commander_fails_is_brought_to_rest_while_the_others_go_on(runs):
+    done, _, events = runs(environment=PAD, duration="40 s", flier=FLIES, listener=LISTENER)
+    landed = [event for event in events if isinstance(event, Operation) and event.operation == "come_to_rest"]
+    assert [(event.vehicle, event.outcome) for event in landed[:1]] == [("drone", "ok")]
+    assert landed[0].end < 35_000_000_000
+    assert done.record.outcome.reason == "flier: ended with exit status 1 (flier.py:16)"
+    assert done.record.sim_s >= 40.0
