@@ -18,7 +18,8 @@ from volery.ros.graph.interface import (
     full_node_name,
 )
 from volery.ros.graph.snapshot import GraphSnapshot, TopicSnapshot
-from volery.trace.events import Call, Message, Published
+from volery.ros.graph.unserved import PUBLISHED, SUBSCRIBED
+from volery.trace.events import Call, Message, Published, Unserved
 from volery.trace.mcap_writer import TRACE_FILE
 from volery.trace.reader import Reading
 
@@ -52,18 +53,22 @@ def graph_of_run(folder: Path) -> GraphSnapshot:
                 subscribers.setdefault(event.topic, {})[event.subscriber] = None
             elif isinstance(event, Call) and event.operation.startswith(GRAPH_NAME_PREFIX):
                 services[event.operation] = event.callee
-    if not publishers:
+            elif isinstance(event, Unserved) and event.kind in (PUBLISHED, SUBSCRIBED):
+                types.setdefault(event.name, event.type)
+                side = publishers if event.kind == PUBLISHED else subscribers
+                side.setdefault(event.name, {}).update(dict.fromkeys(event.who.split(", ")))
+    if not publishers and not subscribers:
         raise UsageError(f"{folder}: nothing was published in this run, so there is no graph to show")
     seconds = to_seconds(last) or 1.0
     topics = tuple(
         TopicSnapshot(
             name,
             types.get(name, ""),
-            tuple(sorted(publishers[name])),
+            tuple(sorted(publishers.get(name, ()))),
             tuple(sorted(subscribers.get(name, ()))),
             messages[name] / seconds if name in messages else None,
         )
-        for name in sorted(publishers)
+        for name in sorted({*publishers, *subscribers})
     )
     nodes = {node for topic in topics for node in (*topic.publishers, *topic.subscribers)}
     served = tuple(ServiceState(name, "", server) for name, server in sorted(services.items()))

@@ -221,6 +221,7 @@ def render(material: ReportContent) -> str:
             ticks=_ticks(record.sim_s),
             not_counted=record.not_counted,
             warnings=record.warnings,
+            unserved=[str(one) for one in record.unserved],
             laws=laws_grid(record),
             remarks=_remarks(data["remarks"]),
             left_out=data["left_out"],
@@ -394,6 +395,7 @@ def compare(folders: Sequence[Path], beside: Path | None = None) -> Comparison:
                     "link": _link(folder, beside),
                     "not_counted": record.not_counted,
                     "warnings": record.warnings,
+                    "unserved": [str(one) for one in record.unserved],
                 }
                 for label, folder, record in zip(called, folders, records, strict=True)
             ],

@@ -84,6 +84,10 @@ def headline(record: RunRecord) -> Text:
     return line
 
 
+UNSERVED_LINES = 6
+"""How many lines of a summary name what no node took or served."""
+
+
 def summary_table(record: RunRecord, *, notes: bool = False) -> RenderableType:
     """Return the summary of one run.
 
@@ -98,6 +102,10 @@ def summary_table(record: RunRecord, *, notes: bool = False) -> RenderableType:
         for name, one in record.chains.items()
         if one.unobserved
     ]
+    shown = record.unserved if notes else record.unserved[:UNSERVED_LINES]
+    parts += [Text(f"⚠ {line}", style="yellow") for line in shown]
+    if len(record.unserved) > len(shown):
+        parts.append(Text(f"⚠ and {len(record.unserved) - len(shown)} more in the report", style="yellow"))
     if notes:
         parts += [Text(f"⚠ {line}", style="yellow") for line in record.warnings]
         parts += [Text(f"not counted: {line}", style="dim") for line in record.not_counted]

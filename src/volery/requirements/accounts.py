@@ -32,6 +32,7 @@ from volery.requirements.record import (
     RunRecord,
     Status,
     StepRecord,
+    UnservedRecord,
 )
 from volery.requirements.response_bounds import Demands
 from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
@@ -49,6 +50,7 @@ from volery.trace.events import (
     Record,
     Slice,
     Text,
+    Unserved,
     VehicleState,
     Verdict,
 )
@@ -98,6 +100,7 @@ class Accounts:
         self._demands = Demands()
         self._preemptions: dict[tuple[str, str, str], int] = {}
         self._failures: list[Failure] = []
+        self._unserved: list[UnservedRecord] = []
         self._warnings = dict.fromkeys(setup.warnings)
         self.last: Ns = 0
         self._listeners: dict[type[Any], Record] = {
@@ -113,6 +116,7 @@ class Accounts:
             Failure: self._failure,
             Verdict: self._verdict,
             Text: self._text,
+            Unserved: self._unserved_want,
         }
 
     def __call__(self, event: Event) -> None:
@@ -206,6 +210,20 @@ class Accounts:
             self._warnings[event.text] = None
         self._other(event)
 
+    def _unserved_want(self, event: Unserved) -> None:
+        self._unserved.append(
+            UnservedRecord(
+                kind=event.kind,
+                name=event.name,
+                type=event.type,
+                who=event.who,
+                count=event.times,
+                since_s=to_seconds(event.since),
+                hint=event.hint,
+            )
+        )
+        self._other(event)
+
     def record(
         self,
         status: Status,
@@ -235,6 +253,7 @@ class Accounts:
             laws=[LawRecord.model_validate(asdict(law)) for law in setup.laws],
             not_counted=[*setup.not_counted, *self._not_counted()],
             warnings=list(self._warnings),
+            unserved=self._unserved,
             versions=dict(sorted(circumstances.versions.items())),
             sim_s=elapsed,
             wall_s=wall,

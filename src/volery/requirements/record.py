@@ -72,6 +72,30 @@ class PreemptionRecord(_Part):
     count: int
 
 
+class UnservedRecord(_Part):
+    """What components offered or asked for and no node took or served; see the event ``Unserved``."""
+
+    kind: str
+    name: str
+    type: str
+    who: str
+    count: int
+    since_s: float
+    hint: str
+
+    def __str__(self) -> str:
+        """Return it as one sentence."""
+        since = f"since {self.since_s:.1f} s"
+        who = ", ".join(one.removeprefix("/") for one in self.who.split(", "))
+        times = "once" if self.count == 1 else f"{self.count} times"
+        said = {
+            "publication": f"{self.count} messages by {who} {since}, no node takes them",
+            "subscription": f"subscribed to by {who} {since}, no node publishes it",
+            "transform": f"looked up {times} by {who} {since}, it was never there",
+        }.get(self.kind, f"{self.kind} asked for by {who} {since}, no node serves it")
+        return f"{self.name}: {said}{'; ' if self.hint else ''}{self.hint}"
+
+
 class ComponentRecord(_Part):
     """The computing of a component.
 
@@ -215,6 +239,7 @@ class RunRecord(_Part):
     laws: list[LawRecord]
     not_counted: list[str]
     warnings: list[str]
+    unserved: list[UnservedRecord] = []
     versions: dict[str, str]
     sim_s: float
     wall_s: float | None

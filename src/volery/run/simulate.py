@@ -219,6 +219,8 @@ class _Simulation:
         self._fleet.record_states()
         for warning in self._built.warnings():
             self._recording.stream(Text(now, WHO, WARNING, warning))
+        for one in self._built.unserved():
+            self._recording.stream(one)
         verdicts = self._observers.verdicts(now)
         record = self._recording.finish(ending.status, ending.reason, now, verdicts)
         return Run(

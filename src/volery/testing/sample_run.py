@@ -44,6 +44,7 @@ from volery.trace.events import (
     Slice,
     Text,
     Transmission,
+    Unserved,
     VehicleState,
     Verdict,
 )
@@ -314,6 +315,7 @@ def _story(journey: list[tuple[Ns, float, float, float]]) -> Iterator[Event]:
         *[nan] * 4,
     )
     yield Text(2 * S, "drone_1", 6, "EKF3 IMU0 is using GPS")
+    yield Unserved(22 * S, "service", "/mavros/land", "", "/ground", 0, 2 * S, "did you mean /drone_1/land?")
     yield Text(21 * S, "drone_2", 4, "Arm: Battery below minimum")
     yield LinkState(500 * MS, "drone_1", "up", "")
     figures = 0.3, 0.2, 0.1, 0.1, 0.0, 0.0, 0.1

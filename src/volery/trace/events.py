@@ -191,6 +191,23 @@ class Text(NamedTuple):
     text: str
 
 
+class Unserved(NamedTuple):
+    """What a component offered or asked for until the end of a run, and no node took or served.
+
+    ``kind`` is ``publication``, ``subscription``, ``service``, ``action`` or ``transform``; ``who``: nodes;
+    ``times`` is the number of messages, calls or look-ups; ``hint`` says what is there instead.
+    """
+
+    at: Ns
+    kind: str
+    name: str
+    type: str
+    who: str
+    times: int
+    since: Ns
+    hint: str
+
+
 class LinkState(NamedTuple):
     """A link came up, went silent, was lost or came back."""
 
@@ -258,6 +275,7 @@ Event = (
     | Operation
     | Milestone
     | Text
+    | Unserved
     | LinkState
     | Failure
     | Verdict

@@ -48,8 +48,10 @@ from volery.ros.graph.interface import (
     full_node_name,
     no_route,
 )
+from volery.ros.graph.unserved import SERVICE, Surroundings, unserved
 from volery.ros.graph.work import Work
 from volery.ros.messages import Message, cdr_size, new
+from volery.trace.events import Unserved
 
 if TYPE_CHECKING:
 
@@ -255,6 +257,7 @@ class EmbeddedNode(LocalNode):
     def wait_for_service(self, name: str, within: Ns | None = None) -> bool:
         """Block until a node serves `name`; return False if `within` ns have passed first."""
         full = self.resolve(name)
+        self._node.want(SERVICE, full, "")
         return self._graph.changed.wait_for(lambda: full in self._graph.services, within)
 
     def get_parameter(self, name: str, default: Any = ...) -> Any:
@@ -443,6 +446,10 @@ class EmbeddedGraph:
         """Return the services that have a server, by name."""
         served = sorted(self._graph.services.items())
         return [ServiceState(name, one.type, one.node.name) for name, one in served]
+
+    def unserved(self, around: Surroundings) -> list[Unserved]:
+        """Return what components have offered or asked for until now, and no node took or served."""
+        return unserved(self._graph.wants, around, self.kernel.now())
 
     def close(self) -> None:
         """Close all nodes."""

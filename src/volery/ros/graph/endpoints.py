@@ -28,6 +28,7 @@ from volery.ros.graph.interface import (
     QoS,
     Route,
 )
+from volery.ros.graph.unserved import PUBLISHED, SERVICE, SUBSCRIBED
 from volery.ros.graph.work import Work
 from volery.ros.messages import cdr_size, message_class, service
 from volery.ros.messages.encodings import copied_to_cdr
@@ -102,6 +103,7 @@ class EmbeddedPublisher:
         self._spacing: Ns = 0  # shortest of the subscriptions', on a graph that takes the place of a link
         self._due: Ns = 0  # when the next message will be used
         self._open = True
+        self._want = node.want(PUBLISHED, topic.name, topic.type)
         topic.publishers.append(self)
         for subscription in topic.subscriptions:
             self.connect(subscription)
@@ -113,7 +115,10 @@ class EmbeddedPublisher:
         if why:
             text = f"{self.topic}: {other.name} does not hear {node.name}: {why}"
             graph.record(Text(node.kernel.now(), node.name, WARNING, text))
+            self._want.reason = f"{other.name} does not receive it: {why}"
+            subscription.want.reason = f"nothing comes from {node.name}: {why}"
             return
+        self._want.met = subscription.want.met = True
         route = graph.route(node.id, other.id)
         if route is None:
             connection = Connection(subscription, subscription.arrive)
@@ -162,6 +167,8 @@ class EmbeddedPublisher:
         A message of others is encoded even if nothing needs its bytes: real ROS finds values that do not fit.
         """
         node, connections = self.node, self._connections
+        if not connections:
+            self._want.count += 1
         if not (connections or self._latches or self._recorded or (self._checked and not fresh)):
             return
         if node.graph.as_bytes:
@@ -217,6 +224,7 @@ class EmbeddedSubscription:
         self._queue: deque[Any] = deque()
         self._run = self.run
         self._open = True
+        self.want = node.want(SUBSCRIBED, topic.name, topic.type)
         topic.subscriptions.append(self)
         for publisher in topic.publishers:
             publisher.connect(self)
@@ -344,6 +352,7 @@ class EmbeddedService:
         self._handler, self._group = handler, group
         self._pending: list[Exchange] = []
         node.graph.services[name] = self
+        node.graph.wants.served[name] = self.type
 
     def arrive(self, exchange: Exchange) -> None:
         """Queue a request that has arrived. A framework callback."""
@@ -432,6 +441,7 @@ class EmbeddedClient:
         services = self._node.graph.services
         server = services.get(self.name)
         if server is None:
+            self._node.want(SERVICE, self.name, self.type).count += 1
             hint = did_you_mean(self.name, services)
             raise ServiceError(self.name, f"no node serves it{hint}; there is {choices(services)}")
         if server.type != self.type:
@@ -449,4 +459,7 @@ class EmbeddedClient:
 
     def ready_now(self) -> bool:
         """Return whether a node serves it now, without being an interaction point."""
-        return self.name in self._node.graph.services
+        if self.name in self._node.graph.services:
+            return True
+        self._node.want(SERVICE, self.name, self.type)
+        return False

@@ -20,6 +20,7 @@ from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
 from volery.ros.graph.interface import NodeId, QoS, Routing, Tariffs
+from volery.ros.graph.unserved import Want, Wants
 from volery.ros.messages import Message, cdr_size, from_cdr, to_cdr
 from volery.trace.events import Charge, Event
 
@@ -45,6 +46,7 @@ class SubscriptionEnd(Protocol):
 
     node: NodeContext
     qos: QoS
+    want: Want
 
     def arrive(self, message: Any, sent: Ns, publisher: str, size: int) -> None:
         """Queue a message that has arrived. A framework callback."""
@@ -152,6 +154,7 @@ class GraphContext:
         unrecorded: No event of the graph is recorded.
         as_bytes: Messages are encoded and decoded, as by a transport.
         size_of: Size of a message for its route, bytes.
+        wants: What its nodes offer and ask for.
     """
 
     kernel: Kernel
@@ -167,6 +170,7 @@ class GraphContext:
     unrecorded: bool = False
     as_bytes: bool = False
     size_of: Callable[[Message], int] = cdr_size
+    wants: Wants = field(default_factory=Wants)
 
     def record(self, event: Event) -> None:
         """Record an event of the graph."""
@@ -341,6 +345,10 @@ class NodeContext:
         if waited > 0.0:
             self._waited += waited
             self.charge_background("wait", waited)
+
+    def want(self, kind: str, name: str, type_name: str) -> Want:
+        """Return what the graph keeps of this use of a name by the node's component."""
+        return self.graph.wants.of(kind, name, type_name, (self.id.component, self.name), self.kernel.now())
 
     def check_open(self) -> None:
         """Raise ``UsageError`` if the node has left the graph."""

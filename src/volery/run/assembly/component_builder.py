@@ -34,13 +34,15 @@ from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
 from volery.ros.graph.embedded_graph import record_all
 from volery.ros.graph.graph_context import Records
+from volery.ros.graph.unserved import Surroundings
 from volery.ros.messages import Workspace, define_imported
 from volery.run.assembly.component_ends import ComponentEnds
 from volery.run.assembly.computers import Platform, commanded_by, is_node
 from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.assembly.fences import fence_of
-from volery.run.assembly.vehicle_nodes import graph_access, node_name, serve_on_graph
+from volery.run.assembly.vehicle_nodes import NAMES_OF, graph_access, node_name, serve_on_graph
 from volery.run.ending import Ending, Landable
+from volery.trace.events import Unserved
 from volery.vehicles import Drone, Rover, Vehicle
 from volery.vehicles.driver import drivers
 
@@ -116,6 +118,7 @@ class BuiltComponents:
     loader: Loader
     instances: Mapping[str, Instance]
     doubts: tuple[str, ...] = ()
+    unserved: Callable[[], list[Unserved]] = list
     finish: Callable[[], None] = lambda: None
 
     def start(self) -> None:
@@ -215,6 +218,7 @@ class Builder:
         self._landable: dict[str, Landable] = {}
         self._instances: dict[str, Instance] = {}
         self._ends = ComponentEnds(kernel, self._graph, ending, self._commanded_alone)
+        self._served: dict[str, str] = {}  # the kind of names of each vehicle that has a node
 
     def build(self, fidelity: str, seed: int, traces: Path | None = None) -> BuiltComponents:
         """Load every file, create every instance, connect every port.
@@ -238,7 +242,15 @@ class Builder:
         self._instances = {model.name: self._instance(model, steps) for model in self._models}
         starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in self._models))
         doubts = tuple(self._cpp.warnings(self._models))
-        return BuiltComponents(starters, loader, self._instances, doubts, self._cpp.finish)
+        return BuiltComponents(starters, loader, self._instances, doubts, self._unserved, self._cpp.finish)
+
+    def _unserved(self) -> list[Unserved]:
+        """Return what the components waited for in vain on the embedded graph."""
+        if not isinstance(self._graph, EmbeddedGraph):
+            return []
+        served = {name: node for name, node in self._served.items() if node}
+        without = [one.name for one in self._system.vehicles if one.name not in served]
+        return self._graph.unserved(Surroundings(self._instances, served, without))
 
     def _launches(self) -> dict[str, Launch]:
         return {
@@ -391,6 +403,8 @@ class Builder:
                 graph_access(vehicle.autopilot, vehicle.name)  # raises before anything starts
                 if vehicle.name not in commanded:
                     self._add_unattended(vehicle.name, INTERFACES[vehicle.kind])
+                codec = self._fleet.family(vehicle.name).codec
+                self._served[vehicle.name] = NAMES_OF[codec.name] if codec else "its SDK"
                 yield partial(self._serve, self._fleet, vehicle.name, vehicle.processor)
 
     def _add_unattended(self, name: str, interface: str) -> None:

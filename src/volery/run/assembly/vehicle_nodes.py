@@ -146,6 +146,9 @@ def _pprzros(
 NODES: Mapping[str, Serve] = {"MAVLink": _mavros, "pprzlink": _pprzros}
 """By the name of the codec."""
 
+NAMES_OF = {"MAVLink": "MAVROS", "pprzlink": "pprzros"}
+"""Whose names that node has."""
+
 SIMULATED_LINK_OPTIONS = {"texts": "unrecorded"}
 """Driver options for a simulated vehicle on a link: its autopilot records its status texts itself."""
 
