@@ -7,13 +7,19 @@ from typing import Any
 
 import pytest
 
+from volery.base.errors import UsageError
 from volery.base.time import S
+from volery.ros.client_libraries.tf2 import tf
 from volery.ros.client_libraries.tf2.transform_tree import (
     IDENTITY,
+    ConnectivityException,
     ExtrapolationException,
     InvalidArgumentException,
+    LookupException,
+    RigidTransform,
     TransformTree,
 )
+from volery.trace.events import Text
 
 BROADCASTER = """
 import rospy
@@ -107,10 +113,12 @@ out(round(rospy.get_time() - began, 6))
     assert "not part of the same tree" in connectivity[1]
     assert future == (
         "ExtrapolationException",
-        "Lookup would require extrapolation into the future.  Requested time 3.000000 but the latest data "
-        "is at time 2.000000, when looking up transform from frame [base] to frame [odom]",
+        "Lookup would require extrapolation 1.000000000s into the future.  Requested time 3.000000000 but "
+        "the latest data is at time 2.000000000, when looking up transform from frame [base] to frame [odom]",
     )
-    assert "into the past.  Requested time 0.500000 but the earliest data is at time 1.000000" in past[1]
+    assert (
+        "into the past.  Requested time 0.500000000 but the earliest data is at time 1.000000000" in past[1]
+    )
     assert (can, took) == (False, 2.0)
 
 
@@ -220,9 +228,9 @@ try:
 except tf.Exception as error:
     out("moon" in str(error))
 try:
-    quaternion_from_euler(0, 0, 1, "rzyx")
+    quaternion_from_euler(0, 0, 1, "rzzx")
 except Exception as error:
-    out("rzyx" in str(error))
+    out("rzzx" in str(error))
 """,
     )
     assert stage.run(5 * S) == [([1, 2, 3], [0, 0, 1.570796]), True, True]
@@ -248,11 +256,133 @@ def test_old_transforms_are_forgotten_and_wrong_ones_refused() -> None:
     assert tree.look_up("odom", "base", 19 * S)[0] == 19 * S
     with pytest.raises(ExtrapolationException, match=r"earliest data is at time 19\.0"):
         tree.look_up("odom", "base", 18 * S)
-    for child, parent, rigid in (
-        ("a", "a", IDENTITY),
-        ("", "a", IDENTITY),
-        ("/a", "b", IDENTITY),
-        ("a", "b", IDENTITY._replace(rotation=(0.0, 0.0, 0.0, 0.0))),
+    assert tree.add("base", "odom", 5 * S, IDENTITY).startswith("TF_OLD_DATA")
+    for child, parent, rotation, said in (
+        ("a", "a", (1.0, 0.0, 0.0, 0.0), "TF_SELF_TRANSFORM"),
+        ("", "a", (1.0, 0.0, 0.0, 0.0), "TF_NO_CHILD_FRAME_ID"),
+        ("a", "", (1.0, 0.0, 0.0, 0.0), "TF_NO_FRAME_ID"),
+        ("a", "b", (0.0, 0.0, 0.0, 0.0), "TF_DENORMALIZED_QUATERNION"),
+        ("a", "b", (2.0, 0.0, 0.0, 0.0), "TF_DENORMALIZED_QUATERNION"),
+        ("a", "b", (1.0, float("nan"), 0.0, 0.0), "TF_NAN_INPUT"),
+        ("/a", "/b", (1.0005, 0.0, 0.0, 0.0), ""),
     ):
-        with pytest.raises(InvalidArgumentException):
-            tree.add(child, parent, S, rigid)
+        problem = tree.add(child, parent, S, IDENTITY._replace(rotation=rotation))
+        assert problem.partition(":")[0] == said
+    assert tree.look_up("b", "a", S)[1].rotation == (1.0005, 0.0, 0.0, 0.0)
+    with pytest.raises(InvalidArgumentException, match="cannot start with a '/'"):
+        tree.look_up("/b", "a", S)
+
+
+def moved(x: float) -> RigidTransform:
+    return IDENTITY._replace(translation=(x, 0.0, 0.0))
+
+
+def test_a_change_of_the_parent_leaves_the_past_with_the_old_one() -> None:
+    """As Debian's tf2 0.7.6 answers to the same calls."""
+    tree = TransformTree(cache=100 * S)
+    tree.add("rover", "map", 0, moved(100.0), static=True)
+    tree.add("drone", "map", 0, moved(200.0), static=True)
+    tree.add("parcel", "rover", 1 * S, IDENTITY)
+    tree.add("parcel", "rover", 2 * S, IDENTITY)
+    tree.add("parcel", "drone", 4 * S, moved(-1.0))
+
+    def x(source: str, target: str, at: float) -> float:
+        return tree.look_up(target, source, int(at * S))[1].translation[0]
+
+    assert [x("parcel", "map", at) for at in (1.5, 3.0, 3.9, 4.0, 0)] == [100.0, 100.0, 100.0, 199.0, 199.0]
+    assert x("map", "parcel", 3.0) == -100.0
+    assert [x("parcel", "rover", at) for at in (3.0, 0)] == [0.0, 99.0]
+    with pytest.raises(ExtrapolationException, match=r"0\.500000000s into the future"):
+        x("parcel", "map", 4.5)
+    tree.add("parcel", "drone", 5 * S, moved(-1.0))
+    assert x("parcel", "map", 4.5) == 199.0
+
+
+def test_one_stamp_twice_and_what_a_frame_was_first() -> None:
+    one, two = TransformTree(), TransformTree(ros2=True)
+    for tree in (one, two):
+        tree.add("twice", "map", S, moved(1.0))
+        tree.add("twice", "map", S, moved(2.0))
+    found = [tree.look_up("map", "twice", S)[1].translation[0] for tree in (one, two)]
+    assert found == [1.0, 2.0]
+    one.add("fixed", "map", S, IDENTITY, static=True)
+    one.add("fixed", "odom", 2 * S, moved(7.0))
+    assert one.look_up("odom", "fixed", 99 * S)[1].translation[0] == 7.0
+    with pytest.raises(ConnectivityException):
+        one.look_up("map", "fixed", S)
+    one.add("a", "b", S, IDENTITY)
+    one.add("b", "a", S, IDENTITY)
+    one.add("x", "y", S, IDENTITY)
+    with pytest.raises(LookupException, match="contains a loop"):
+        one.look_up("y", "a", S)
+
+
+def test_transformations_are_those_of_tf() -> None:
+    """Values of Debian's tf 1.13.2."""
+    found = tf.quaternion_from_euler(1.0, 2.0, 3.0, "ryxz")
+    assert found == pytest.approx((0.310622, -0.718287, 0.444435, 0.435953), abs=1e-6)
+    for axes in ("sxyz", "szxy", "rxyz", "ryxz", "sxyx", "szyz", "rxzx", "ryzy"):
+        angles = tf.euler_from_matrix(tf.euler_matrix(0.4, -0.5, 0.6, axes), axes)
+        assert tf.is_same_transform(tf.euler_matrix(*angles, axes), tf.euler_matrix(0.4, -0.5, 0.6, axes))
+    turned = tf.quaternion_from_matrix(tf.rotation_matrix(2.5, (0.0, 3.0, 4.0)))
+    assert turned == pytest.approx(tf.quaternion_about_axis(2.5, (0.0, 3.0, 4.0)))
+    half = tf.quaternion_slerp((0.0, 0.0, 0.0, 1.0), turned, 0.5)
+    assert half == pytest.approx(tf.quaternion_about_axis(1.25, (0.0, 3.0, 4.0)))
+    with pytest.raises(UsageError, match="s \\(static\\) or r"):
+        tf.euler_matrix(0.0, 0.0, 0.0, "sxxy")
+
+
+def test_a_buffer_tells_of_its_frames_and_logs_what_it_ignores(stage: Any) -> None:
+    stage.script(
+        "asker",
+        """
+import rospy
+import tf
+import tf2_geometry_msgs
+import tf2_ros
+from geometry_msgs.msg import PointStamped, PoseWithCovarianceStamped, QuaternionStamped, TransformStamped
+from tf.msg import tfMessage
+rospy.init_node("asker")
+old = tf.TransformListener()
+made = TransformStamped(child_frame_id="base")
+made.header.frame_id, made.header.stamp = "/odom", rospy.Time(1)
+made.transform.translation.x = 2.0
+made.transform.rotation.w, made.transform.rotation.z = 0.5 ** 0.5, 0.5 ** 0.5
+for _ in range(3):
+    old.setTransform(made)
+out(old.allFramesAsString())
+point = PointStamped()
+point.header.frame_id, point.header.stamp, point.point.x = "base", rospy.Time(1), 1.0
+moved = old.transformPoint("odom", point).point
+out([round(one, 6) for one in (moved.x, moved.y, moved.z)])
+turned = QuaternionStamped(header=point.header)
+turned.quaternion.w = 1.0
+out(round(old.transformQuaternion("odom", turned).quaternion.z, 6))
+out(old.asMatrix("odom", point.header).round(6).tolist()[:2])
+out(old.getLatestCommonTime("odom", "base").to_sec())
+estimate = PoseWithCovarianceStamped(header=point.header)
+estimate.pose.covariance[0] = 4.0
+estimate.pose.pose.orientation.w = 1.0
+found = tf2_geometry_msgs.do_transform_pose_with_covariance_stamped(estimate, made)
+out([round(found.pose.covariance[at], 6) for at in (0, 7)])
+try:
+    tf2_ros.TransformRegistration().get(TransformStamped)
+except tf2_ros.TypeException as error:
+    out("register a function" in str(error))
+out(tfMessage(transforms=[made]).transforms[0].child_frame_id)
+""",
+    )
+    assert stage.run(5 * S) == [
+        "Frame base exists with parent odom.\n",
+        [2.0, 1.0, 0.0],
+        0.707107,
+        [[0.0, -1.0, 0.0, 2.0], [1.0, 0.0, 0.0, 0.0]],
+        1.0,
+        [0.0, 4.0],
+        True,
+        "base",
+    ]
+    logged = [one.text for one in stage.of(Text)]
+    assert logged == [
+        "TF_REPEATED_DATA ignoring data with redundant timestamp for frame base at time 1.000000"
+    ]

@@ -7,6 +7,7 @@ poll; transforms are ordinary messages of the graph, so a broadcast costs the sa
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
 
@@ -17,20 +18,26 @@ from volery.ros.client_libraries.tf2.tf import TRANSFORMATIONS
 from volery.ros.client_libraries.tf2.tf2_ros import (
     STAMPED,
     Buffer,
+    NotImplementedException,
     StaticTransformBroadcaster,
     TransformBroadcaster,
     TransformListener,
+    TransformRegistration,
+    TypeException,
 )
 from volery.ros.client_libraries.tf2.transform_tree import EXCEPTIONS, TransformException
+from volery.ros.messages import message_class
 
 __all__ = ["modules"]
 
 _CLASSES = (TransformBroadcaster, StaticTransformBroadcaster, TransformListener)
+_PLAIN = (NotImplementedException, TransformRegistration, TypeException)
 _SUBMODULES = {
-    "buffer": "Buffer",
-    "transform_broadcaster": "TransformBroadcaster",
-    "static_transform_broadcaster": "StaticTransformBroadcaster",
-    "transform_listener": "TransformListener",
+    "buffer": ("Buffer",),
+    "buffer_interface": ("NotImplementedException", "TransformRegistration", "TypeException"),
+    "transform_broadcaster": ("TransformBroadcaster",),
+    "static_transform_broadcaster": ("StaticTransformBroadcaster",),
+    "transform_listener": ("TransformListener",),
 }
 
 
@@ -43,31 +50,46 @@ def modules(kernel: Kernel, rospy: ModuleType, executors: ModuleType) -> dict[st
         executors: The module ``rclpy.executors``.
     """
     members = {"rospy": rospy, "executors": executors}
+    buffer = type("Buffer", (Buffer,), {"kernel": kernel, "time_class": rospy.Time})
     names: dict[str, Any] = {
         **EXCEPTIONS,
-        "Buffer": type("Buffer", (Buffer,), {"kernel": kernel}),
+        **{kind.__name__: kind for kind in _PLAIN},
+        "Buffer": buffer,
         **{kind.__name__: type(kind.__name__, (kind,), members) for kind in _CLASSES},
     }
-    tf2_ros = library_module("tf2_ros", names)
-    parts = {
-        f"tf2_ros.{part}": library_module(f"tf2_ros.{part}", {name: names[name]})
-        for part, name in _SUBMODULES.items()
-    }
+    inside = {part: {name: names[name] for name in listed} for part, listed in _SUBMODULES.items()}
+    parts = {part: library_module(f"tf2_ros.{part}", names) for part, names in inside.items()}
+    tf2_ros = library_module("tf2_ros", {**names, **parts})
     transformations = library_module("tf.transformations", TRANSFORMATIONS)
-    old: dict[str, Any] = {
-        **EXCEPTIONS,
-        "Exception": TransformException,
-        "transformations": transformations,
-        **{
-            kind.__name__: type(kind.__name__, (kind,), {"tf2_ros": tf2_ros})
-            for kind in (tf.TransformListener, tf.TransformBroadcaster)
-        },
+    message = message_class("tf2_msgs/msg/TFMessage")
+    broadcaster = type("TransformBroadcaster", (tf.TransformBroadcaster,), {"tf2_ros": tf2_ros})
+    listeners: dict[str, Any] = {
+        kind.__name__: type(kind.__name__, (kind,), {"tf2_ros": tf2_ros})
+        for kind in (tf.Transformer, tf.TransformerROS, tf.TransformListener)
     }
+    old: dict[str, Mapping[str, Any]] = {
+        "broadcaster": {"TransformBroadcaster": broadcaster},
+        "listener": listeners,
+        "msg": {"tfMessage": message},
+    }
+    old_parts = {part: library_module(f"tf.{part}", names) for part, names in old.items()}
     return {
         "tf2_ros": tf2_ros,
-        **parts,
+        **{f"tf2_ros.{part}": module for part, module in parts.items()},
+        "tf2_py": library_module("tf2_py", {**EXCEPTIONS, "BufferCore": buffer}),
         "tf2_geometry_msgs": library_module("tf2_geometry_msgs", STAMPED),
-        "tf": library_module("tf", old),
+        "tf": library_module(
+            "tf",
+            {
+                **EXCEPTIONS,
+                "Exception": TransformException,
+                "TransformBroadcaster": broadcaster,
+                **listeners,
+                **old_parts,
+                "transformations": transformations,
+            },
+        ),
+        **{f"tf.{part}": module for part, module in old_parts.items()},
         "tf.transformations": transformations,
         "tf_transformations": library_module("tf_transformations", TRANSFORMATIONS),
     }

@@ -10,15 +10,16 @@ from functools import partial
 from types import ModuleType
 from typing import Any, ClassVar
 
-from volery.base.errors import choices
-from volery.base.frames import multiply
-from volery.base.time import Ns, S, from_seconds
+import numpy as np
+
+from volery.base.errors import did_you_mean
+from volery.base.frames import Quaternion, multiply
+from volery.base.time import Ns, S, from_seconds, to_seconds
 from volery.kernel.api import Kernel
-from volery.kernel.waiting import Signal
+from volery.kernel.waiting import Signal, current_task
 from volery.ros.client_libraries.rclpy.entities import DurabilityPolicy, QoSProfile
 from volery.ros.client_libraries.rclpy.executors import ReentrantCallbackGroup
 from volery.ros.client_libraries.tf2.transform_tree import (
-    InvalidArgumentException,
     RigidTransform,
     TransformException,
     TransformTree,
@@ -28,6 +29,10 @@ from volery.ros.client_libraries.tf2.transform_tree import (
 )
 from volery.ros.messages import message_class, new
 from volery.ros.messages.message import nanoseconds
+from volery.trace.events import Text
+
+ERROR, WARNING = 3, 4
+"""Severities as in syslog."""
 
 
 def _transform_point(point: Any, by: RigidTransform) -> None:
@@ -44,6 +49,29 @@ def _transform_pose(pose: Any, by: RigidTransform) -> None:
     q.w, q.x, q.y, q.z = multiply(by.rotation, (q.w, q.x, q.y, q.z))
 
 
+def _transform_wrench(wrench: Any, by: RigidTransform) -> None:
+    _transform_vector(wrench.force, by)
+    _transform_vector(wrench.torque, by)
+
+
+def _transform_polygon(polygon: Any, by: RigidTransform) -> None:
+    for point in polygon.points:
+        _transform_point(point, by)
+
+
+def _transform_covariant_pose(pose: Any, by: RigidTransform) -> None:
+    """Transform a pose and turn its covariance, of x, y, z and the rotations about them."""
+    _transform_pose(pose.pose, by)
+    turn = np.kron(np.eye(2), rotation_matrix(by.rotation))
+    covariance = np.asarray(pose.covariance, float).reshape(6, 6)
+    pose.covariance = (turn @ covariance @ turn.T).ravel().tolist()
+
+
+def rotation_matrix(q: Quaternion) -> Any:
+    """Return the 3 x 3 matrix of a unit quaternion (w, x, y, z)."""
+    return np.array([rotated(q, axis) for axis in ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))]).T
+
+
 _KINDS: dict[str, tuple[str, Callable[[Any, RigidTransform], None]]] = {
     "geometry_msgs/msg/Point": ("", _transform_point),
     "geometry_msgs/msg/PointStamped": ("point", _transform_point),
@@ -51,15 +79,54 @@ _KINDS: dict[str, tuple[str, Callable[[Any, RigidTransform], None]]] = {
     "geometry_msgs/msg/Vector3Stamped": ("vector", _transform_vector),
     "geometry_msgs/msg/Pose": ("", _transform_pose),
     "geometry_msgs/msg/PoseStamped": ("pose", _transform_pose),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": ("pose", _transform_covariant_pose),
+    "geometry_msgs/msg/Wrench": ("", _transform_wrench),
+    "geometry_msgs/msg/WrenchStamped": ("wrench", _transform_wrench),
+    "geometry_msgs/msg/PolygonStamped": ("polygon", _transform_polygon),
 }
 """Transformable types: the field to transform and the function that does so."""
+
+
+class TypeException(Exception):  # noqa: N818 - tf2's name
+    """A type that has no registered function."""
+
+
+class NotImplementedException(Exception):  # noqa: N818 - tf2's name
+    """A function that a buffer does not have."""
+
+    def __init__(self) -> None:
+        super().__init__("CanTransform or LookupTransform not implemented")
+
+
+class TransformRegistration:
+    """Functions ``(object, TransformStamped)`` that transform objects, by their class."""
+
+    _functions: ClassVar[dict[Any, Any]] = {}
+
+    def add(self, key: Any, callback: Any) -> None:
+        """Register the function of a class."""
+        self._functions[key] = callback
+
+    def get(self, key: Any) -> Any:
+        """Return the function of a class; raise ``TypeException`` if there is none."""
+        found = self._functions.get(key)
+        if found is not None:
+            return found
+        name = getattr(key, "__msgtype__", "")
+        if name not in _KINDS:
+            named = name or getattr(key, "__name__", key)
+            raise TypeException(
+                f"Type {named} if not loaded or supported{did_you_mean(str(named), _KINDS)}; register a "
+                "function by tf2_ros.TransformRegistration().add(type, function)"
+            )
+        return transformed
 
 
 def transformed(given: Any, transform: Any) -> Any:
     """Return a copy of *given* transformed by a ``TransformStamped``, with its header."""
     name = getattr(given, "__msgtype__", type(given).__name__)
     if name not in _KINDS:
-        raise InvalidArgumentException(f"{name} cannot be transformed; choose {choices(_KINDS)}")
+        raise TypeException(f"{name} cannot be transformed{did_you_mean(name, _KINDS)}")
     field, change = _KINDS[name]
     made = given.copy()
     change(getattr(made, field) if field else made, from_transform(transform.transform))
@@ -70,7 +137,10 @@ def transformed(given: Any, transform: Any) -> Any:
 
 STAMPED = {
     f"do_transform_{what}": transformed
-    for what in ("point", "vector3", "pose", "pose_stamped", "point_stamped", "vector3_stamped")
+    for what in (
+        *("point", "vector3", "pose", "wrench", "pose_stamped", "point_stamped", "vector3_stamped"),
+        *("wrench_stamped", "polygon_stamped", "pose_with_covariance_stamped"),
+    )
 }
 """Content of ``tf2_geometry_msgs``."""
 
@@ -87,17 +157,32 @@ class Buffer:
     """The transforms of the last *cache_time* (10 s by default)."""
 
     kernel: ClassVar[Kernel]
+    time_class: ClassVar[Any]
 
-    def __init__(self, cache_time: Any = None, *options: Any, **more: Any) -> None:
-        self._tree = TransformTree(10 * S if cache_time is None else as_ns(cache_time))
+    def __init__(self, cache_time: Any = None, *options: Any, node: Any = None, **more: Any) -> None:
+        self._tree = TransformTree(10 * S if cache_time is None else as_ns(cache_time), ros2=node is not None)
         self._changed = Signal(self.kernel, "tf2_ros.Buffer (a transform)")
+        self._said: set[tuple[str, str]] = set()
+
+    def follow_ros2(self) -> None:
+        """Follow ROS 2 where its rules differ: it is filled by a node of rclpy."""
+        self._tree.ros2 = True
 
     def set_transform(self, transform: Any, authority: str = "", *, static: bool = False) -> None:
-        """Add a ``geometry_msgs/msg/TransformStamped``."""
-        header = transform.header
+        """Add a ``geometry_msgs/msg/TransformStamped``. What is ignored is logged, once a frame and cause."""
+        header, child = transform.header, transform.child_frame_id
         rigid = from_transform(transform.transform)
-        self._tree.add(transform.child_frame_id, header.frame_id, as_ns(header.stamp), rigid, static=static)
-        self._changed.notify()
+        problem = self._tree.add(child, header.frame_id, as_ns(header.stamp), rigid, static=static)
+        if not problem:
+            self._changed.notify()
+            return
+        kind = problem.partition(" ")[0]
+        if (kind, child) not in self._said:
+            self._said.add((kind, child))
+            severity = WARNING if kind in ("TF_OLD_DATA", "TF_REPEATED_DATA") else ERROR
+            with self.kernel as kernel:
+                component = current_task(kernel).context.component
+                kernel.record(Text(kernel.now(), component, severity, problem))
 
     def set_transform_static(self, transform: Any, authority: str = "") -> None:
         """Add a static transform."""
@@ -111,6 +196,29 @@ class Buffer:
         """Return the names of all frames."""
         return self._tree.frames()
 
+    def all_frames_as_string(self) -> str:
+        """Return a line of each frame with its parent."""
+        frames = self._tree.described()
+        return "".join(f"Frame {name} exists with parent {parent}.\n" for name, parent, *_ in frames)
+
+    def all_frames_as_yaml(self) -> str:
+        """Return the frames with their parents, rates (Hz) and times (s) as YAML."""
+        texts = []
+        for name, parent, first, last, count in self._tree.described():
+            length = to_seconds(last - first)
+            rate = (count - 1) / length if length > 0.0 else 10000.0
+            texts.append(
+                f"{name}: \n  parent: '{parent}'\n  broadcaster: 'default_authority'\n  rate: {rate:.3f}\n"
+                f"  most_recent_transform: {to_seconds(last):.3f}\n"
+                f"  oldest_transform: {to_seconds(first):.3f}\n  buffer_length: {length:.3f}\n"
+            )
+        return "".join(texts)
+
+    def get_latest_common_time(self, target_frame: str, source_frame: str) -> Any:
+        """Return the latest time at which the transform between two frames is known."""
+        found = self._tree.latest_common_time(target_frame, source_frame)
+        return self.time_class(*divmod(found, S))
+
     def can_transform(
         self,
         target_frame: str,
@@ -120,6 +228,9 @@ class Buffer:
         return_debug_tuple: bool = False,
     ) -> Any:
         """Return whether ``lookup_transform`` would succeed within *timeout*, optionally with the reason."""
+        for name in (target_frame, source_frame):
+            if name.startswith("/"):  # tf2 gives no reason
+                return (False, "") if return_debug_tuple else False
         reason = self._wait_for(target_frame, source_frame, as_ns(time), as_ns(timeout))
         return (not reason, reason) if return_debug_tuple else not reason
 
@@ -184,13 +295,60 @@ class Buffer:
     ) -> Any:
         """Return a stamped point, vector or pose in another frame."""
         if new_type is not None:
-            raise InvalidArgumentException(
-                "Buffer.transform(new_type=...) is not there on the embedded graph"
-            )
+            raise TypeException(f"Buffer.transform: nothing converts to {new_type!r} on the embedded graph")
+        change = TransformRegistration().get(type(object_stamped))
         header = object_stamped.header
-        return transformed(
+        return change(
             object_stamped, self.lookup_transform(target_frame, header.frame_id, header.stamp, timeout)
         )
+
+    def transform_full(
+        self,
+        object_stamped: Any,
+        target_frame: str,
+        target_time: Any,
+        fixed_frame: str,
+        timeout: Any = 0,
+        new_type: Any = None,
+    ) -> Any:
+        """Return a stamped object in another frame at another time, via a fixed frame."""
+        if new_type is not None:
+            raise TypeException(f"Buffer.transform: nothing converts to {new_type!r} on the embedded graph")
+        change = TransformRegistration().get(type(object_stamped))
+        header = object_stamped.header
+        return change(
+            object_stamped,
+            self.lookup_transform_full(
+                target_frame, target_time, header.frame_id, header.stamp, fixed_frame, timeout
+            ),
+        )
+
+    def can_transform_full(  # noqa: PLR0917 - tf2's
+        self,
+        target_frame: str,
+        target_time: Any,
+        source_frame: str,
+        source_time: Any,
+        fixed_frame: str,
+        timeout: Any = 0,
+        return_debug_tuple: bool = False,
+    ) -> Any:
+        """Return whether ``lookup_transform_full`` would succeed, optionally with the reason."""
+        first = self.can_transform(fixed_frame, source_frame, source_time, timeout, True)
+        can, why = (
+            first
+            if not first[0]
+            else self.can_transform(target_frame, fixed_frame, target_time, timeout, True)
+        )
+        return (can, why) if return_debug_tuple else can
+
+    lookup_transform_core = lookup_transform
+    lookup_transform_full_core = lookup_transform_full
+
+    def can_transform_core(self, target_frame: str, source_frame: str, time: Any) -> Any:
+        """Return whether the transform is available now, and the reason."""
+        can, why = self.can_transform(target_frame, source_frame, time, 0, True)
+        return int(can), why
 
 
 TF, TF_STATIC = "/tf", "/tf_static"
@@ -272,6 +430,7 @@ class TransformListener:
             ]
             return
         self._node = node
+        buffer.follow_ros2()
         group = ReentrantCallbackGroup()
         self._subscriptions = [
             node.create_subscription(
@@ -290,17 +449,7 @@ class TransformListener:
 
     def _on_transforms(self, static: bool, message: Any) -> None:
         for transform in message.transforms:
-            try:
-                self.buffer.set_transform(transform, static=static)
-            except InvalidArgumentException as error:
-                self._warn(str(error))
-
-    def _warn(self, text: str) -> None:
-        node = getattr(self, "_node", None)
-        if node is None:
-            self.rospy.logwarn(text)
-        else:
-            node.get_logger().warning(text)
+            self.buffer.set_transform(transform, static=static)
 
     def unregister(self) -> None:
         """Remove the subscriptions."""
