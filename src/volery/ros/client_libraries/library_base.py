@@ -10,7 +10,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple, NoReturn
 
-from volery.base.errors import UsageError, choices, did_you_mean
+from volery.base.errors import UsageError, did_you_mean
 from volery.kernel.task import ExecutionContext, Scope
 from volery.kernel.waiting import current_task
 from volery.ros.graph import EmbeddedGraph, Node, Publisher, QoS, RosGraph
@@ -130,12 +130,19 @@ class LaunchedComponents:
 # -- module objects
 
 
-def library_module(name: str, names: Mapping[str, Any]) -> ModuleType:
-    """Return a module object whose ``AttributeError`` lists the available names.
+SURFACE = "docs/reference/ros-surface.md"
+"""The page that lists what there is."""
+
+
+def library_module(
+    name: str, names: Mapping[str, Any], refused: Mapping[str, str] | None = None
+) -> ModuleType:
+    """Return a module object that says of a missing name what to do instead.
 
     Args:
         name: Dotted name of the module.
         names: Content of the module.
+        refused: Dotted names that are not there on purpose, and their replacement.
     """
     module = ModuleType(name, f"{name.partition('.')[0]} on the embedded graph.")
     module.__path__ = []
@@ -144,10 +151,10 @@ def library_module(name: str, names: Mapping[str, Any]) -> ModuleType:
     def missing(attribute: str) -> NoReturn:
         if attribute.startswith("__"):
             raise AttributeError(attribute)
+        full = f"{name}.{attribute}"
+        instead = (refused or {}).get(full) or f"{SURFACE} lists what is"
         hint = did_you_mean(attribute, names)
-        raise AttributeError(
-            f"{name}.{attribute} is not there on the embedded graph{hint}; there is {choices(names)}"
-        )
+        raise AttributeError(f"{full} is not there on the embedded graph{hint}; {instead}")
 
     vars(module)["__getattr__"] = missing
     return module

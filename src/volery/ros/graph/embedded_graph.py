@@ -366,6 +366,11 @@ class EmbeddedGraph:
         return self._graph.epoch
 
     @property
+    def changed(self) -> Signal:
+        """Notified when nodes, publishers, subscriptions or services come or go."""
+        return self._graph.changed
+
+    @property
     def parameters(self) -> Parameters:
         """All parameters, by absolute name."""
         return self._graph.parameters
@@ -436,6 +441,11 @@ class EmbeddedGraph:
         """Return what the publishers of a topic offer."""
         found = self._graph.topics.get(topic)
         return tuple(one.qos for one in found.publishers) if found is not None else ()
+
+    def requested(self, topic: str) -> tuple[QoS, ...]:
+        """Return what the subscriptions to a topic request."""
+        found = self._graph.topics.get(topic)
+        return tuple(one.qos for one in found.subscriptions) if found is not None else ()
 
     def has_subscribers(self, topic_name: str) -> bool:
         """Return whether a node subscribes to the topic, without being an interaction point."""

@@ -16,7 +16,14 @@ from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
 from volery.base.time import Ns, to_seconds
 from volery.kernel.waiting import Signal
 from volery.ros.graph.callbacks import CallbackGroup
-from volery.ros.graph.graph_context import GraphContext, NodeContext, ServiceEnd, SubscriptionEnd, Topic
+from volery.ros.graph.graph_context import (
+    GraphContext,
+    NodeContext,
+    PublisherEnd,
+    ServiceEnd,
+    SubscriptionEnd,
+    Topic,
+)
 from volery.ros.graph.interface import (
     BEST_AVAILABLE,
     BEST_EFFORT,
@@ -63,6 +70,12 @@ def incompatible(offered: QoS, requested: QoS) -> str:
         return "reliable is wanted, best effort offered"
     if requested.durability == TRANSIENT_LOCAL and offered.durability == VOLATILE:
         return "transient local is wanted, volatile offered"
+    if requested.deadline and not 0 < offered.deadline <= requested.deadline:
+        return "a shorter deadline is wanted than offered"
+    if requested.manual and not offered.manual:
+        return "liveliness by topic is wanted, automatic offered"
+    if requested.lease and not 0 < offered.lease <= requested.lease:
+        return "a shorter lease of liveliness is wanted than offered"
     return ""
 
 
@@ -104,6 +117,7 @@ class EmbeddedPublisher:
         self._due: Ns = 0  # when the next message will be used
         self._open = True
         self._want = node.want(PUBLISHED, topic.name, topic.type)
+        self.latest: Ns | None = None  # when the last message was sent
         topic.publishers.append(self)
         for subscription in topic.subscriptions:
             self.connect(subscription)
@@ -133,6 +147,8 @@ class EmbeddedPublisher:
             other.charge_background("connect")
         if self._latches and subscription.qos.durability in (TRANSIENT_LOCAL, BEST_AVAILABLE):
             for content, sent, size in self._latched:
+                if self.qos.lifespan and node.kernel.now() > sent + self.qos.lifespan:
+                    continue
                 connection.deliver(content.copy(), sent, node.name, size)
 
     def disconnect(self, subscription: SubscriptionEnd) -> None:
@@ -184,6 +200,7 @@ class EmbeddedPublisher:
         elif self._checked or self._sized:
             size = node.graph.size_of(content)
         self._due = sent + self._spacing
+        self.latest = sent
         if self._latches:
             self._latched.append((content.copy(), sent, size))
         single = len(connections) == 1
@@ -194,6 +211,10 @@ class EmbeddedPublisher:
         """Return the number of subscriptions it is connected to."""
         with self.node.kernel:
             return len(self._connections)
+
+    def counterparts(self) -> list[SubscriptionEnd]:
+        """Return the subscriptions to the topic, whether they match or not."""
+        return list(self._topic.subscriptions) if self._open else []
 
     def awaited_from(self) -> Ns:
         """Return the time from which a message will be used; see ``QoS.spacing``."""
@@ -225,6 +246,8 @@ class EmbeddedSubscription:
         self._run = self.run
         self._open = True
         self.want = node.want(SUBSCRIBED, topic.name, topic.type)
+        self.latest: Ns | None = None  # when the last message arrived
+        self.lost = 0
         topic.subscriptions.append(self)
         for publisher in topic.publishers:
             publisher.connect(self)
@@ -238,6 +261,7 @@ class EmbeddedSubscription:
         if not node.graph.unrecorded:
             kernel.record(Message(sent, now, self.topic, publisher, node.name, size))
         node.charge_background("receive")
+        self.latest = now
         queue = self._queue
         if len(queue) == self.qos.depth:
             queue.popleft()  # its turn in the group goes to the next oldest
@@ -249,6 +273,7 @@ class EmbeddedSubscription:
 
     def lose(self, sent: Ns, publisher: str, size: int) -> None:
         """Record that a message was lost. A framework callback."""
+        self.lost += 1
         self.node.graph.record(Message(sent, NONE, self.topic, publisher, self.node.name, size))
 
     def run(self) -> None:
@@ -264,6 +289,10 @@ class EmbeddedSubscription:
         """Return the number of publishers it is connected to."""
         with self.node.kernel:
             return sum(1 for publisher in self._topic.publishers if not incompatible(publisher.qos, self.qos))
+
+    def counterparts(self) -> list[PublisherEnd]:
+        """Return the publishers of the topic, whether they match or not."""
+        return list(self._topic.publishers) if self._open else []
 
     def close(self) -> None:
         """Stop receiving and drop the waiting messages."""

@@ -33,6 +33,8 @@ class PublisherEnd(Protocol):
 
     node: NodeContext
     qos: QoS
+    latest: Ns | None
+    """When its last message was sent, or its liveliness asserted."""
 
     def connect(self, subscription: SubscriptionEnd) -> None:
         """Connect a subscription and deliver latched (transient-local) messages."""

@@ -45,12 +45,20 @@ class QoS:
         durability: ``volatile``, ``transient_local`` or ``best_available``.
         spacing: A subscription uses no more than one message in this time, ns. Nodes of ROS send all; a graph
             that takes the place of a link leaves the others out (``Publisher.awaited_from``).
+        deadline: Longest time between two messages, ns, offered or wanted; 0 without.
+        lifespan: A publisher's messages are not given to late subscribers after this time, ns; 0 without.
+        lease: Time after which a publisher that has not asserted its liveliness is not alive, ns; 0 without.
+        manual: Whether a publisher asserts its liveliness itself, by messages too, or its process does.
     """
 
     depth: int | None = 10
     reliability: str = RELIABLE
     durability: str = VOLATILE
     spacing: Ns = 0
+    deadline: Ns = 0
+    lifespan: Ns = 0
+    lease: Ns = 0
+    manual: bool = False
 
     def __post_init__(self) -> None:
         if self.reliability not in _RELIABILITY:
@@ -421,7 +429,7 @@ _RULE = f"{_PART}, parts joined by single slashes"
 
 def check_name(name: str, what: str = "name") -> None:
     """Raise ``UsageError`` if `name` is no valid ROS name."""
-    if not _NAME.match(name) or "__" in name:
+    if not _NAME.match(name):
         raise UsageError(
             f"{name!r} is no valid ROS {what}: {_RULE}; '/' before makes it absolute, '~' private"
         )

@@ -261,7 +261,9 @@ except ParameterNotDeclaredException as error:
 FIBONACCI = """
 import rclpy
 from rclpy.action import ActionServer, CancelResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.duration import Duration
+from rclpy.executors import MultiThreadedExecutor
 from rclpy.node import Node
 from example_interfaces.action import Fibonacci
 
@@ -269,7 +271,8 @@ class Server(Node):
     def __init__(self):
         super().__init__("server")
         self._server = ActionServer(self, Fibonacci, "fibonacci", self.work,
-                                    cancel_callback=lambda goal: CancelResponse.ACCEPT)
+                                    cancel_callback=lambda goal: CancelResponse.ACCEPT,
+                                    callback_group=ReentrantCallbackGroup())
 
     def work(self, goal):
         feedback = Fibonacci.Feedback(sequence=[0, 1])
@@ -284,7 +287,9 @@ class Server(Node):
         return Fibonacci.Result(sequence=feedback.sequence)
 
 rclpy.init()
-rclpy.spin(Server())
+executor = MultiThreadedExecutor()
+executor.add_node(Server())
+executor.spin()
 """
 
 GOAL = """
@@ -394,7 +399,7 @@ def test_what_is_not_there_says_so(stage: Stage) -> None:
         "rclpy.components is not there on the embedded graph",
         "rclpy.logging",
         "NotInitializedException",
-        "NameValidationException",
+        "InvalidNodeNameException",
     ]
 
 

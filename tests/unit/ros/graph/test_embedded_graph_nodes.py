@@ -23,7 +23,7 @@ def test_names_are_resolved_below_the_namespace_and_remapped(rig: Any) -> None:
     assert node.resolve("/tf") == "/drone_1/tf"
 
 
-@pytest.mark.parametrize("wrong", ["", "1a", "a//b", "a/", "/", "a-b", "a b", "~", "a__b", "é", "a/1"])
+@pytest.mark.parametrize("wrong", ["", "1a", "a//b", "a/", "/", "a-b", "a b", "~", "é", "a/1"])
 def test_invalid_names_are_refused(rig: Any, wrong: str) -> None:
     node = rig.graph.node("nav")
     with pytest.raises(UsageError, match="no valid ROS"):

@@ -5,8 +5,8 @@ component names its first node.
 
 Intended differences from the real library: a missing attribute is reported with the available ones; the
 callbacks of an executor run in the order in which they became ready, not kind by kind; connecting takes no
-time; deadlines, lifespans and liveliness are refused, not ignored; a ``Rate`` works without a spinning
-executor; the callback of a service cannot be a coroutine; arrays of numbers are numpy arrays; a node joins
+time; a ``Rate`` works without a spinning executor; a timer of 0 s calls each millisecond; what rcl's wait set
+needs (waitables) is refused; arrays of numbers are numpy arrays; a node joins
 ``/rosout`` when it logs its first line that has a subscriber; the threads of a ``MultiThreadedExecutor`` take
 turns, one continues where another waits.
 """

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import IntEnum
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 
 from volery.kernel.waiting import Signal
-from volery.ros.client_libraries.rclpy.entities import qos_profile_action_status_default
-from volery.ros.client_libraries.rclpy.executors import CallbackGroup, Future
+from volery.ros.client_libraries.rclpy.context import RCLError
+from volery.ros.client_libraries.rclpy.executors import CallbackGroup, Future, await_or_execute
 from volery.ros.client_libraries.rclpy.node import Node
+from volery.ros.client_libraries.rclpy.qos import qos_profile_action_status_default
 from volery.ros.messages import message_class, new
+from volery.ros.messages.message import nanoseconds
 
 _CANCEL = "action_msgs/srv/CancelGoal"
 
@@ -64,6 +67,9 @@ def _key(goal_id: Any) -> bytes:
     return bytes(np.asarray(goal_id.uuid, np.uint8))
 
 
+Callback = Callable[[Any], Any]
+
+
 class ServerGoalHandle:
     """A goal on the side of the server, the argument of ``execute_callback``."""
 
@@ -72,6 +78,7 @@ class ServerGoalHandle:
         self.goal_id = goal_id
         self.request = request
         self.status = Status.ACCEPTED
+        self.stamp = server.node.get_clock().now().to_msg()
         self.result: Any = None
         self.ended = Signal(server.node.context.kernel, f"{server.name} (result)")
 
@@ -87,46 +94,66 @@ class ServerGoalHandle:
 
     def publish_feedback(self, feedback: Any) -> None:
         """Publish feedback to the client."""
+        if not isinstance(feedback, self._server.action_type.Feedback):
+            raise TypeError(f"Expected {self._server.action_type.Feedback}, got {type(feedback)}")
         self._server.publish_feedback(self, feedback)
 
-    def _set_status(self, status: Status) -> None:
+    def _set_status(self, status: Status, *before: Status) -> None:
+        if self.status not in before:
+            raise RCLError(
+                f"Failed to update goal state: goal_handle attempted invalid transition from state "
+                f"{self.status.name} to {status.name}"
+            )
         self.status = status
         self._server.publish_status()
 
-    def execute(self) -> None:
-        """Run the execute callback."""
-        if self.status is Status.ACCEPTED:
-            self._set_status(Status.EXECUTING)
-        self._server.execute(self)
+    def execute(self, execute_callback: Callable[[ServerGoalHandle], Any] | None = None) -> None:
+        """Let the executor run the execute callback."""
+        if self.status is not Status.CANCELING:
+            self._set_status(Status.EXECUTING, Status.ACCEPTED)
+        self._server.execute(self, execute_callback)
 
     def succeed(self) -> None:
         """Set the status SUCCEEDED."""
-        self._set_status(Status.SUCCEEDED)
+        self._set_status(Status.SUCCEEDED, Status.EXECUTING, Status.CANCELING)
 
     def abort(self) -> None:
         """Set the status ABORTED."""
-        self._set_status(Status.ABORTED)
+        self._set_status(Status.ABORTED, Status.EXECUTING, Status.CANCELING)
 
     def canceled(self) -> None:
         """Set the status CANCELED."""
-        self._set_status(Status.CANCELED)
+        self._set_status(Status.CANCELED, Status.CANCELING)
 
     def request_cancel(self) -> None:
         """Set the status CANCELING."""
-        self._set_status(Status.CANCELING)
+        self._set_status(Status.CANCELING, Status.ACCEPTED, Status.EXECUTING)
 
     def end(self, result: Any) -> None:
         """Store the result of the execute callback."""
         if self.is_active:
-            self._set_status(Status.ABORTED)
+            self.status = Status.ABORTED
+            self._server.publish_status()
         self.result = result
         self.ended.notify()
 
+    def destroy(self) -> None:
+        """Do nothing: a handle holds no resources."""
+
+
+class _CancelCode(IntEnum):
+    """Answers of ``action_msgs/srv/CancelGoal``."""
+
+    NONE = 0
+    REJECTED = 1
+    UNKNOWN_GOAL_ID = 2
+    GOAL_TERMINATED = 3
+
 
 class ActionServer:
-    """Executes goals, each in a task of its own, as the threads of an executor would."""
+    """Executes goals. The executor of the node runs all callbacks; the execute callback is a task of it."""
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - rclpy's signature
         self,
         node: Node,
         action_type: Any,
@@ -137,55 +164,116 @@ class ActionServer:
         goal_callback: Callable[[Any], Any] = lambda _: GoalResponse.ACCEPT,
         handle_accepted_callback: Callable[[ServerGoalHandle], Any] = lambda handle: handle.execute(),
         cancel_callback: Callable[[ServerGoalHandle], Any] = lambda _: CancelResponse.REJECT,
+        feedback_pub_qos_profile: Any = 10,
+        status_pub_qos_profile: Any = qos_profile_action_status_default,
         **options: Any,
     ) -> None:
         self.node, self.name = node, action_name
-        self._type = _action_type("ActionServer", action_type)
-        self._on_execute, self._on_goal, self._on_cancel = execute_callback, goal_callback, cancel_callback
-        self._on_accepted = handle_accepted_callback
+        self.action_type = _action_type("ActionServer", action_type)
+        self._on_goal: Callback
+        self._on_cancel: Callback
+        self._on_accepted: Callback
+        self._on_execute: Callback
+        self.register_goal_callback(goal_callback)
+        self.register_cancel_callback(cancel_callback)
+        self.register_handle_accepted_callback(handle_accepted_callback)
+        self.register_execute_callback(execute_callback)
         self._goals: dict[bytes, ServerGoalHandle] = {}
         group = callback_group or node.default_callback_group
-        at = f"{action_name}/_action"
+        at, kind = f"{action_name}/_action", self.action_type
         self._services = [
-            node.create_service(self._type.SendGoal, f"{at}/send_goal", self._accept, callback_group=group),
+            node.create_service(kind.SendGoal, f"{at}/send_goal", self._accept, callback_group=group),
             node.create_service(_CancelType, f"{at}/cancel_goal", self._cancel, callback_group=group),
-            node.create_waiting_service(self._type.GetResult, f"{at}/get_result", self._result),
+            node.create_waiting_service(kind.GetResult, f"{at}/get_result", self._result),
         ]
-        self._feedback = node.create_publisher(self._type.FeedbackMessage, f"{at}/feedback", 10)
+        self._feedback = node.create_publisher(
+            kind.FeedbackMessage, f"{at}/feedback", feedback_pub_qos_profile
+        )
         status = message_class("action_msgs/msg/GoalStatusArray")
-        self._status = node.create_publisher(status, f"{at}/status", qos_profile_action_status_default)
+        self._status = node.create_publisher(status, f"{at}/status", status_pub_qos_profile)
 
-    def _accept(self, request: Any, response: Any) -> Any:
+    def register_goal_callback(self, goal_callback: Callable[[Any], Any] | None) -> None:
+        """Ask *goal_callback* whether a goal is accepted; None accepts each."""
+        self._on_goal = goal_callback or (lambda _: GoalResponse.ACCEPT)
+
+    def register_cancel_callback(self, cancel_callback: Callable[[Any], Any] | None) -> None:
+        """Ask *cancel_callback* whether a goal may be cancelled; None rejects each request."""
+        self._on_cancel = cancel_callback or (lambda _: CancelResponse.REJECT)
+
+    def register_handle_accepted_callback(
+        self, handle_accepted_callback: Callable[[ServerGoalHandle], Any] | None
+    ) -> None:
+        """Call *handle_accepted_callback* with each accepted goal; None executes it."""
+        self._on_accepted = handle_accepted_callback or (lambda handle: handle.execute())
+
+    def register_execute_callback(self, execute_callback: Callable[[ServerGoalHandle], Any]) -> None:
+        """Execute goals by *execute_callback*."""
+        if not callable(execute_callback):
+            raise TypeError("Failed to register goal execution callback: not callable")
+        self._on_execute = execute_callback
+
+    async def _accept(self, request: Any, response: Any) -> Any:
         handle = ServerGoalHandle(self, request.goal_id, request.goal)
-        response.accepted = self._on_goal(request.goal) == GoalResponse.ACCEPT
-        response.stamp = self.node.get_clock().now().to_msg()
+        answer = await await_or_execute(self._on_goal, request.goal)
+        if not isinstance(answer, GoalResponse):
+            self.node.get_logger().warning(
+                "Goal request callback did not return a GoalResponse type. Rejecting goal."
+            )
+        response.accepted = answer == GoalResponse.ACCEPT
+        response.stamp = handle.stamp
         if response.accepted:
             self._goals[_key(request.goal_id)] = handle
             self.publish_status()
-            self._on_accepted(handle)
+            self._after_answer(handle)
         return response
 
-    def execute(self, handle: ServerGoalHandle) -> None:
-        """Run the execute callback for a goal in a task of its own."""
+    def _after_answer(self, handle: ServerGoalHandle) -> None:
+        """Call the callback of accepted goals once the client has been answered."""
+        executor = self.node.executor
+        if executor is None:
+            self._on_accepted(handle)
+        else:
+            executor.create_task(self._on_accepted, handle)
 
-        def body() -> None:
+    def execute(self, handle: ServerGoalHandle, callback: Callable[[Any], Any] | None) -> None:
+        """Let the executor run the execute callback for a goal."""
+
+        async def run() -> None:
             result = None
             try:
-                result = self._on_execute(handle)
+                result = await await_or_execute(callback or self._on_execute, handle)
             except Exception as error:
                 self.node.get_logger().error(f"Error raised in execute callback: {error}")
-            handle.end(result if result is not None else self._type.Result())
+            if handle.is_active:
+                self.node.get_logger().warning(
+                    f"Goal state not set, assuming aborted. Goal ID: {list(_key(handle.goal_id))}"
+                )
+            handle.end(result if result is not None else self.action_type.Result())
 
-        self.node.context.spawn(body, f"goal of {self.name}")
+        executor = self.node.executor
+        if executor is None:
+            raise RuntimeError(f"{self.name}: no executor spins the node of the action server")
+        executor.create_task(run)
 
-    def _cancel(self, request: Any, response: Any) -> Any:
-        wanted = _key(request.goal_info.goal_id)
-        for key, handle in self._goals.items():
-            chosen = key == wanted or not any(wanted)
-            if chosen and handle.is_active and self._on_cancel(handle) == CancelResponse.ACCEPT:
+    async def _cancel(self, request: Any, response: Any) -> Any:
+        wanted, stamp = _key(request.goal_info.goal_id), nanoseconds(request.goal_info.stamp)
+        known = self._goals.get(wanted)
+        if any(wanted) and known is None and not stamp:
+            response.return_code = _CancelCode.UNKNOWN_GOAL_ID
+            return response
+        if any(wanted) and known is not None and not known.is_active and not stamp:
+            response.return_code = _CancelCode.GOAL_TERMINATED
+            return response
+        for key, handle in list(self._goals.items()):
+            chosen = key == wanted or (not any(wanted) and not stamp)
+            chosen = chosen or bool(stamp and nanoseconds(handle.stamp) <= stamp)
+            if not (chosen and handle.is_active) or handle.status is Status.CANCELING:
+                continue
+            answer = await await_or_execute(self._on_cancel, handle)
+            if answer == CancelResponse.ACCEPT and handle.is_active:
                 handle.request_cancel()
-                response.goals_canceling.append(new("action_msgs/msg/GoalInfo", goal_id=handle.goal_id))
-        response.return_code = 0 if response.goals_canceling else 1
+                info = new("action_msgs/msg/GoalInfo", goal_id=handle.goal_id, stamp=handle.stamp)
+                response.goals_canceling.append(info)
         return response
 
     def _result(self, request: Any, response: Any) -> Any:
@@ -197,14 +285,14 @@ class ActionServer:
 
     def publish_feedback(self, handle: ServerGoalHandle, feedback: Any) -> None:
         """Publish feedback of a goal."""
-        self._feedback.publish(self._type.FeedbackMessage(goal_id=handle.goal_id, feedback=feedback))
+        self._feedback.publish(self.action_type.FeedbackMessage(goal_id=handle.goal_id, feedback=feedback))
 
     def publish_status(self) -> None:
         """Publish the status of all goals."""
         listed = [
             new(
                 "action_msgs/msg/GoalStatus",
-                goal_info=new("action_msgs/msg/GoalInfo", goal_id=handle.goal_id),
+                goal_info=new("action_msgs/msg/GoalInfo", goal_id=handle.goal_id, stamp=handle.stamp),
                 status=int(handle.status),
             )
             for handle in self._goals.values()
@@ -225,16 +313,30 @@ class ClientGoalHandle:
         self.goal_id = goal_id
         self.accepted: bool = answer.accepted
         self.stamp = answer.stamp
-        self.status = Status.ACCEPTED if answer.accepted else Status.UNKNOWN
+        self.status = int(Status.UNKNOWN)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ClientGoalHandle) and _key(self.goal_id) == _key(other.goal_id)
+
+    def __hash__(self) -> int:
+        return hash(_key(self.goal_id))
 
     def get_result_async(self) -> Future:
         """Return the future of the result (``.status``, ``.result``)."""
         return self._client.results.call_async(self._client.type.GetResult.Request(goal_id=self.goal_id))
 
+    def get_result(self) -> Any:
+        """Block until an executor in another task has processed the result."""
+        return self._client.wait_for(self.get_result_async())
+
     def cancel_goal_async(self) -> Future:
         """Request the cancellation of the goal."""
         info = new("action_msgs/msg/GoalInfo", goal_id=self.goal_id)
         return self._client.cancels.call_async(_CancelType.Request(goal_info=info))
+
+    def cancel_goal(self) -> Any:
+        """Request the cancellation and block until an executor in another task has processed the answer."""
+        return self._client.wait_for(self.cancel_goal_async())
 
 
 class ActionClient:
@@ -253,12 +355,20 @@ class ActionClient:
         self._node, self._name = node, action_name
         self._sent = 0
         self._feedbacks: dict[bytes, Callable[[Any], Any]] = {}
+        self._handles: WeakValueDictionary[bytes, ClientGoalHandle] = WeakValueDictionary()
         at, group = f"{action_name}/_action", callback_group
         self._goals = node.create_client(self.type.SendGoal, f"{at}/send_goal", callback_group=group)
         self.cancels = node.create_client(_CancelType, f"{at}/cancel_goal", callback_group=group)
         self.results = node.create_client(self.type.GetResult, f"{at}/get_result", callback_group=group)
         self._feedback_subscription = node.create_subscription(
             self.type.FeedbackMessage, f"{at}/feedback", self._on_feedback, 10, callback_group=group
+        )
+        self._status_subscription = node.create_subscription(
+            message_class("action_msgs/msg/GoalStatusArray"),
+            f"{at}/status",
+            self._on_status,
+            qos_profile_action_status_default,
+            callback_group=group,
         )
 
     def server_is_ready(self) -> bool:
@@ -287,7 +397,10 @@ class ActionClient:
             if problem is not None:
                 handle.set_exception(problem)
             else:
-                handle.set_result(ClientGoalHandle(self, goal_id, answer.result()))
+                made = ClientGoalHandle(self, goal_id, answer.result())
+                if made.accepted:
+                    self._handles[_key(goal_id)] = made
+                handle.set_result(made)
 
         answered.add_done_callback(set_handle)
         return handle
@@ -304,25 +417,82 @@ class ActionClient:
         if callback is not None:
             callback(message)
 
+    def _on_status(self, message: Any) -> None:
+        for one in message.status_list:
+            handle = self._handles.get(_key(one.goal_info.goal_id))
+            if handle is not None and handle.status not in _ENDED:
+                handle.status = one.status
+
+    def wait_for(self, future: Future) -> Any:
+        """Block until an executor in another task has completed *future*; return its result."""
+        done = Signal(self._node.context.kernel, f"{self._name} (an answer, which an executor takes in)")
+        future.on_done(done.notify)
+        done.wait_for(future.done)
+        return future.result()
+
     def send_goal(self, goal: Any, **options: Any) -> Any:
         """Send a goal and block until an executor in another task has processed its result."""
-        done = Signal(self._node.context.kernel, f"{self._name} (a result, which an executor takes in)")
-        handle = self.send_goal_async(goal, **options)
-        handle.add_done_callback(lambda _: done.notify())
-        done.wait_for(handle.done)
-        result = handle.result().get_result_async()
-        result.add_done_callback(lambda _: done.notify())
-        done.wait_for(result.done)
-        return result.result()
+        handle = self.wait_for(self.send_goal_async(goal, **options))
+        return handle.get_result() if handle.accepted else None
 
     def destroy(self) -> None:
         """Destroy the clients and the subscription of the action."""
         for client in (self._goals, self.cancels, self.results):
             self._node.destroy_client(client)
         self._node.destroy_subscription(self._feedback_subscription)
+        self._node.destroy_subscription(self._status_subscription)
 
 
-ACTION = {
+def get_action_names_and_types(node: Node) -> list[tuple[str, list[str]]]:
+    """Return all actions that have a server or a client."""
+    return _actions(node.get_topic_names_and_types())
+
+
+def get_action_server_names_and_types_by_node(
+    node: Node, remote_node_name: str, remote_node_namespace: str
+) -> list[tuple[str, list[str]]]:
+    """Return the actions that a node serves."""
+    return _actions(node.get_publisher_names_and_types_by_node(remote_node_name, remote_node_namespace))
+
+
+def get_action_client_names_and_types_by_node(
+    node: Node, remote_node_name: str, remote_node_namespace: str
+) -> list[tuple[str, list[str]]]:
+    """Return the actions that a node calls."""
+    return _actions(node.get_subscriber_names_and_types_by_node(remote_node_name, remote_node_namespace))
+
+
+_FEEDBACK = "/_action/feedback"
+
+
+def _actions(topics: list[tuple[str, list[str]]]) -> list[tuple[str, list[str]]]:
+    return [
+        (name.removesuffix(_FEEDBACK), [one.removesuffix("_FeedbackMessage") for one in kinds])
+        for name, kinds in topics
+        if name.endswith(_FEEDBACK)
+    ]
+
+
+GRAPH: dict[str, Any] = {
+    one.__name__: one
+    for one in (
+        get_action_client_names_and_types_by_node,
+        get_action_names_and_types,
+        get_action_server_names_and_types_by_node,
+    )
+}
+"""Content of ``rclpy.action.graph``."""
+CLIENT: dict[str, Any] = {"ActionClient": ActionClient, "ClientGoalHandle": ClientGoalHandle}
+"""Content of ``rclpy.action.client``."""
+SERVER: dict[str, Any] = {
+    "ActionServer": ActionServer,
+    "CancelResponse": CancelResponse,
+    "GoalResponse": GoalResponse,
+    "ServerGoalHandle": ServerGoalHandle,
+}
+"""Content of ``rclpy.action.server``."""
+ACTION: dict[str, Any] = {
+    **GRAPH,
     "ActionClient": ActionClient,
     "ActionServer": ActionServer,
     "CancelResponse": CancelResponse,

@@ -6,6 +6,7 @@ the trace under the name of the component.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -29,6 +30,14 @@ from volery.ros.graph import Node, RosGraph
 from volery.trace.events import Text
 
 
+class RCLError(RuntimeError):
+    """A failure that rcl reports."""
+
+
+class NodeNameNonExistentError(RCLError):
+    """There is no node of this name."""
+
+
 class NotInitializedException(Exception):  # noqa: N818 - rclpy's name
     """A call before ``rclpy.init()`` or after ``rclpy.shutdown()``."""
 
@@ -49,6 +58,14 @@ class ExternalShutdownException(Exception):  # noqa: N818 - rclpy's name
 
 class TimeoutException(Exception):  # noqa: N818 - rclpy's name
     """Nothing became ready before the time-out."""
+
+
+class ConditionReachedException(Exception):  # noqa: N818 - rclpy's name
+    """What an executor waited for has come true."""
+
+
+class NoTypeSupportImportedException(Exception):  # noqa: N818 - rclpy's name
+    """A class is no message or service class."""
 
 
 class InvalidHandle(Exception):  # noqa: N818 - rclpy's name
@@ -131,6 +148,7 @@ EXCEPTIONS = {
     for kind in (
         NotInitializedException,
         NameValidationException,
+        NoTypeSupportImportedException,
         InvalidHandle,
         InvalidParameterException,
         InvalidParameterTypeException,
@@ -144,6 +162,12 @@ EXCEPTIONS = {
     )
 }
 """Content of ``rclpy.exceptions``."""
+
+
+def private_name(parameter: str) -> str:
+    """Return the name on the graph of a node's parameter, whose own name may have any characters."""
+    parts = re.split(r"[./]+", parameter.strip("./"))
+    return "~" + "/".join(re.sub(r"\W", "_", f"_{part}" if part[:1].isdigit() else part) for part in parts)
 
 
 class Context:
@@ -183,6 +207,15 @@ class Context:
         """Whether the context runs; unlike ``ok``, no interaction point."""
         return self._started
 
+    @property
+    def handle(self) -> Context:
+        """The context itself: it has no handle in C."""
+        return self
+
+    def get_domain_id(self) -> int:
+        """Return the ROS domain of the environment, which the embedded graph does not use."""
+        return int(os.environ.get("ROS_DOMAIN_ID") or 0)
+
     def on_shutdown(self, callback: Callable[[], Any]) -> None:
         """Call *callback* at shutdown or at the end of the run."""
         if not self._end_requested:
@@ -216,8 +249,6 @@ class Context:
         """Return a new node of the graph."""
         if not self._started:
             raise NotInitializedException("cannot create node: rclpy.init() has not been called")
-        if not re.fullmatch(r"[A-Za-z_]\w*", name):
-            raise NameValidationException(f"Invalid node name: {name!r}: letters, digits and underscores")
         first = not self._nodes and self._launch is not None
         launch = self._launch or Launch()
         where = namespace if namespace is not None and launch.namespace == "/" else launch.namespace
@@ -228,7 +259,7 @@ class Context:
             made = self._graph.node(label, where, remaps=launch.remaps)
         if first:
             for key, value in launch.parameters.items():
-                made.set_parameter(f"~{key.replace('.', '/')}", value)
+                made.set_parameter(private_name(key), value)
         self._nodes.append(made)
         return made
 

@@ -1,155 +1,26 @@
-"""rclpy's entities of a node and their quality of service.
-
-The entities are publishers, subscriptions, services, clients and timers.
-"""
+"""rclpy's entities of a node: publishers, subscriptions, services, clients, timers and guard conditions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from enum import IntEnum
+from inspect import iscoroutinefunction, signature
 from typing import Any, Protocol
 
 from volery.base.errors import UsageError
-from volery.base.time import Ns, S, from_seconds
+from volery.base.time import MS, Ns, S, from_seconds
 from volery.kernel.waiting import Signal
-from volery.ros.client_libraries.rclpy.context import Context, InvalidHandle
-from volery.ros.client_libraries.rclpy.executors import CallbackGroup, CallbackQueue, Executor, Future
-from volery.ros.client_libraries.rclpy.ros_time import Duration
-from volery.ros.graph import Node as GraphNode
-from volery.ros.graph import QoS, ServiceError, Work
-from volery.ros.graph.interface import BEST_AVAILABLE, BEST_EFFORT, RELIABLE, TRANSIENT_LOCAL, VOLATILE
-from volery.ros.messages import Message
-
-
-class InvalidQoSProfileException(Exception):  # noqa: N818 - rclpy's name
-    """A profile that is contradictory or incomplete."""
-
-
-class HistoryPolicy(IntEnum):
-    """Which messages are kept."""
-
-    SYSTEM_DEFAULT = 0
-    KEEP_LAST = 1
-    KEEP_ALL = 2
-    UNKNOWN = 3
-
-
-class ReliabilityPolicy(IntEnum):
-    """Whether lost messages are sent again."""
-
-    SYSTEM_DEFAULT = 0
-    RELIABLE = 1
-    BEST_EFFORT = 2
-    UNKNOWN = 3
-    BEST_AVAILABLE = 4
-
-
-class DurabilityPolicy(IntEnum):
-    """Whether late subscriptions receive earlier messages."""
-
-    SYSTEM_DEFAULT = 0
-    TRANSIENT_LOCAL = 1
-    VOLATILE = 2
-    UNKNOWN = 3
-    BEST_AVAILABLE = 4
-
-
-class LivelinessPolicy(IntEnum):
-    """Liveliness policies, which are accepted without effect on the embedded graph."""
-
-    SYSTEM_DEFAULT = 0
-    AUTOMATIC = 1
-    MANUAL_BY_TOPIC = 3
-    UNKNOWN = 4
-    BEST_AVAILABLE = 5
-
-
-class QoSProfile:
-    """A profile as in rclpy: ``QoSProfile(depth=10)``.
-
-    Finite deadlines, lifespans and lease durations are refused, because the embedded graph does not monitor
-    them.
-    """
-
-    def __init__(self, **policies: Any) -> None:
-        if "history" not in policies and "depth" not in policies:
-            raise InvalidQoSProfileException("History and/or depth settings are required.")
-        self.history = HistoryPolicy(policies.pop("history", HistoryPolicy.KEEP_LAST))
-        if self.history is HistoryPolicy.KEEP_LAST and "depth" not in policies:
-            raise InvalidQoSProfileException("History set to KEEP_LAST without a depth setting.")
-        self.depth = int(policies.pop("depth", 0))
-        self.reliability = ReliabilityPolicy(policies.pop("reliability", ReliabilityPolicy.RELIABLE))
-        self.durability = DurabilityPolicy(policies.pop("durability", DurabilityPolicy.VOLATILE))
-        self.liveliness = LivelinessPolicy(policies.pop("liveliness", LivelinessPolicy.SYSTEM_DEFAULT))
-        self.avoid_ros_namespace_conventions = policies.pop("avoid_ros_namespace_conventions", False)
-        for name in ("deadline", "lifespan", "liveliness_lease_duration"):
-            span = policies.pop(name, None)
-            setattr(self, name, span or Duration())
-            if span is not None and 0 < span.nanoseconds < (1 << 62):
-                raise UsageError(f"QoSProfile: a {name} is not monitored on the embedded graph; leave it out")
-        if policies:
-            raise TypeError(f"QoSProfile has no {sorted(policies)[0]!r}")
-
-
-def _preset(depth: int, **policies: Any) -> QoSProfile:
-    return QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=depth, **policies)
-
-
-qos_profile_default = _preset(10)
-qos_profile_system_default = _preset(10)
-qos_profile_sensor_data = _preset(5, reliability=ReliabilityPolicy.BEST_EFFORT)
-qos_profile_services_default = _preset(10)
-qos_profile_parameters = _preset(1000)
-qos_profile_parameter_events = _preset(1000)
-qos_profile_action_status_default = _preset(1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-qos_profile_best_available = _preset(
-    10, reliability=ReliabilityPolicy.BEST_AVAILABLE, durability=DurabilityPolicy.BEST_AVAILABLE
+from volery.ros.client_libraries.rclpy.context import Context, InvalidHandle, RCLError
+from volery.ros.client_libraries.rclpy.events import (
+    PublisherEventCallbacks,
+    SubscriptionEventCallbacks,
+    watch,
 )
-
-_RELIABILITY = {
-    ReliabilityPolicy.BEST_EFFORT: BEST_EFFORT,
-    ReliabilityPolicy.BEST_AVAILABLE: BEST_AVAILABLE,
-}
-_DURABILITY = {
-    DurabilityPolicy.TRANSIENT_LOCAL: TRANSIENT_LOCAL,
-    DurabilityPolicy.BEST_AVAILABLE: BEST_AVAILABLE,
-}
-
-
-def graph_qos(given: Any) -> QoS:
-    """Return the quality of service of the graph for a profile or a depth."""
-    if isinstance(given, bool) or not isinstance(given, (int, QoSProfile)):
-        raise TypeError(f"Expected QoSProfile or int, but received {type(given)!r}")
-    if isinstance(given, int):
-        if given < 0:
-            raise ValueError("history depth must be greater than or equal to zero")
-        return QoS(max(1, given))
-    depth = None if given.history is HistoryPolicy.KEEP_ALL else max(1, given.depth)
-    reliability = _RELIABILITY.get(given.reliability, RELIABLE)
-    return QoS(depth, reliability, _DURABILITY.get(given.durability, VOLATILE))
-
-
-QOS = {
-    "DurabilityPolicy": DurabilityPolicy,
-    "HistoryPolicy": HistoryPolicy,
-    "InvalidQoSProfileException": InvalidQoSProfileException,
-    "LivelinessPolicy": LivelinessPolicy,
-    "QoSDurabilityPolicy": DurabilityPolicy,
-    "QoSHistoryPolicy": HistoryPolicy,
-    "QoSLivelinessPolicy": LivelinessPolicy,
-    "QoSProfile": QoSProfile,
-    "QoSReliabilityPolicy": ReliabilityPolicy,
-    "ReliabilityPolicy": ReliabilityPolicy,
-    "qos_profile_action_status_default": qos_profile_action_status_default,
-    "qos_profile_best_available": qos_profile_best_available,
-    "qos_profile_default": qos_profile_default,
-    "qos_profile_parameter_events": qos_profile_parameter_events,
-    "qos_profile_parameters": qos_profile_parameters,
-    "qos_profile_sensor_data": qos_profile_sensor_data,
-    "qos_profile_services_default": qos_profile_services_default,
-    "qos_profile_system_default": qos_profile_system_default,
-}
-"""Content of ``rclpy.qos``."""
+from volery.ros.client_libraries.rclpy.executors import CallbackGroup, CallbackQueue, Executor, Future
+from volery.ros.client_libraries.rclpy.qos import graph_qos, profile_of
+from volery.ros.client_libraries.rclpy.ros_time import Clock
+from volery.ros.graph import CallFailedError, EmbeddedGraph, RosGraph, ServiceError, Work
+from volery.ros.graph import Node as GraphNode
+from volery.ros.messages import Message, from_cdr, to_cdr
 
 
 class EntityNode(Protocol):
@@ -167,8 +38,15 @@ class EntityNode(Protocol):
     def executor(self) -> Executor | None:
         """Executor that spins the node."""
 
-    def execute(self, callback: Callable[..., Any], *args: Any) -> None:
-        """Run a callback, which may be a coroutine function."""
+    @property
+    def graph(self) -> RosGraph:
+        """Graph of the node."""
+
+    def absolute_name(self, name: str, *, is_service: bool = False) -> str:
+        """Return a checked name with its substitutions made."""
+
+    def execute(self, callback: Callable[..., Any], *args: Any) -> Future | None:
+        """Run a callback; return the task of one that is a coroutine function."""
 
 
 def type_name(caller: str, given: Any) -> str:
@@ -190,17 +68,46 @@ def service_name(caller: str, given: Any) -> str:
 class Publisher:
     """Publisher returned by ``node.create_publisher``."""
 
-    def __init__(self, node: EntityNode, msg_type: Any, topic: str, qos: Any) -> None:
+    def __init__(
+        self,
+        node: EntityNode,
+        msg_type: Any,
+        topic: str,
+        qos: Any,
+        events: tuple[PublisherEventCallbacks | None, CallbackQueue] | None = None,
+    ) -> None:
         self.msg_type = msg_type
-        self.qos_profile = qos
-        self._made = node.graph_node.advertise(topic, type_name("create_publisher", msg_type), graph_qos(qos))
+        self.qos_profile = profile_of(qos)
+        name = node.absolute_name(topic)
+        kind = type_name("create_publisher", msg_type)
+        self._node = node
+        self._made = node.graph_node.advertise(name, kind, graph_qos(self.qos_profile))
         self.topic = self.topic_name = self._made.topic
+        if events is not None and events[0] is not None:
+            watch(node.context, node.graph, self._made, events[0], events[1])
 
     def publish(self, msg: Any) -> None:
-        """Publish a message; raise ``TypeError`` if it is of another type."""
+        """Publish a message, or the bytes of one; raise ``TypeError`` if it is of another type."""
+        if isinstance(msg, bytes):
+            msg = from_cdr(self.msg_type.__msgtype__, msg)
         if not isinstance(msg, self.msg_type):
             raise TypeError(f"Expected {self.msg_type}, got {type(msg)}")
         self._made.publish(msg)
+
+    @property
+    def logger_name(self) -> str:
+        """Name of the node's logger."""
+        return _logger_name(self._node)
+
+    def assert_liveliness(self) -> None:
+        """Assert that the publisher is alive, for ``LivelinessPolicy.MANUAL_BY_TOPIC``."""
+        if isinstance(self._node.graph, EmbeddedGraph):
+            with self._node.context.kernel as kernel:
+                self._made.latest = kernel.now()  # type: ignore[attr-defined]  # of the embedded graph
+
+    def wait_for_all_acked(self, timeout: Any = None) -> bool:
+        """Return True: on the embedded graph a message is on its way when ``publish`` returns."""
+        return True
 
     def get_subscription_count(self) -> int:
         """Return the number of subscriptions to the topic."""
@@ -209,6 +116,39 @@ class Publisher:
     def destroy(self) -> None:
         """Remove the publisher from the graph."""
         self._made.close()
+
+    def __enter__(self) -> Publisher:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy()
+
+
+def _logger_name(node: EntityNode) -> str:
+    return node.graph_node.name.strip("/").replace("/", ".")
+
+
+_CALLBACK = (
+    "Subscription.__init__(): callback should be either be callable with one argument"
+    "(to get only the message) or two (to get message and message info)"
+)
+
+
+def _wants_info(callback: Any) -> bool:
+    """Return whether a callback takes the message and its info; ``RuntimeError`` if it takes neither."""
+    if not callable(callback):
+        raise RuntimeError(_CALLBACK)
+    try:
+        signature(callback).bind(object())
+    except TypeError:
+        try:
+            signature(callback).bind(object(), object())
+        except TypeError:
+            raise RuntimeError(_CALLBACK) from None
+        return True
+    except ValueError:  # a built-in function has no signature
+        pass
+    return False
 
 
 class Subscription:
@@ -219,20 +159,47 @@ class Subscription:
         node: EntityNode,
         msg_type: Any,
         topic: str,
-        callback: Callable[[Any], Any],
+        callback: Callable[..., Any],
         *,
         qos: Any,
         queue: CallbackQueue,
+        events: SubscriptionEventCallbacks | None = None,
+        raw: bool = False,
     ) -> None:
-        self.msg_type, self.callback, self.qos_profile = msg_type, callback, qos
+        self.msg_type, self.callback, self.qos_profile = msg_type, callback, profile_of(qos)
         self.callback_group: CallbackGroup = queue.group
+        self.raw = raw
         kind = type_name("create_subscription", msg_type)
         self._node = node
-        self._made = node.graph_node.subscribe(topic, kind, self._call, graph_qos(qos), queue.ready)
+        self._wants_info = _wants_info(callback)
+        self._received = 0
+        name = node.absolute_name(topic)
+        used = graph_qos(self.qos_profile)
+        self._made = node.graph_node.subscribe(name, kind, self._call, used, queue.ready)
         self.topic = self.topic_name = self._made.topic
+        queue.add(self)
+        if events is not None:
+            watch(node.context, node.graph, self._made, events, queue)
 
     def _call(self, message: Any) -> None:
-        self._node.execute(self.callback, message)
+        given = to_cdr(message) if self.raw else message
+        if not self._wants_info:
+            self._node.execute(self.callback, given)
+            return
+        self._received += 1
+        now = self._node.graph.epoch + self._node.context.kernel.now()
+        info = {
+            "source_timestamp": now,
+            "received_timestamp": now,
+            "publication_sequence_number": self._received,
+            "reception_sequence_number": self._received,
+        }
+        self._node.execute(self.callback, given, info)
+
+    @property
+    def logger_name(self) -> str:
+        """Name of the node's logger."""
+        return _logger_name(self._node)
 
     def get_publisher_count(self) -> int:
         """Return the number of publishers of the topic."""
@@ -241,6 +208,12 @@ class Subscription:
     def destroy(self) -> None:
         """Remove the subscription from the graph."""
         self._made.close()
+
+    def __enter__(self) -> Subscription:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy()
 
 
 class Service:
@@ -257,18 +230,49 @@ class Service:
         self.srv_type, self.callback = srv_type, callback
         self.callback_group: CallbackGroup = queue.group
         kind = service_name("create_service", srv_type)
-        self._made = node.graph_node.serve(name, kind, self._handle, queue.ready)
+        self._node, self._queue = node, queue
+        self._answered = Signal(node.context.kernel, f"{name} (a coroutine's response)")
+        full = node.absolute_name(name, is_service=True)
+        if iscoroutinefunction(callback):
+            beside = node.graph_node.group(lambda work: node.context.spawn(work.run, name))
+            self._made = node.graph_node.serve(full, kind, self._await_response, beside)
+        else:
+            self._made = node.graph_node.serve(full, kind, self._handle, queue.ready)
         self.srv_name = self.service_name = self._made.name
+        queue.add(self)
 
     def _handle(self, request: Any) -> Any:
-        response = self.callback(request, self.srv_type.Response())
+        return self._checked(self.callback(request, self.srv_type.Response()))
+
+    def _checked(self, response: Any) -> Any:
         if not isinstance(response, Message):
-            close = getattr(response, "close", None)
-            if close is not None:
-                close()
-                raise TypeError(f"service {self.srv_name}: a coroutine cannot answer on the embedded graph")
             raise TypeError(f"service {self.srv_name}: its callback returned {response!r}, not a response")
         return response
+
+    def _await_response(self, request: Any) -> Any:
+        """Let the executor run the coroutine; wait for its result in a task beside the executor."""
+        started: list[Future] = []
+
+        def start() -> None:
+            made = self._node.execute(self.callback, request, self.srv_type.Response())
+            if made is None:  # the node has left its executor
+                raise UsageError(f"service {self.srv_name}: no executor spins its node")
+            started.append(made)
+            made.on_done(self._answered.notify)
+
+        kernel = self._node.context.kernel
+        with kernel.guard:
+            self._queue.ready.add(Work(kernel.now(), start))
+        self._answered.wait_for(lambda: started and started[0].done())
+        if started[0].exception() is not None:  # the executor has raised it
+            raise CallFailedError(str(started[0].exception()))
+        return self._checked(started[0].result())
+
+    def configure_introspection(
+        self, clock: Any, service_event_qos_profile: Any, introspection_state: Any
+    ) -> None:
+        """Refuse all but ``OFF``: calls of services are in the trace."""
+        _refuse_introspection(introspection_state)
 
     def destroy(self) -> None:
         """Remove the service from the graph."""
@@ -282,9 +286,24 @@ class Client:
         self.srv_type = srv_type
         self.callback_group: CallbackGroup = queue.group
         self._node, self._queue = node, queue
-        self._made = node.graph_node.client(name, service_name("create_client", srv_type))
+        full = node.absolute_name(name, is_service=True)
+        self._made = node.graph_node.client(full, service_name("create_client", srv_type))
         self.srv_name = self.service_name = self._made.name
         self._destroyed = False
+        self._pending: list[Future] = []
+        queue.add(self)
+
+    def remove_pending_request(self, future: Future) -> None:
+        """Forget a request, whose future will not be completed."""
+        if future in self._pending:
+            self._pending.remove(future)
+            future.abandon()
+
+    def configure_introspection(
+        self, clock: Any, service_event_qos_profile: Any, introspection_state: Any
+    ) -> None:
+        """Refuse all but ``OFF``: calls of services are in the trace."""
+        _refuse_introspection(introspection_state)
 
     def service_is_ready(self) -> bool:
         """Return whether the service is available."""
@@ -304,6 +323,8 @@ class Client:
         if not isinstance(request, self.srv_type.Request):
             raise TypeError(f"Expected {self.srv_type.Request}, got {type(request)}")
         future = Future(executor=executor)
+        self._pending.append(future)
+        future.on_done(lambda: self._pending.remove(future) if future in self._pending else None)
         sent = request.copy()
         context = self._node.context
 
@@ -345,29 +366,43 @@ class Client:
         self._destroyed = True
 
 
+def _refuse_introspection(state: Any) -> None:
+    if int(state):
+        raise UsageError(
+            "service introspection is not there on the embedded graph: calls are in the trace (`volery "
+            "timeline`); configure ServiceIntrospectionState.OFF"
+        )
+
+
 class Timer:
-    """Timer returned by ``node.create_timer``."""
+    """Timer returned by ``node.create_timer``. One of 0 s calls each ``SHORTEST_PERIOD``."""
 
     def __init__(
         self,
         node: EntityNode,
         period: Ns,
-        callback: Callable[..., Any],
+        callback: Callable[..., Any] | None,
         queue: CallbackQueue,
+        clock: Clock,
         *,
         autostart: bool = True,
     ) -> None:
         self.callback = callback
         self.callback_group: CallbackGroup = queue.group
         self.timer_period_ns = period
+        self.clock = clock
         self._node, self._queue = node, queue
         self._made: Any = None
         self._started: Ns = 0
+        self._called: Ns | None = None
+        queue.add(self)
         if autostart:
             self.reset()
 
     def _fire(self) -> None:
-        self._node.execute(self.callback)
+        self._called = self._node.context.kernel.now()
+        if self.callback is not None:
+            self._node.execute(self.callback)
 
     def cancel(self) -> None:
         """Stop the timer until it is reset."""
@@ -379,26 +414,71 @@ class Timer:
         """Return whether the timer is cancelled."""
         return self._made is None
 
+    def is_ready(self) -> bool:
+        """Return whether the timer's callback waits for the executor."""
+        left = self.time_until_next_call()
+        return left is not None and left <= 0
+
     def reset(self) -> None:
         """Restart the timer; the next call is one period from now."""
         self.cancel()
         self._started = self._node.context.kernel.now()
-        self._made = self._node.graph_node.timer(self.timer_period_ns, self._fire, self._queue.ready)
+        period = max(self.timer_period_ns, SHORTEST_PERIOD)
+        self._made = self._node.graph_node.timer(period, self._fire, self._queue.ready)
 
     def time_until_next_call(self) -> Ns | None:
         """Return the time until the next call in ns, or None if the timer is cancelled."""
         if self._made is None:
             return None
         since = self._node.context.kernel.now() - self._started
-        return self.timer_period_ns - since % self.timer_period_ns
+        period = max(self.timer_period_ns, SHORTEST_PERIOD)
+        return period - since % period
+
+    def time_since_last_call(self) -> Ns:
+        """Return the time since the last call, or since the start, in ns."""
+        last = self._started if self._called is None else self._called
+        return self._node.context.kernel.now() - last
 
     def destroy(self) -> None:
         """Stop the timer."""
         self.cancel()
 
 
+SHORTEST_PERIOD: Ns = MS
+"""Period of a timer of 0 s, which rclpy calls as often as its executor comes round."""
+
+
+class GuardCondition:
+    """Guard condition of ``node.create_guard_condition``: a callback that ``trigger`` makes ready."""
+
+    def __init__(self, node: EntityNode, callback: Callable[[], Any], queue: CallbackQueue) -> None:
+        self.callback = callback
+        self.callback_group: CallbackGroup = queue.group
+        self._node, self._queue = node, queue
+        self._destroyed = self._ready = False
+        queue.add(self)
+
+    def trigger(self) -> None:
+        """Let the executor call back, once for all triggers before it does."""
+        if self._destroyed:
+            raise InvalidHandle("cannot use Destroyable because destruction was requested")
+        if not self._ready:
+            self._ready = True
+            with self._node.context.kernel as kernel:
+                self._queue.ready.add(Work(kernel.now(), self._run))
+
+    def _run(self) -> None:
+        self._ready = False
+        if not self._destroyed and self.callback is not None:
+            self._node.execute(self.callback)
+
+    def destroy(self) -> None:
+        """Refuse further triggers."""
+        self._destroyed = True
+
+
 def timer_period(seconds: float) -> Ns:
-    """Return the period of a timer in ns; raise ``ValueError`` if it is not above 0 s."""
-    if seconds <= 0:
-        raise ValueError("timer period must be above 0 s")
-    return round(seconds * S)
+    """Return the period of a timer in ns; raise ``RCLError`` if it is negative."""
+    if seconds < 0:
+        raise RCLError("failed to create timer: timer period must be non-negative")
+    return int(float(seconds) * S)

@@ -193,9 +193,11 @@ class LifecycleNode(Node, ManagedEntity):
         ):
             self.create_service(service_class(f"lifecycle_msgs/srv/{kind}"), f"~/{name}", answer)
 
-    def create_lifecycle_publisher(self, msg_type: Any, topic: str, qos: Any, **options: Any) -> Any:
+    def create_lifecycle_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **options: Any) -> Any:
         """Create a publisher that publishes only while the node is active."""
-        made = self._keep(LifecyclePublisher(self, msg_type, topic, qos))
+        made = self.create_publisher(
+            msg_type, topic, qos_profile, publisher_class=LifecyclePublisher, **options
+        )
         self._managed.append(made)
         return made
 
@@ -343,6 +345,8 @@ def _fill_transition(message: Any, by: _Transition) -> Any:
 LIFECYCLE: dict[str, Any] = {
     "LifecyclePublisher": LifecyclePublisher,
     "LifecycleState": LifecycleState,
+    "Publisher": LifecyclePublisher,
+    "State": LifecycleState,
     "ManagedEntity": ManagedEntity,
     "SimpleManagedEntity": SimpleManagedEntity,
     "TransitionCallbackReturn": TransitionCallbackReturn,

@@ -2,36 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from enum import IntEnum
 from functools import partial
 from types import ModuleType
 from typing import Any
 
+from volery.base.time import S
+from volery.kernel.waiting import Signal
 from volery.ros import messages
 from volery.ros.client_libraries.library_base import AtEnd, Launch, ignore_end, library_module
 from volery.ros.client_libraries.rclpy import (
     action,
+    endpoint_info,
     entities,
+    events,
     executors,
     lifecycle,
+    names,
     node_parameters,
+    parameter_client,
+    qos_overrides,
     ros_time,
 )
 from volery.ros.client_libraries.rclpy.context import (
     EXCEPTIONS,
+    ConditionReachedException,
     Context,
     Contexts,
     ExternalShutdownException,
     Logger,
     LoggingSeverity,
     NotInitializedException,
+    NoTypeSupportImportedException,
     ShutdownException,
     TimeoutException,
     logging_functions,
 )
-from volery.ros.client_libraries.rclpy.entities import QOS
 from volery.ros.client_libraries.rclpy.executors import Executor, Future
 from volery.ros.client_libraries.rclpy.node import Node
+from volery.ros.client_libraries.rclpy.qos import QOS, graph_qos
 from volery.ros.graph import Node as GraphNode
 from volery.ros.graph import RosGraph
 
@@ -48,16 +59,30 @@ def modules(
     """
     contexts = Contexts(graph, launched, nodes, at_end)
     bound = _bound_classes(contexts)
-    parts = _submodules(bound)
-    names: dict[str, Any] = {**_functions(contexts, bound), "Parameter": node_parameters.Parameter}
-    found = {f"rclpy.{part}": library_module(f"rclpy.{part}", inside) for part, inside in parts.items()}
-    rclpy = library_module("rclpy", {**names, **{part: found[f"rclpy.{part}"] for part in parts}})
-    return {**messages.modules(), "rclpy": rclpy, **found}
+    functions = _functions(contexts, bound)
+    parts = {"impl": {}, **_submodules(bound, functions)}
+    top: dict[str, Any] = {
+        **functions,
+        "Context": Context,
+        "Future": executors.Future,
+        "Parameter": node_parameters.Parameter,
+        "SignalHandlerOptions": SignalHandlerOptions,
+        "get_rmw_implementation_identifier": get_rmw_implementation_identifier,
+        "install_signal_handlers": install_signal_handlers,
+        "uninstall_signal_handlers": uninstall_signal_handlers,
+    }
+    found = {"rclpy": library_module("rclpy", top, REFUSED)}
+    for part, inside in sorted(parts.items()):  # a package before what is in it
+        above, _, last = f"rclpy.{part}".rpartition(".")
+        made = found[f"rclpy.{part}"] = library_module(f"rclpy.{part}", inside, REFUSED)
+        setattr(found[above], last, made)
+    return {**messages.modules(), **found}
 
 
 def _bound_classes(contexts: Contexts) -> dict[str, Any]:
     """Return the classes that refer to the contexts of their run."""
     kinds: tuple[type, ...] = (
+        executors.Executor,
         executors.MultiThreadedExecutor,
         executors.SingleThreadedExecutor,
         Logger,
@@ -75,47 +100,107 @@ def _bound_classes(contexts: Contexts) -> dict[str, Any]:
     return {**bound, **nodes}
 
 
-def _submodules(bound: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+def _submodules(
+    bound: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]
+) -> dict[str, dict[str, Any]]:
     """Return the content of each submodule."""
     duration = {"Duration": ros_time.Duration, "Infinite": ros_time.Infinite}
+    node = {"Node": bound["Node"]}
+    publisher, subscription = {"Publisher": entities.Publisher}, {"Subscription": entities.Subscription}
+    logging = {"LoggingSeverity": LoggingSeverity, **logging_functions(bound["Logger"])}
+    groups = {
+        kind.__name__: kind
+        for kind in (
+            executors.CallbackGroup,
+            executors.MutuallyExclusiveCallbackGroup,
+            executors.ReentrantCallbackGroup,
+        )
+    }
+    parameter = {"Parameter": node_parameters.Parameter, **parameter_client.PARAMETER_TEXTS}
+    clock_type = {"ClockType": ros_time.ClockType}
+    managed = {
+        **lifecycle.LIFECYCLE,
+        "LifecycleNode": bound["LifecycleNode"],
+        "Node": bound["LifecycleNode"],
+    }
     return {
         "action": action.ACTION,
-        "callback_groups": {
-            kind.__name__: kind
-            for kind in (
-                executors.CallbackGroup,
-                executors.MutuallyExclusiveCallbackGroup,
-                executors.ReentrantCallbackGroup,
-            )
-        },
+        "action.client": action.CLIENT,
+        "action.graph": action.GRAPH,
+        "action.server": action.SERVER,
+        "callback_groups": groups,
         "client": {"Client": entities.Client},
-        "clock": {"ClockType": ros_time.ClockType, "Clock": bound["Clock"], "ROSClock": bound["ROSClock"]},
+        "clock": {**clock_type, **duration, "Clock": bound["Clock"], "ROSClock": bound["ROSClock"]},
+        "clock_type": clock_type,
+        "constants": {"S_TO_NS": S},
         "context": {"Context": Context},
         "duration": duration,
-        "exceptions": EXCEPTIONS,
+        "event_handler": events.EVENTS,
+        "exceptions": {**EXCEPTIONS, **names.NAME_EXCEPTIONS},
         "executors": {
-            "Executor": Executor,
+            "ConditionReachedException": ConditionReachedException,
+            "Executor": bound["Executor"],
             "ExternalShutdownException": ExternalShutdownException,
             "MultiThreadedExecutor": bound["MultiThreadedExecutor"],
             "ShutdownException": ShutdownException,
             "SingleThreadedExecutor": bound["SingleThreadedExecutor"],
             "TimeoutException": TimeoutException,
+            "await_or_execute": executors.await_or_execute,
         },
-        "lifecycle": {
-            **lifecycle.LIFECYCLE,
-            "LifecycleNode": bound["LifecycleNode"],
-            "Node": bound["LifecycleNode"],
-        },
-        "logging": {"LoggingSeverity": LoggingSeverity, **logging_functions(bound["Logger"])},
-        "node": {"Node": bound["Node"]},
-        "parameter": {"Parameter": node_parameters.Parameter},
-        "publisher": {"Publisher": entities.Publisher},
+        "guard_condition": {"GuardCondition": entities.GuardCondition},
+        "impl.logging_severity": {"LoggingSeverity": LoggingSeverity},
+        "impl.rcutils_logger": {"RcutilsLogger": bound["Logger"]},
+        "lifecycle": managed,
+        "lifecycle.managed_entity": lifecycle.LIFECYCLE,
+        "lifecycle.node": managed,
+        "lifecycle.publisher": {"LifecyclePublisher": lifecycle.LifecyclePublisher},
+        "logging": logging,
+        "node": {**node, **parameter, **groups},
+        "parameter": parameter,
+        "parameter_client": parameter_client.PARAMETER_CLIENT,
+        "parameter_event_handler": parameter_client.PARAMETER_EVENTS,
+        "publisher": publisher,
         "qos": {**QOS, **duration},
+        "qos_event": events.EVENTS,
+        "qos_overriding_options": qos_overrides.OVERRIDES,
+        "serialization": {one.__name__: one for one in (serialize_message, deserialize_message)},
         "service": {"Service": entities.Service},
-        "subscription": {"Subscription": entities.Subscription},
+        "service_introspection": {"ServiceIntrospectionState": ServiceIntrospectionState},
+        "signals": {
+            "SignalHandlerOptions": SignalHandlerOptions,
+            **{
+                one.__name__: one
+                for one in (
+                    install_signal_handlers,
+                    uninstall_signal_handlers,
+                    get_current_signal_handlers_options,
+                )
+            },
+        },
+        "subscription": subscription,
         "task": {"Future": executors.Future, "Task": executors.Task},
-        "time": {"Time": ros_time.Time, "Duration": ros_time.Duration, "ClockType": ros_time.ClockType},
+        "time": {"Time": ros_time.Time, **duration, **clock_type},
         "timer": {"Rate": ros_time.Rate, "Timer": entities.Timer},
+        "topic_endpoint_info": endpoint_info.ENDPOINT_INFO,
+        "type_hash": {"TypeHash": endpoint_info.TypeHash},
+        "type_support": {
+            one.__name__: one
+            for one in (check_for_type_support, check_is_valid_msg_type, check_is_valid_srv_type)
+        },
+        "utilities": {
+            **{name: functions[name] for name in ("get_default_context", "ok", "shutdown", "try_shutdown")},
+            **{
+                one.__name__: one
+                for one in (
+                    get_available_rmw_implementations,
+                    get_rmw_implementation_identifier,
+                    remove_ros_args,
+                    timeout_sec_to_nsec,
+                )
+            },
+        },
+        "wait_for_message": {"wait_for_message": wait_for_message},
+        **names.NAMES,
     }
 
 
@@ -164,6 +249,135 @@ def get_default_context(contexts: Contexts) -> Context:
     """Return the context of this component."""
     return contexts.current()
 
+
+# -- helpers
+
+REFUSED = {
+    "rclpy.experimental": "use an executor of rclpy.executors",
+    "rclpy.impl.implementation_singleton": "use the classes of rclpy; there is no library in C behind them",
+    "rclpy.logging_service": "give the node enable_logger_service=True",
+    "rclpy.parameter_service": "nodes serve their parameters themselves",
+    "rclpy.time_source": "nodes have ROS time, which is the time of the run",
+    "rclpy.type_description_service": "read the definition in the recording of the run",
+    "rclpy.waitable": "there is no wait set of rcl; use a guard condition, a timer or a subscription",
+}
+"""What is refused, and what to do instead."""
+
+
+class SignalHandlerOptions(IntEnum):
+    """Signals that rclpy handles. In a run it handles none: the end of the run shuts contexts down."""
+
+    NO = 0
+    SIGINT = 1
+    SIGTERM = 2
+    ALL = 3
+
+
+def install_signal_handlers(options: SignalHandlerOptions = SignalHandlerOptions.ALL) -> None:
+    """Do nothing: the end of the run shuts contexts down."""
+
+
+def uninstall_signal_handlers() -> None:
+    """Do nothing: there are no signal handlers."""
+
+
+def get_current_signal_handlers_options() -> SignalHandlerOptions:
+    """Return that no signal is handled."""
+    return SignalHandlerOptions.NO
+
+
+class ServiceIntrospectionState(IntEnum):
+    """What of a service's calls is published."""
+
+    OFF = 0
+    METADATA = 1
+    CONTENTS = 2
+
+
+def serialize_message(message: Any) -> bytes:
+    """Return the bytes of a message in CDR."""
+    return messages.to_cdr(message)
+
+
+def deserialize_message(serialized_message: bytes, message_type: Any) -> Any:
+    """Return the message in bytes of CDR."""
+    return messages.from_cdr(
+        entities.type_name("deserialize_message", message_type), bytes(serialized_message)
+    )
+
+
+def check_is_valid_msg_type(msg_type: Any) -> None:
+    """Raise ``RuntimeError`` unless *msg_type* is a message class."""
+    if not getattr(msg_type, "__msgtype__", ""):
+        raise RuntimeError(f"The message type provided is not valid ({msg_type})")
+
+
+def check_is_valid_srv_type(srv_type: Any) -> None:
+    """Raise ``RuntimeError`` unless *srv_type* is a service class."""
+    if not hasattr(srv_type, "Request"):
+        raise RuntimeError(f"The service type provided is not valid ({srv_type})")
+
+
+def check_for_type_support(msg_or_srv_type: Any) -> None:
+    """Raise an exception unless the argument is a class of messages, services or actions."""
+    if not any(hasattr(msg_or_srv_type, name) for name in ("__msgtype__", "Request", "Goal")):
+        raise NoTypeSupportImportedException(f"{msg_or_srv_type!r} is no class of messages or services")
+
+
+def get_rmw_implementation_identifier() -> str:
+    """Return the name of what carries messages."""
+    return "volery"
+
+
+def get_available_rmw_implementations() -> set[str]:
+    """Return the names of what can carry messages."""
+    return {get_rmw_implementation_identifier()}
+
+
+def remove_ros_args(args: Sequence[str] | None = None) -> list[str]:
+    """Return the arguments of a program without those of ROS.
+
+    A section of them is from ``--ros-args`` to ``--`` or the end; old remappings stand alone.
+    """
+    kept, inside = [], False
+    for one in args if args is not None else sys.argv:
+        if inside:
+            inside = one != "--"
+        elif one == "--ros-args":
+            inside = True
+        elif ":=" not in one:
+            kept.append(one)
+    return kept
+
+
+def timeout_sec_to_nsec(timeout_sec: float | None) -> int:
+    """Return a time-out in ns; -1 for None and negative ones."""
+    return -1 if timeout_sec is None or timeout_sec < 0 else int(float(timeout_sec) * S)
+
+
+def wait_for_message(
+    msg_type: Any, node: Node, topic: str, *, qos_profile: Any = 1, time_to_wait: Any = -1
+) -> tuple[bool, Any]:
+    """Block until a message of a topic has arrived; return (False, None) after *time_to_wait* s."""
+    received: list[Any] = []
+    arrived = Signal(node.context.kernel, f"wait_for_message of {topic}")
+
+    def keep(message: Any) -> None:
+        received.append(message)
+        arrived.notify()
+
+    at_once = node.graph_node.group(lambda work: work.run())
+    name, kind = node.absolute_name(topic), entities.type_name("wait_for_message", msg_type)
+    subscription = node.graph_node.subscribe(name, kind, keep, graph_qos(qos_profile), at_once)
+    try:
+        longest = timeout_sec_to_nsec(time_to_wait)
+        arrived.wait_for(lambda: received, None if longest < 0 else longest, ends_activation=True)
+    finally:
+        subscription.close()
+    return (True, received[0]) if received else (False, None)
+
+
+# -- spinning
 
 GlobalExecutor = Callable[[], Executor]
 """Returns the executor of ``rclpy.spin``, which is created by the first call."""

@@ -18,6 +18,7 @@ from volery.ros.client_libraries.rclpy.context import (
     ParameterImmutableException,
     ParameterNotDeclaredException,
     ParameterUninitializedException,
+    private_name,
 )
 from volery.ros.graph import Node
 from volery.ros.messages import new
@@ -170,29 +171,41 @@ Validator = Callable[[list[Parameter]], Any]
 """A callback that accepts or refuses new values with a ``SetParametersResult``."""
 
 
+Changed = Callable[[list[Parameter], set[str], list[Parameter]], None]
+"""Called with the parameters that were set, the names of those that are new, and the deleted parameters."""
+
+
 class DeclaredParameters:
     """The declared parameters of one node. Values of a launch file override declared defaults."""
 
-    def __init__(self, node: Node, overrides: Iterable[Parameter], undeclared_allowed: bool) -> None:
+    def __init__(
+        self, node: Node, overrides: Iterable[Parameter], undeclared_allowed: bool, changed: Changed
+    ) -> None:
         self._node = node
+        self._changed = changed
         self._undeclared_allowed = undeclared_allowed
         self._overrides = {one.name: one.value for one in overrides}
         self._parameters: dict[str, Parameter] = {}
         self._descriptors: dict[str, Any] = {}
-        self._validators: list[Validator] = []
+        self.before: list[Callable[[list[Parameter]], list[Parameter]]] = []
+        """Functions that change what is to be set."""
+        self.validators: list[Validator] = []
+        """Functions that accept or refuse it."""
+        self.after: list[Callable[[list[Parameter]], None]] = []
+        """Functions that are told what has been set."""
 
-    def add_validator(self, callback: Validator) -> None:
-        """Call *callback* before values are set; it may refuse them."""
-        self._validators.insert(0, callback)
-
-    def remove_validator(self, callback: Validator) -> None:
-        """Remove a callback; raise ``ValueError`` if it was not added."""
-        self._validators.remove(callback)
+    def declare_builtin(self, name: str, value: Any) -> None:
+        """Declare a parameter that every node has."""
+        if self._override(name, self._private(name), None) is not None:
+            self.declare(name, value)
+            return
+        self._descriptors[name] = new(_DESCRIPTOR, name=name, type=int(Parameter(name, value=value).type_))
+        self._parameters[name] = Parameter(name, value=value)
 
     def _private(self, name: str) -> str:
         if not name or not all(name.split(".")):
             raise InvalidParameterException(name)
-        return f"~{name.replace('.', '/')}"
+        return private_name(name)
 
     def declare(
         self, name: str, value: Any = None, descriptor: Any = None, ignore: bool = False
@@ -220,12 +233,14 @@ class DeclaredParameters:
         if refusal:
             raise InvalidParameterValueException(name, given, refusal)
         self._keep(parameter)
+        self._changed([parameter], {name}, [])
         return parameter
 
     def _override(self, name: str, private: str, default: Any) -> Any:
         if name in self._overrides:
             return self._overrides[name]
-        return self._node.get_parameter(private) if self._node.has_parameter(private) else default
+        found = self._node.get_parameter(private) if self._node.has_parameter(private) else default
+        return default if isinstance(found, dict) else found  # others are below this name
 
     def _keep(self, parameter: Parameter) -> None:
         self._parameters[parameter.name] = parameter
@@ -257,18 +272,38 @@ class DeclaredParameters:
             raise ParameterNotDeclaredException(name)
         return self._descriptors[name]
 
+    def describe(self, name: str, descriptor: Any, alternative: Any) -> Any:
+        """Replace a descriptor; see ``Node.set_descriptor``."""
+        if self.descriptor(name).read_only:
+            raise ParameterImmutableException(name)
+        current = self.get(name)
+        descriptor.name, descriptor.type = name, int(current.type_)
+        self._descriptors[name] = descriptor
+        if constraint_violation(current, descriptor, declared=False) and alternative is not None:
+            current = Parameter.from_parameter_msg(
+                new("rcl_interfaces/msg/Parameter", name=name, value=alternative)
+            )
+            self._keep(current)
+        return current.get_parameter_value()
+
     def undeclare(self, name: str) -> None:
         """Remove a parameter."""
         if name not in self._parameters:
             raise ParameterNotDeclaredException(name)
         if self._descriptors[name].read_only:
             raise ParameterImmutableException(name)
-        del self._parameters[name], self._descriptors[name]
+        gone = self._parameters.pop(name)
+        del self._descriptors[name]
         if self._node.has_parameter(self._private(name)):
             self._node.delete_parameter(self._private(name))
+        self._changed([], set(), [gone])
 
     def set(self, parameters: Sequence[Parameter]) -> Any:
         """Set all parameters or none; return a ``SetParametersResult``."""
+        for prepare in self.before:
+            parameters = prepare(list(parameters))
+            if not parameters:
+                return new(_RESULT, successful=False, reason="parameter list was modified to be empty")
         unknown = [one.name for one in parameters if one.name not in self._parameters]
         if unknown and not self._undeclared_allowed:
             raise ParameterNotDeclaredException(unknown)
@@ -279,6 +314,9 @@ class DeclaredParameters:
             kind = int(parameter.type_)
             self._descriptors.setdefault(parameter.name, new(_DESCRIPTOR, name=parameter.name, type=kind))
             self._keep(parameter)
+        self._changed(list(parameters), set(unknown), [])
+        for tell in self.after:
+            tell(list(parameters))
         return new(_RESULT, successful=True)
 
     def _refusal(self, parameters: list[Parameter]) -> str:
@@ -288,7 +326,7 @@ class DeclaredParameters:
                 violation = constraint_violation(one, self._descriptors[one.name], declared=declared)
                 if violation:
                     return violation
-        for validator in self._validators:
+        for validator in self.validators:
             result = validator(parameters)
             if not result.successful:
                 return result.reason or "a callback refused it"
@@ -363,14 +401,35 @@ class NodeParameters:
         """Return the descriptors of parameters."""
         return [self._declared.descriptor(name) for name in names]
 
-    def add_on_set_parameters_callback(self, callback: Validator) -> Validator:
+    def add_on_set_parameters_callback(self, callback: Validator) -> None:
         """Call *callback* before values are set; it may refuse them."""
-        self._declared.add_validator(callback)
-        return callback
+        self._declared.validators.insert(0, callback)
 
     def remove_on_set_parameters_callback(self, callback: Validator) -> None:
-        """Remove a callback that was added."""
-        self._declared.remove_validator(callback)
+        """Remove a callback; raise ``ValueError`` if it was not added."""
+        self._declared.validators.remove(callback)
+
+    def add_pre_set_parameters_callback(self, callback: Callable[[list[Parameter]], list[Parameter]]) -> None:
+        """Let *callback* change what is to be set, before it is checked."""
+        self._declared.before.insert(0, callback)
+
+    def remove_pre_set_parameters_callback(
+        self, callback: Callable[[list[Parameter]], list[Parameter]]
+    ) -> None:
+        """Remove a callback; raise ``ValueError`` if it was not added."""
+        self._declared.before.remove(callback)
+
+    def add_post_set_parameters_callback(self, callback: Callable[[list[Parameter]], None]) -> None:
+        """Call *callback* after values were set."""
+        self._declared.after.insert(0, callback)
+
+    def remove_post_set_parameters_callback(self, callback: Callable[[list[Parameter]], None]) -> None:
+        """Remove a callback; raise ``ValueError`` if it was not added."""
+        self._declared.after.remove(callback)
+
+    def set_descriptor(self, name: str, descriptor: Any, alternative_value: Any = None) -> Any:
+        """Describe a parameter anew; return its value as a message."""
+        return self._declared.describe(name, descriptor, alternative_value)
 
     def get_parameter_type(self, name: str) -> Parameter.Type:
         """Return the type of the current value of a parameter."""

@@ -17,8 +17,8 @@ from volery.base.frames import Quaternion, multiply
 from volery.base.time import Ns, S, from_seconds, to_seconds
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal, current_task
-from volery.ros.client_libraries.rclpy.entities import DurabilityPolicy, QoSProfile
 from volery.ros.client_libraries.rclpy.executors import ReentrantCallbackGroup
+from volery.ros.client_libraries.rclpy.qos import DurabilityPolicy, QoSProfile
 from volery.ros.client_libraries.tf2.transform_tree import (
     RigidTransform,
     TransformException,
