@@ -192,7 +192,7 @@ class DeclaredParameters:
         self.validators: list[Validator] = []
         """Functions that accept or refuse it."""
         self.after: list[Callable[[list[Parameter]], None]] = []
-        """Functions that are told what has been set."""
+        """Functions that get what has been set."""
 
     def declare_builtin(self, name: str, value: Any) -> None:
         """Declare a parameter that every node has."""
