@@ -19,7 +19,7 @@ from typing import Self
 from volery.base.errors import ComponentError, LinkSilent, Location, ModelError
 from volery.base.time import MS, Ns, S
 from volery.calibration.ros.probe_environment import roscpp_program
-from volery.components.cpp.compiler import find_sources
+from volery.components.cpp.sources import find_sources
 from volery.components.programs import script_or_class
 from volery.model.instances import Instance
 from volery.model.system import System

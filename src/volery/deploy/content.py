@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from volery.base.errors import UsageError
-from volery.components.cpp.compiler import find_sources
+from volery.components.cpp.sources import find_sources
 from volery.components.loader import imported_files
 from volery.model.instances import Instance
 from volery.model.system import Processor, System

@@ -56,6 +56,9 @@ SPECIAL_INTERFACES = (*VEHICLE_INTERFACES, ENVIRONMENT_INTERFACE)
 LANGUAGES = ("python", "rospy", "rclpy", "c++", "roscpp", "rclcpp")
 """Languages that a model may name. The ``Vocabulary`` states which of them run."""
 
+RUNNING_LANGUAGES = ("python", "rospy", "rclpy", "c++", "roscpp")
+"""Languages whose components can run."""
+
 CPP_LANGUAGES = ("c++", "roscpp", "rclcpp")
 """Languages that are compiled."""
 

@@ -21,7 +21,7 @@ from volery.model.assembly import (
     model_file,
 )
 from volery.model.builder import ModelBuilder
-from volery.model.components import Figure
+from volery.model.components import RUNNING_LANGUAGES, Figure
 from volery.model.document import DOCUMENT, Document
 from volery.model.environment import Environment, Vehicle
 from volery.model.fields import TEXT, ListOf, read_child
@@ -35,12 +35,12 @@ FIDELITIES = ("times", "code", "firmware", "hardware")
 
 
 def check_code(system: System) -> None:
-    """Check that the files of all components are there, as a run needs them.
+    """Check that the files of all components are there, in languages that run.
 
     Raises:
-        ModelError: A file is missing; all of them at once (``CollectedModelError``).
+        ModelError: A file is missing or does not run; all of them at once (``CollectedModelError``).
     """
-    found = list(_unwritten(system))
+    found = [*_unwritten(system), *_foreign(system, RUNNING_LANGUAGES)]
     if len(found) == 1:
         raise found[0]
     if found:
@@ -59,6 +59,14 @@ def _unwritten(system: System) -> Iterator[ModelError]:
             yield ModelError(what, at, stated.get(at, component.where), rules.UNWRITTEN_CODE.code)
 
 
+def _foreign(system: System, languages: Iterable[str]) -> Iterator[ModelError]:
+    for component in {one.component.name: one.component for one in system.instances}.values():
+        if component.path and component.language not in languages:
+            what = f"{component.language} components do not run yet; {choices(languages)} do"
+            code = rules.LANGUAGE_UNSUPPORTED.code
+            yield ModelError(what, f"components.{component.name}.language", component.where, code)
+
+
 def gaps(system: System, fidelity: str, vocabulary: Vocabulary) -> Iterator[ModelError]:
     """Yield what is missing, component by component, in the order of the model."""
     yield from _unwritten(system)
@@ -67,10 +75,7 @@ def gaps(system: System, fidelity: str, vocabulary: Vocabulary) -> Iterator[Mode
         if fidelity == "code" and not component.path:
             what = "it has no code: fidelity `code` needs a `path`; `times` runs without"
             yield ModelError(what, f"components.{component.name}", component.where, rules.NO_CODE.code)
-        if component.path and component.language not in vocabulary.languages:
-            what = f"{component.language} components do not run yet; {choices(vocabulary.languages)} do"
-            code = rules.LANGUAGE_UNSUPPORTED.code
-            yield ModelError(what, f"components.{component.name}.language", component.where, code)
+    yield from _foreign(system, vocabulary.languages)
     if fidelity == "times":
         for instance in system.instances:
             yield from _missing_figures(system, instance)

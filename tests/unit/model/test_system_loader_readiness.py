@@ -46,6 +46,9 @@ def test_a_file_that_is_not_written_yet_keeps_a_model_from_running_only(workshop
 def test_languages_that_do_not_run_yet_are_named(workshop):
     workshop.change("language: rospy", "language: roscpp")
     assert any("roscpp components do not run yet; python or rospy do" in one for one in missing(workshop))
+    workshop.change("language: roscpp", "language: rclcpp")
+    with pytest.raises(ModelError, match=r"rclcpp components do not run yet"):
+        check_code(workshop.load())
 
 
 def test_components_without_instances_do_not_matter(workshop):

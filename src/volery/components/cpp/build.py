@@ -9,15 +9,17 @@ of the model, and calls its operations. Values of the model's types (``bool``, `
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from volery.base.errors import Location, ModelError, choices
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
-from volery.components.cpp.compiler import CppToolchain, ReportProgress, Sources, cache_folder, find_sources
+from volery.components.cpp.compiler import CppToolchain, ReportProgress, cache_folder
+from volery.components.cpp.sources import Sources, find_sources
 from volery.model.components import Interface, Signature
 from volery.ros import client_libraries
 from volery.ros.client_libraries.abi_codec import Reader, Writer
@@ -230,8 +232,11 @@ CompileSources = Callable[[CppToolchain, Sequence[Path], Sequence[Path], Sequenc
 Fidelity ``code`` replaces the plain compiler by one that inserts counters.
 """
 
-GenerateHeaders = Callable[[Sequence[str], Path], Mapping[str, str]]
-"""Returns header texts by file name for the given ``#include`` names of the files in a folder."""
+GenerateHeaders = Callable[[Sequence[str], Path, Collection[str]], Mapping[str, str]]
+"""Returns header texts by file name for the given ``#include`` names of the files in a folder.
+
+The last argument has the names that are files of the workspace.
+"""
 
 
 def compile_each(
@@ -270,7 +275,7 @@ class ClientLibrary:
 
     include: tuple[Path, ...] = ()
     fallback: tuple[Path, ...] = ()
-    generate: GenerateHeaders = lambda includes, folder: {}
+    generate: GenerateHeaders = lambda includes, folder, found: {}
 
 
 @dataclass(frozen=True)
@@ -294,11 +299,11 @@ def compile_component(
         ModelError: The sources do not compile; the message is the compiler's.
         UsageError: There is no compiler.
     """
-    sources = find_sources(component.path, component.where)
+    sources = find_sources(component.path, component.where, _include_flags(component.flags))
     tools = CppToolchain(component.name, report_progress)
     framework = build_framework()
     headers = _generated_headers(component, client_library, sources)
-    include = (sources.folder, headers, *client_library.include, *INCLUDE)
+    include = (sources.folder, headers, *client_library.include, *INCLUDE, *sources.folders)
     fallback = (option for path in client_library.fallback for option in ("-idirafter", str(path)))
     files = _translation_units(component, sources)
     try:
@@ -309,6 +314,13 @@ def compile_component(
     objects = [*units, *(_runtime_object(name) for name in ours)]
     options = [str(framework), *(f"-l{library}" for library in component.libraries)]
     return CompiledComponent(component, tools.library(objects, options), framework)
+
+
+def _include_flags(flags: Sequence[str]) -> tuple[Path, ...]:
+    """Return the folders of the options ``-Ifolder`` and ``-I folder``."""
+    separate = [after for option, after in pairwise(flags) if option == "-I"]
+    joined = [option[2:] for option in flags if option.startswith("-I") and option != "-I"]
+    return tuple(Path(one) for one in (*joined, *separate))
 
 
 _NO_MEMBER = re.compile(r"has no member named '(\w+)'|no member named '(\w+)' in")
@@ -352,7 +364,7 @@ def _generated_headers(component: CppComponent, client_library: ClientLibrary, s
         if one.name in required or provided & one.operations.keys()
     ]
     texts = {HEADER: interfaces_header(used)}
-    texts.update(client_library.generate(sources.includes(), component.path))
+    texts.update(client_library.generate(sources.included, component.path, sources.found))
     return _write_generated(texts)
 
 

@@ -1,4 +1,4 @@
-"""Sources of a C++ component, and the compiler with its cache of objects and libraries.
+"""The C++ compiler, with its cache of objects and libraries.
 
 Cached files are in ``$XDG_CACHE_HOME/volery/cpp`` or ``~/.cache/volery/cpp``, named by the content of all
 that went into them. An object is reused if its compiler, its options, its source and every header that it
@@ -21,12 +21,6 @@ from pathlib import Path
 from volery.base.dependency_record import content_digest, is_current, rule_dependencies, write_record
 from volery.base.errors import Location, ModelError, UsageError
 
-_SOURCE_SUFFIXES = (".cpp", ".cc", ".cxx", ".c++")
-_HEADER_SUFFIXES = (".h", ".hpp", ".hh", ".hxx")
-_INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^>"\n]+)[>"]', re.MULTILINE)
-_COMMENT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
-_MAIN = re.compile(r"^\s*(?:extern\s+\"C\"\s+)?(?:auto|int)\s+main\s*\(", re.MULTILINE)
-
 COMPILERS = ("g++", "clang++", "c++")
 FLAGS = ("-std=c++17", "-O2", "-g", "-fPIC", "-Wall", "-fdiagnostics-color=never")
 COMPILER_HINT = "apt install g++ (or clang)"
@@ -40,75 +34,6 @@ _LINK_ERROR = re.compile(
 
 ReportProgress = Callable[[str], None]
 """Receives a line about a step that takes time."""
-
-
-@dataclass(frozen=True)
-class Sources:
-    """Files of a component: ``compiled`` are translation units, ``own`` those and the headers beside them."""
-
-    folder: Path
-    compiled: tuple[Path, ...]
-    own: tuple[Path, ...]
-
-    def includes(self) -> list[str]:
-        """Return the names that the files include, each once, in order."""
-        found = (name for file in self.own for name in _INCLUDE.findall(_text(file)))
-        return list(dict.fromkeys(found))
-
-    def defines_main(self) -> bool:
-        """Return whether the component is a program with a ``main``."""
-        return any(_MAIN.search(_code(file)) for file in self.compiled)
-
-    def file_of_class(self, name: str) -> Path | None:
-        """Return the file that defines a class, headers first, or None."""
-        definition = _definition(name)
-        in_order = sorted(self.own, key=lambda file: file.suffix not in _HEADER_SUFFIXES)
-        return next((file for file in in_order if definition.search(_code(file))), None)
-
-    def mentions(self, function: str) -> bool:
-        """Return whether a file declares, defines or calls a function of this name."""
-        return any(re.search(rf"\b{re.escape(function)}\s*\(", _code(file)) for file in self.own)
-
-    def place_of_class(self, name: str) -> Location | None:
-        """Return file and line of the definition of a class, or None."""
-        file = self.file_of_class(name)
-        found = _definition(name).search(_text(file)) if file is not None else None
-        return Location(str(file), _text(file).count("\n", 0, found.start()) + 1) if file and found else None
-
-
-def _definition(name: str) -> re.Pattern[str]:
-    return re.compile(rf"\b(?:class|struct)\s+{re.escape(name)}\b(?:\s+final)?\s*(?::[^:;{{][^;{{]*)?\{{")
-
-
-def find_sources(path: Path, where: Location | None = None) -> Sources:
-    """Find the sources of the component at ``path``, a file or a folder.
-
-    All sources in a folder and its subfolders are compiled. Of a file only that file is compiled; headers
-    beside it and in subfolders belong to it.
-
-    Raises:
-        ModelError: There is nothing to compile; the error names ``where``.
-    """
-    folder = path if path.is_dir() else path.parent
-    if not path.exists():
-        raise ModelError(f"no file or folder {path}", where=where)
-    around = [file for file in sorted(folder.rglob("*")) if file.is_file()]
-    compiled = [file for file in around if file.suffix in _SOURCE_SUFFIXES] if path.is_dir() else [path]
-    if not compiled:
-        suffixes = ", ".join(_SOURCE_SUFFIXES)
-        raise ModelError(f"no source file in {path}: one that ends in {suffixes}", where=where)
-    headers = [file for file in around if file.suffix in _HEADER_SUFFIXES]
-    own = tuple(file.resolve() for file in (*compiled, *headers))
-    return Sources(folder.resolve(), own[: len(compiled)], own)
-
-
-def _text(file: Path) -> str:
-    return file.read_text(encoding="utf-8", errors="replace")
-
-
-def _code(file: Path) -> str:
-    """Return a file's text without comments and strings."""
-    return _COMMENT.sub(" ", _text(file))
 
 
 @dataclass(frozen=True)

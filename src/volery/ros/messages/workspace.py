@@ -43,6 +43,11 @@ class Package(NamedTuple):
         )
         return [found for pattern in below for found in sorted(self.prefix.glob(pattern))]
 
+    @property
+    def include(self) -> Path:
+        """Folder in which its C++ headers are searched; it need not exist."""
+        return (self.prefix or self.folder) / "include"
+
 
 def entries(variable: str) -> list[Path]:
     """Return the folders that an environment variable lists."""
@@ -89,6 +94,14 @@ class Workspace:
             for root in package.python_roots():
                 if module_file(root, module) is not None:
                     return root
+        return None
+
+    def package_with(self, header: str, file: Path) -> Package | None:
+        """Return the package whose C++ header ``package/name.h`` *file* includes, or None."""
+        named = self.find(header.partition("/")[0], file)
+        for package in (named, *self._own(file).values(), *self._sourced.values()):
+            if package is not None and (package.include / header).is_file():
+                return package
         return None
 
     def _own(self, file: Path) -> dict[str, Package]:

@@ -34,11 +34,11 @@ from volery.components.cpp.compiler import (
     CppToolchain,
     ReportProgress,
     cache_folder,
-    find_sources,
     has_compiler,
 )
 from volery.components.cpp.cpp_program import CppProgram
 from volery.components.cpp.framework import Counters, LoadedLibrary, StepMeter, ToSteps
+from volery.components.cpp.sources import find_sources
 from volery.cost import CoreLaw, load_catalogue
 from volery.kernel.api import Kernel
 from volery.model.components import CPP_LANGUAGES, ENVIRONMENT_INTERFACE, VEHICLE_INTERFACES, Component
@@ -272,10 +272,16 @@ def describe_component(system: System, component: Component) -> CppComponent:
         ),
         tuple(RequiredPort(port.name, port.interface, port.many) for port in component.requires.values()),
         system.interfaces,
-        component.build.flags,
+        tuple(_from_model(system, flag) for flag in component.build.flags),
         component.build.libraries,
         component.where,
     )
+
+
+def _from_model(system: System, flag: str) -> str:
+    """Return ``-Ifolder`` with a folder that is relative to the model's."""
+    folder = system.folder / flag.removeprefix("-I")
+    return f"-I{folder.resolve()}" if flag.startswith("-I") and flag != "-I" and folder.is_dir() else flag
 
 
 def _class_of(component: Component, system: System) -> str:

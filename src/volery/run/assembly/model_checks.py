@@ -11,12 +11,13 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from volery.base.errors import ModelError, VoleryError
-from volery.components.cpp.compiler import find_sources
+from volery.components.cpp.sources import find_sources
 from volery.components.loader import Loader
 from volery.components.programs import ScriptProgram
 from volery.components.virtual_stdlib import virtual_modules
 from volery.cost import load_catalogue
 from volery.kernel.virtual import VirtualKernel
+from volery.model.components import RUNNING_LANGUAGES
 from volery.model.instances import Instance
 from volery.model.reading import ProcessorKind, Vocabulary
 from volery.model.system import System
@@ -30,14 +31,11 @@ from volery.run.assembly.cpp import compile_all, describe_component, is_cpp
 from volery.run.ending import Ending
 from volery.simulation.autopilots.autopilot import firmwares
 
-LANGUAGES = frozenset({"c++", "python", "rclpy", "roscpp", "rospy"})
-"""Languages of components that can run."""
-
 
 def vocabulary() -> Vocabulary:
     """Return the names that a model is checked against."""
     autopilots = frozenset(firmwares.names())
-    return Vocabulary(_kinds(), LANGUAGES, autopilots, OBSERVABLES, _kinds)
+    return Vocabulary(_kinds(), frozenset(RUNNING_LANGUAGES), autopilots, OBSERVABLES, _kinds)
 
 
 def _kinds(*more: Path) -> dict[str, ProcessorKind]:

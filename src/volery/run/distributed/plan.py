@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, cast
 from volery.base.errors import CapabilityError, choices
 from volery.components.instance import Allocation
 from volery.cost import FREE, Pricing
+from volery.model.components import RUNNING_LANGUAGES
 from volery.model.instances import Instance
 from volery.model.system import Bound, System
 from volery.ros.graph.interface import full_node_name
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 
 NODE = "volery"
 """Node of the run's own process, which publishes the clock and serves the components of the environment."""
-
-LANGUAGES = ("python", "rospy", "rclpy", "c++", "roscpp")
 
 COMPUTING = frozenset(
     (
@@ -59,10 +58,10 @@ def worker_instances(system: System) -> tuple[Instance, ...]:
     found = tuple(one for one in system.instances if not one.is_environment)
     for one in found:
         language = one.component.language
-        if language not in LANGUAGES:
+        if language not in RUNNING_LANGUAGES:
             raise CapabilityError(
                 f"{one.name}: a component in {language} cannot be a process on a real graph yet; "
-                f"there is {choices(LANGUAGES)}"
+                f"there is {choices(RUNNING_LANGUAGES)}"
             )
     return found
 

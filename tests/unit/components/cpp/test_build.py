@@ -12,8 +12,8 @@ from volery.base.errors import ModelError
 from volery.base.position import AboveHome, Position
 from volery.components.cpp import build, compiler
 from volery.components.cpp.build import RequiredPort, cpp_type, glue, interfaces_header, operation, operations
-from volery.components.cpp.compiler import find_sources
 from volery.components.cpp.framework import Crash, StepMeter, read_crash
+from volery.components.cpp.sources import find_sources
 from volery.model.components import Argument, Interface, Signature
 from volery.ros.client_libraries.abi_codec import Reader, Writer
 
@@ -77,7 +77,7 @@ def test_sources_of_a_file_and_of_a_folder(tmp_path):
     (tmp_path / "robot" / "arm.h").write_text("class Hand;\nclass Hand final : public Base<int> {\n};\n")
     one = find_sources(tmp_path / "node.cpp")
     assert [file.name for file in one.compiled] == ["node.cpp"]
-    assert one.includes() == ["ros/ros.h", "robot/arm.h"]
+    assert one.included == ("ros/ros.h", "robot/arm.h")
     assert one.defines_main()
     assert not find_sources(tmp_path / "other.cc").defines_main()
     every = find_sources(tmp_path)
@@ -85,6 +85,34 @@ def test_sources_of_a_file_and_of_a_folder(tmp_path):
     assert every.file_of_class("Hand") == (tmp_path / "robot" / "arm.h").resolve()
     assert every.file_of_class("Arm") == (tmp_path / "other.cc").resolve()
     assert every.file_of_class("Foot") is None
+
+
+def test_what_a_package_builds_with_a_file_belongs_to_it(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "others"))
+    files = {
+        "arm/package.xml": "<package><name>arm</name></package>",
+        "arm/CMakeLists.txt": """
+            project(arm)
+            add_library(${PROJECT_NAME}_core src/core.cpp) # src/unused.cpp
+            add_executable(node src/node.cpp "${PROJECT_SOURCE_DIR}/src/more.cpp")
+            target_link_libraries(node ${PROJECT_NAME}_core ${catkin_LIBRARIES})
+            add_executable(other src/other.cpp)
+        """,
+        "arm/src/node.cpp": '#include "arm/arm.hpp"\n#include <hand/hand.h>\nint main() {}',
+        **{f"arm/src/{name}.cpp": "" for name in ("core", "more", "other", "unused")},
+        "arm/include/arm/arm.hpp": "#include <std_msgs/String.h>",
+        "others/hand/package.xml": "<package><name>hand</name></package>",
+        "others/hand/include/hand/hand.h": '#include "finger.h"',
+        "others/hand/include/hand/finger.h": "#include <mavros_msgs/CommandTOL.h>",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    found = find_sources(tmp_path / "arm/src/node.cpp")
+    assert [file.name for file in found.compiled] == ["node.cpp", "more.cpp", "core.cpp"]
+    assert {"std_msgs/String.h", "mavros_msgs/CommandTOL.h"} <= set(found.included)
+    assert found.found == {"arm/arm.hpp", "hand/hand.h", "finger.h"}
+    assert list(found.folders) == [tmp_path / "arm/include", tmp_path / "others/hand/include"]
 
 
 def test_a_folder_without_sources(tmp_path):

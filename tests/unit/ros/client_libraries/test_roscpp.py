@@ -49,10 +49,20 @@ def test_services_constants_and_arrays():
 
 def test_what_ros_has_and_is_not_offered_says_so():
     texts = roscpp.generate_headers(
-        ["ros/callback_queue.h", "std_msgs/Nothing.h", "ros/ros.h", "foo/bar.h"], HERE
+        [
+            "ros/poll_set.h",
+            "std_msgs/Nothing.h",
+            "ros/ros.h",
+            "foo/bar.h",
+            "cv_bridge/cv_bridge.h",
+            "tf/mine.h",
+        ],
+        HERE,
+        {"tf/mine.h"},
     )
-    assert set(texts) == {"ros/callback_queue.h", "std_msgs/Nothing.h"}
+    assert set(texts) == {"ros/poll_set.h", "std_msgs/Nothing.h", "cv_bridge/cv_bridge.h"}
     assert all("is not offered" in text for text in texts.values())
+    assert "read sensor_msgs::Image::data" in texts["cv_bridge/cv_bridge.h"]
 
 
 @pytest.mark.parametrize("value", [True, -3, 2.5, "text", [1, 2.5, ["x"]], {"a": {"b": 1}, "c": []}])

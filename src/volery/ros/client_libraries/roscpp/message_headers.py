@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from volery.base.errors import UsageError
@@ -22,7 +22,7 @@ _BASES = {
 _TIMES = {"builtin_interfaces/msg/Time": "ros::Time", "builtin_interfaces/msg/Duration": "ros::Duration"}
 
 
-def generate_headers(includes: Sequence[str], path: Path) -> Mapping[str, str]:
+def generate_headers(includes: Sequence[str], path: Path, present: Collection[str] = ()) -> Mapping[str, str]:
     """Return the texts of the headers that *includes* name, and of those they include, by name.
 
     A header of ROS that is not offered becomes an ``#error``, so that the compiler does not find a real one.
@@ -31,6 +31,7 @@ def generate_headers(includes: Sequence[str], path: Path) -> Mapping[str, str]:
     Args:
         includes: Names in the ``#include`` lines of a file.
         path: File or folder of the component; interface packages near it are found.
+        present: Those that are files of the workspace.
 
     Raises:
         ModelError: The file of an interface is not a valid definition.
@@ -41,15 +42,37 @@ def generate_headers(includes: Sequence[str], path: Path) -> Mapping[str, str]:
     texts: dict[str, str] = {}
     for found in named:
         _add(texts, found[1], found[2])
-        ours = INCLUDE / found[0]
-        if found[0] not in texts and found[1] in {"ros", *packages} and not ours.exists():
-            texts[found[0]] = _REFUSED.format(name=found[0])
+    for name in includes:
+        package = name.partition("/")[0]
+        if name in texts or name in present or package == name or (INCLUDE / name).exists():
+            continue
+        remedy = "no message or service of this name" if package in packages else _NOT_OFFERED.get(package)
+        if remedy is not None:
+            texts[name] = f'#error "volery: <{name}> is not offered: {remedy}"\n'
     return texts
 
 
-_REFUSED = """\
-#error "volery: <{name}> is not offered on the embedded graph"
-"""
+_OWN_PROCESS = "it needs threads or a process of its own; write it in Python, or leave this node out"
+_NOT_OFFERED = {
+    "ros": "include <ros/ros.h>, whose content docs/cpp-components.md lists",
+    "tf": "include <tf/transform_listener.h>, <tf/transform_broadcaster.h> or <tf/transform_datatypes.h>",
+    "tf2_ros": "include <tf2_ros/transform_listener.h>, <tf2_ros/transform_broadcaster.h>, "
+    "<tf2_ros/static_transform_broadcaster.h> or <tf2_ros/buffer.h>",
+    "tf2": "include <tf2/LinearMath/Quaternion.h>, <tf2/LinearMath/Transform.h> or <tf2/utils.h>",
+    "actionlib": "use the topics of the action, or write the component in Python (actionlib)",
+    "message_filters": "keep the last message of each topic, or write the component in Python",
+    "dynamic_reconfigure": "read the parameters with NodeHandle::param()",
+    "image_transport": "publish and subscribe sensor_msgs::Image with a NodeHandle",
+    "cv_bridge": "read sensor_msgs::Image::data",
+    "pcl_ros": "read sensor_msgs::PointCloud2::data",
+    "nodelet": _OWN_PROCESS,
+    "pluginlib": _OWN_PROCESS,
+    "mavros": "publish to the topics of MAVROS and call its services",
+    "mavconn": "publish to the topics of MAVROS and call its services",
+    "rosbag": "record the run with `volery simulate`, which writes a bag",
+    "rclcpp": "it is a header of ROS 2; components of rclcpp do not run yet",
+}
+"""Packages of ROS whose headers need the real libraries, and what to do instead."""
 
 
 def _add(texts: dict[str, str], package: str, label: str) -> None:
