@@ -16,7 +16,7 @@ from functools import partial
 from types import FrameType
 from typing import Protocol
 
-from volery.base.errors import VoleryError
+from volery.base.errors import ComponentError, VoleryError
 from volery.base.process import on_ending_signals
 from volery.base.time import MINUTE, Ns, S
 from volery.kernel.api import Kernel
@@ -130,7 +130,12 @@ class Ending:
         self._farewells = [one for one in self._farewells if one[0].component != component]
 
     def _record_farewell(self, who: str, error: BaseException) -> None:
-        if not isinstance(error, SystemExit):
+        if isinstance(error, ComponentError):  # what it finds of the component at its end
+            self._kernel.record(Failure(self._kernel.now(), who, error.what))
+            self.component_failed(who, error)
+            if self.begun and self.status == "completed":
+                self.status, self.reason = "failed", self._failures[0]
+        elif not isinstance(error, SystemExit):
             what = f"failed at the end of the run: {type(error).__name__}: {error}"
             self._kernel.record(Failure(self._kernel.now(), who, what))
 

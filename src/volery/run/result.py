@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from volery.base.data_frames import to_frame
 from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
-from volery.base.time import MS, Ns, S
+from volery.base.time import MS, Ns, S, clock
 from volery.kernel.api import Kernel
-from volery.run.event_log import LogOptions
+from volery.run.event_log import LEVELS, LogOptions
 from volery.run.vehicle_arrays import INDEX, vehicle_arrays
-from volery.trace.events import Event, Milestone, Text
+from volery.trace.events import Event, Failure, Milestone, Text
 from volery.vehicles.driver import LINK_LOSS_ACTIONS, LinkLossAction
 from volery.vehicles.observed_vehicle import ON_LINK_LOSS
 
@@ -67,6 +67,66 @@ class LostLinkReporter:
         """Report a text about the loss of the link."""
         if isinstance(event, Text) and event.text.startswith(ON_LINK_LOSS):
             self._tell(f"{event.source}: {event.text}")
+
+
+LINES_A_SECOND = 5
+"""Lines of a component's log that are shown in a simulated second; the others are counted."""
+
+_LONGEST = 300
+
+
+class ComponentLogReporter:
+    """Stream tap that shows warnings, errors and failures of components at once, and counts them.
+
+    Args:
+        components: Names of the components.
+        tell: Shows a line, or None to count only.
+    """
+
+    def __init__(self, components: Collection[str], tell: Tell | None) -> None:
+        self._tell = tell
+        self._errors = dict.fromkeys(components, 0)
+        self._warnings = dict.fromkeys(components, 0)
+        self._first: dict[str, str] = {}
+        self._last: dict[str, str] = {}
+        self._second: dict[str, tuple[Ns, int]] = {}
+        self._unshown = dict.fromkeys(components, 0)
+
+    def __call__(self, event: Event) -> None:
+        """Show and count the lines of severity warning and above, and failures."""
+        if isinstance(event, Text) and event.severity <= LEVELS["warning"] and event.source in self._errors:
+            self._take(event.at, event.source, event.severity, event.text)
+        elif (
+            isinstance(event, Failure)
+            and event.who in self._errors
+            and not self._last.get(event.who, "").endswith(event.what)  # a client library has logged it
+        ):
+            self._take(event.at, event.who, LEVELS["error"], event.what)
+
+    def _take(self, at: Ns, who: str, severity: int, text: str) -> None:
+        line = " ".join(text.split())
+        self._last[who] = text
+        self._first.setdefault(who, line)
+        counts, word = (self._errors, "error") if severity <= LEVELS["error"] else (self._warnings, "warning")
+        counts[who] += 1
+        second, shown = self._second.get(who, (-1, 0))
+        shown = shown if second == at // S else 0
+        self._second[who] = at // S, shown + 1
+        if shown >= LINES_A_SECOND:
+            self._unshown[who] += 1
+        elif self._tell is not None:
+            self._tell(f"{clock(at)} {word:7} {who}: {line[:_LONGEST]}")
+
+    def finish(self) -> list[str]:
+        """Show how many lines were not shown; return a line for each component that logged any."""
+        for who, count in self._unshown.items():
+            if count and self._tell is not None:
+                self._tell(f"{who}: {count} more warnings and errors; the report and --log-file have them")
+        return [
+            f"{who} logged {self._errors[who]} errors and {self._warnings[who]} warnings, "
+            f"first: {first[:_LONGEST]}"
+            for who, first in self._first.items()
+        ]
 
 
 class ProgressReporter:

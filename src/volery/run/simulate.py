@@ -33,7 +33,7 @@ from volery.run.distributed import (
 )
 from volery.run.ending import Ending
 from volery.run.recording import Recording
-from volery.run.result import DEFAULT_OPTIONS, Options, ProgressReporter, Run
+from volery.run.result import DEFAULT_OPTIONS, ComponentLogReporter, Options, ProgressReporter, Run
 from volery.run.supervision import Supervision, recover_run, run_supervised
 from volery.run.trace_setup import attachments_of, setup_of
 from volery.trace.attachments import RunSetup
@@ -111,8 +111,9 @@ def _supervised(system: System, options: Options) -> Run:
     libraries = {name: one.compiled.library for name, one in ready.items()}
     supervision = Supervision(build_framework(), libraries, PATIENCE_S)
     return run_supervised(
-        lambda show: _simulated(system, replace(options, show=show, tell=None)),
+        lambda show, tell: _simulated(system, replace(options, show=show, tell=tell)),
         options.show,
+        options.tell,
         supervision,
         partial(recover_run, system, options.folder, options.seed, options.fidelity),
     )
@@ -169,6 +170,8 @@ class _Simulation:
         self._recording.stream.tap(self._observers)
         if options.log is not None:
             self._recording.log_into(options.log)
+        self._log = ComponentLogReporter([one.name for one in system.instances], options.tell)
+        self._recording.stream.tap(self._log)
         if system.limits.until is not None:
             self._goal = Observers((system.limits.until,), setup)
             self._recording.stream.tap(self._goal)
@@ -217,7 +220,7 @@ class _Simulation:
         now, ending = self._kernel.now(), self._ending
         self._built.finish()
         self._fleet.record_states()
-        for warning in self._built.warnings():
+        for warning in (*self._built.warnings(), *self._log.finish()):
             self._recording.stream(Text(now, WHO, WARNING, warning))
         for one in self._built.unserved():
             self._recording.stream(one)

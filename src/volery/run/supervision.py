@@ -28,14 +28,14 @@ from volery.model.system import System
 from volery.requirements.verdicts import Observers
 from volery.run.assembly.computers import Platform
 from volery.run.recording import Recording
-from volery.run.result import Progress, Run, Show
+from volery.run.result import Progress, Run, Show, Tell
 from volery.run.trace_setup import attachments_of, setup_of
 from volery.trace.events import Event, Failure, Verdict
 from volery.trace.mcap_writer import TRACE_FILE
 from volery.trace.reader import Reading
 
-Work = Callable[[Show | None], Run]
-"""Executes the run, given the function that shows its progress."""
+Work = Callable[[Show | None, Tell | None], Run]
+"""Executes the run, given the functions that show its progress and its lines."""
 
 RecoverRun = Callable[[VoleryError, str], Run]
 """Finishes the recording of a run that died of an error, blamed on a component or on ``run``."""
@@ -52,12 +52,15 @@ class Supervision:
     patience_s: float
 
 
-def run_supervised(work: Work, show: Show | None, supervision: Supervision, recover: RecoverRun) -> Run:
+def run_supervised(
+    work: Work, show: Show | None, tell: Tell | None, supervision: Supervision, recover: RecoverRun
+) -> Run:
     """Execute a run in a child process and return its result. An exception of the child is raised here.
 
     Args:
         work: The run.
         show: Receives the progress.
+        tell: Receives the lines that the user should read at once.
         supervision: What the child watches.
         recover: Makes the result if the child dies.
     """
@@ -65,7 +68,9 @@ def run_supervised(work: Work, show: Show | None, supervision: Supervision, reco
     ours, theirs = context.Pipe(duplex=False)
     report, crash_pipe = os.pipe()
     child = context.Process(
-        target=_child_main, args=(work, show is not None, supervision, theirs, crash_pipe), name="run"
+        target=_child_main,
+        args=(work, show is not None, tell is not None, supervision, theirs, crash_pipe),
+        name="run",
     )
     sys.stdout.flush()
     sys.stderr.flush()
@@ -73,7 +78,7 @@ def run_supervised(work: Work, show: Show | None, supervision: Supervision, reco
         with _started(child):
             theirs.close()
             os.close(crash_pipe)
-            result = _listen(ours, show)
+            result = _listen(ours, show, tell)
             child.join()
         return result or _recover(child, read_crash(report, supervision.libraries), recover)
     finally:
@@ -84,8 +89,8 @@ def run_supervised(work: Work, show: Show | None, supervision: Supervision, reco
         os.close(report)
 
 
-def _listen(ours: Connection, show: Show | None) -> Run | None:
-    """Show the progress that the child sends until its result, or return None if it ends without one."""
+def _listen(ours: Connection, show: Show | None, tell: Tell | None) -> Run | None:
+    """Show the progress and lines that the child sends until its result; None if it ends without one."""
     while True:
         try:
             kind, content = ours.recv()
@@ -93,6 +98,8 @@ def _listen(ours: Connection, show: Show | None) -> Run | None:
             return None
         if kind == "show" and show is not None:
             show(content)
+        elif kind == "tell" and tell is not None:
+            tell(content)
         elif kind == "raised":
             raise content
         elif kind == "run":
@@ -137,7 +144,9 @@ def _started(child: BaseProcess) -> Iterator[None]:
 # -- in the child
 
 
-def _child_main(work: Work, shown: bool, supervision: Supervision, to: Connection, crash_pipe: int) -> None:
+def _child_main(
+    work: Work, shown: bool, told: bool, supervision: Supervision, to: Connection, crash_pipe: int
+) -> None:
     os.setpgid(0, 0)  # Ctrl-C reaches the parent, which forwards it
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     stopping = ending_signals()
@@ -148,9 +157,12 @@ def _child_main(work: Work, shown: bool, supervision: Supervision, to: Connectio
     def show(progress: Progress) -> None:
         to.send(("show", progress))
 
+    def tell(line: str) -> None:
+        to.send(("tell", line))
+
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, stopping)  # may raise KeyboardInterrupt at once
-        to.send(("run", work(show if shown else None)))
+        to.send(("run", work(show if shown else None, tell if told else None)))
     except BaseException as error:
         to.send(("raised", error))
     finally:

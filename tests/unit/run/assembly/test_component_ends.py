@@ -60,12 +60,13 @@ def runs(tmp_path):
         if environment:
             model["environment"] = environment
         (tmp_path / "model.yaml").write_text(json.dumps(model))
-        done = simulate(tmp_path, Options(out=tmp_path / "run"))
+        done = simulate(tmp_path, Options(out=tmp_path / "run", tell=run.told.append))
         with Reading(tmp_path / "run" / "trace.mcap") as reading:
             events = list(reading.events())
         lines = [event.text for event in events if isinstance(event, Text) and event.source in scripts]
         return done, lines, events
 
+    run.told = []
     return run
 
 
@@ -148,3 +149,53 @@ def test_a_vehicle_whose_only_commander_fails_is_brought_to_rest_while_the_other
     assert landed[0].end < 35_000_000_000
     assert done.record.outcome.reason == "flier: ended with exit status 1 (flier.py:16)"
     assert done.record.sim_s >= 40.0
+
+
+LOGS = """
+import rospy
+from std_msgs.msg import String
+rospy.init_node("logs")
+rospy.loginfo("fine")
+rospy.logwarn("odd\\n  thing")
+for number in range(8):
+    rospy.logerr("number %d", number)
+rospy.sleep(2)
+rospy.logfatal("late")
+"""
+
+
+def test_warnings_and_errors_of_components_are_shown_at_once_and_counted(runs):
+    done, _, _ = runs(logs=LOGS)
+    assert done.completed
+    words = [line.split(maxsplit=1)[1] for line in runs.told]
+    assert words[:2] == ["warning logs: odd thing", "error   logs: number 0"]
+    assert words[-2:] == [
+        "error   logs: late",
+        "4 more warnings and errors; the report and --log-file have them",
+    ]
+    assert len(words) == 7
+    assert "logs logged 9 errors and 1 warnings, first: odd thing" in done.record.warnings
+
+
+HEARS = """
+import rospy
+from std_msgs.msg import String
+rospy.init_node("hears")
+def heard(message):
+    CONDITION
+    print(message.nothing)
+rospy.Subscriber("/heard", String, heard)
+rospy.spin()
+"""
+
+
+def test_a_component_of_which_every_callback_fails_has_failed(runs):
+    done, _, _ = runs(hears=HEARS.replace("CONDITION", ""), listener=LISTENER)
+    assert done.record.outcome.status == "failed"
+    assert done.record.outcome.reason.startswith("hears: every callback failed (3 of 3): callback of /heard")
+    assert any("error   hears: bad callback: callback of /heard raised" in line for line in runs.told)
+
+
+def test_one_callback_that_succeeds_is_enough(runs):
+    sometimes = HEARS.replace("CONDITION", "if message.data.startswith('2'): return")
+    assert runs(hears=sometimes, listener=LISTENER)[0].completed

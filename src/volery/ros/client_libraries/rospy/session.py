@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple, Self
 
-from volery.base.errors import UsageError, VoleryError
+from volery.base.errors import ComponentError, UsageError, VoleryError
 from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Kernel
 from volery.kernel.task import Scope
@@ -78,7 +78,10 @@ class Session:
     shutdown: str = ""
     """Reason of the shutdown; empty while the node is not shut down."""
     hooks: list[Callable[[], Any]] = field(default_factory=list)
-    failures: set[str] = field(default_factory=set)
+    failures: dict[str, None] = field(default_factory=dict)
+    callbacks: int = 0
+    """Number of callbacks that were called, without shutdown hooks."""
+    failed_callbacks: int = 0
     initialised: bool = False
 
     def log(self, severity: int, text: str) -> None:
@@ -121,7 +124,7 @@ class Session:
 
         def body() -> None:
             while not self.node.closed:
-                self._guarded(group.spin_once, what)
+                self._guarded(group.spin_once, what, counted=True)
 
         self._spawn(body, label)
         return group
@@ -134,7 +137,7 @@ class Session:
         """Return a new group that runs each piece of work in a task of its own."""
 
         def start(work: Work) -> None:
-            self._spawn(lambda: self._guarded(work.run, what), label)
+            self._spawn(lambda: self._guarded(work.run, what, counted=True), label)
 
         return self.node.group(start)
 
@@ -147,22 +150,35 @@ class Session:
 
         self.kernel.spawn(run, f"{context.component} ({label})", context, self.scope)
 
-    def _guarded(self, run: Callable[[], object], what: str) -> None:
+    def _guarded(self, run: Callable[[], object], what: str, counted: bool = False) -> None:
         """Run a callback. An exception is logged, as in rospy, and is a failure of the component."""
         try:
-            run()
+            if run() is not False and counted:
+                self.callbacks += 1
         except ROSInterruptException:
             pass
         except Exception as error:
             self.report_failure(what, error)
+            if counted:
+                self.callbacks += 1
+                self.failed_callbacks += 1
 
     def report_failure(self, what: str, error: Exception) -> None:
         """Log what a callback has raised; each text is a failure of the component once."""
         text = f"{what} raised {_description(error)}"
         self.log(ERROR, f"bad callback: {text}")
         if text not in self.failures:
-            self.failures.add(text)
+            if not self.failures:
+                self.at_end(self.node.context, self._judge_callbacks)
+            self.failures[text] = None
             self.kernel.record(Failure(self.kernel.now(), self.node.context.component, text))
+
+    def _judge_callbacks(self) -> None:
+        """Raise ``ComponentError`` if every callback has failed: the node did nothing of what it is for."""
+        if self.failed_callbacks and self.failed_callbacks == self.callbacks:
+            first = next(iter(self.failures))
+            what = f"every callback failed ({self.callbacks} of {self.callbacks}): {first}"
+            raise ComponentError(self.node.context.component, what)
 
 
 def _description(error: Exception) -> str:
