@@ -145,7 +145,7 @@ def _started(child: BaseProcess) -> Iterator[None]:
 
 
 def _child_main(
-    work: Work, shown: bool, told: bool, supervision: Supervision, to: Connection, crash_pipe: int
+    work: Work, shown: bool, tells: bool, supervision: Supervision, to: Connection, crash_pipe: int
 ) -> None:
     os.setpgid(0, 0)  # Ctrl-C reaches the parent, which forwards it
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
@@ -162,7 +162,7 @@ def _child_main(
 
     try:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, stopping)  # may raise KeyboardInterrupt at once
-        to.send(("run", work(show if shown else None, tell if told else None)))
+        to.send(("run", work(show if shown else None, tell if tells else None)))
     except BaseException as error:
         to.send(("raised", error))
     finally:

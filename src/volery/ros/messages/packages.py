@@ -37,7 +37,8 @@ class _Definitions(ModuleType):
         super().__init__(f"{package}.{kind}", f"The {kind} types of {package}.")
         self._package, self._kind = package, kind
         self._known = names
-        self.__all__ = names
+        ends = ("", "Request", "Response") if kind == "srv" else ("",)
+        self.__all__ = [f"{name}{end}" for name in names for end in ends]
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):

@@ -236,6 +236,7 @@ def test_packages_are_importable_modules() -> None:
     assert modules["std_msgs.msg"].String("x").data == "x"
     assert modules["std_msgs"].msg is modules["std_msgs.msg"]
     assert modules["std_srvs.srv"].TriggerResponse(success=True).success
+    assert {"Trigger", "TriggerRequest", "TriggerResponse"} <= set(modules["std_srvs.srv"].__all__)
     assert modules["mavros_msgs.srv"].SetMode.Request(custom_mode="GUIDED").custom_mode == "GUIDED"
     assert modules["mavros_msgs.msg"].VFR_HUD is messages.message_class("mavros_msgs/VfrHud")
     with pytest.raises(AttributeError, match=r"std_msgs\.msg has no 'Strng'.*did you mean 'String'"):
