@@ -34,7 +34,8 @@ from volery.components.instance import COMPONENT_MARK, Instance, describe
 from volery.components.virtual_stdlib.process_modules import ProcessModules
 from volery.cost import StepCounter
 from volery.kernel.task import ExecutionContext
-from volery.ros.messages import Workspace, define_packages, modules
+from volery.ros.messages import Library, Workspace, define_packages, modules
+from volery.ros.messages.packages import KINDS
 from volery.ros.messages.workspace import module_file
 
 _PREFIX = "volery.user"
@@ -263,15 +264,28 @@ class Loader:
 
     def __post_init__(self) -> None:
         self._codes: dict[Path, CodeType] = {}
+        self._interfaces: dict[Library, dict[str, ModuleType]] = {}
         self.shared = Space(self, SHARED_MODULE_PREFIX)
 
-    def load(self, source: SourceFile, name: str) -> ModuleType:
+    def interfaces(self, library: Library) -> dict[str, ModuleType]:
+        """Return the interface packages with the classes of a client library; none for plain components."""
+        if library and library not in self._interfaces:
+            self._interfaces[library] = modules(library=library)
+        return self._interfaces.get(library, {})
+
+    def add_interfaces(self, package: str) -> None:
+        """Make the interfaces of a package, which have been defined, importable."""
+        self.replacements.update(modules(package))
+        for library, known in self._interfaces.items():
+            known.update(modules(package, library))
+
+    def load(self, source: SourceFile, name: str, library: Library = "") -> ModuleType:
         """Execute a component's file for the instance ``name`` and return its module.
 
         Raises:
             ComponentError: The file raises an exception.
         """
-        module = self.shared.module(f"{USER_MODULE_PREFIX}{name}.{source.path.stem}", source.path)
+        module = self.shared.module(f"{USER_MODULE_PREFIX}{name}.{source.path.stem}", source.path, library)
         try:
             self.execute(source, module)
         except VoleryError:
@@ -316,10 +330,12 @@ class Space:
     Args:
         loader: The run's loader.
         prefix: Prefix of the modules' names.
+        library: Client library whose messages the modules get.
     """
 
-    def __init__(self, loader: Loader, prefix: str) -> None:
+    def __init__(self, loader: Loader, prefix: str, library: Library = "") -> None:
         self.loader = loader
+        self.library: Library = library
         self._prefix = prefix
         self._modules: dict[Path, ModuleType] = {}
 
@@ -331,13 +347,16 @@ class Space:
         """Return the folders that a file in *folder* imports the top-level module *top* from, in order."""
         return [folder]
 
-    def module(self, full_name: str, path: Path) -> ModuleType:
-        """Return a new, empty module for the file *path*."""
+    def module(self, full_name: str, path: Path, library: Library = "") -> ModuleType:
+        """Return a new, empty module for the file *path*, whose messages are those of a client library."""
         module = ModuleType(full_name)
         module.__file__ = str(path)
         module.__dict__[COMPONENT_MARK] = True
         names = vars(self.replaced("builtins") or builtins)
-        module.__dict__["__builtins__"] = {**names, "__import__": _Import(self, path)}
+        module.__dict__["__builtins__"] = {
+            **names,
+            "__import__": _Import(self, path, library or self.library),
+        }
         sys.modules[full_name] = module  # dataclasses and typing look a class's module up there
         return module
 
@@ -353,7 +372,7 @@ class Space:
             return None
         own = self.find(name, folder, bare)
         if own is not None and found is not None:
-            for kind in ("msg", "srv", "action"):
+            for kind in KINDS:
                 if hasattr(found, kind):
                     setattr(own, kind, getattr(found, kind))
         return own or found
@@ -453,12 +472,18 @@ class ScriptSpace(Space):
         instance: The component.
         source: Its file.
         arguments: Its arguments.
+        library: Client library that it is written for.
     """
 
     def __init__(
-        self, loader: Loader, instance: Instance, source: SourceFile, arguments: Sequence[str] = ()
+        self,
+        loader: Loader,
+        instance: Instance,
+        source: SourceFile,
+        arguments: Sequence[str] = (),
+        library: Library = "",
     ) -> None:
-        super().__init__(loader, f"{USER_MODULE_PREFIX}{instance.name}.")
+        super().__init__(loader, f"{USER_MODULE_PREFIX}{instance.name}.", library)
         self._instance = instance
         self._source = source
         self._script = source.path
@@ -515,16 +540,16 @@ class ScriptSpace(Space):
             if above is None:
                 raise TypeError(f"the 'package' argument is required to import {name!r}")
             folder = Path(vars(above)["__file__"]).parent
-        import_ = _Import(self, folder / "__init__.py")
+        import_ = _Import(self, folder / "__init__.py", self.library)
         return import_(name.lstrip("."), fromlist=("__name__",), level=level)
 
     def replaced(self, name: str) -> ModuleType | None:
         """See ``Space``. Modules that are the process's own come first."""
         return self._process.get(name) or super().replaced(name)
 
-    def module(self, full_name: str, path: Path) -> ModuleType:
+    def module(self, full_name: str, path: Path, library: Library = "") -> ModuleType:
         """See ``Space``."""
-        made = super().module(full_name, path)
+        made = super().module(full_name, path, library)
         self._process.sys.modules[full_name] = made
         return made
 
@@ -580,14 +605,14 @@ def _python_path() -> list[Path]:
 
 def _interface_kind(name: str) -> bool:
     """Return whether a dotted name is that of interfaces, such as ``std_msgs.msg``."""
-    return name.partition(".")[2].partition(".")[0] in ("msg", "srv", "action")
+    return name.partition(".")[2].partition(".")[0] in KINDS
 
 
 class _Import:
     """``__import__`` for one file."""
 
-    def __init__(self, space: Space, file: Path) -> None:
-        self._space = space
+    def __init__(self, space: Space, file: Path, library: Library) -> None:
+        self._space, self._library = space, library
         self._loader = space.loader
         self._file = file
         self._folder = file.parent
@@ -616,7 +641,14 @@ class _Import:
         return self._top_of(name, found)
 
     def _find(self, name: str) -> ModuleType | None:
-        return self._space.imported(name, self._folder)
+        found = self._space.imported(name, self._folder)
+        ours = self._loader.interfaces(self._library).get(name)
+        if ours is None or found is None:
+            return found
+        if found is self._space.replaced(name):
+            return ours
+        vars(found).update({kind: one for kind, one in vars(ours).items() if kind in KINDS})
+        return found
 
     def _define(self, package: str) -> bool:
         """Define the interfaces of a package if they are not known and are found; return whether they are."""
@@ -624,7 +656,7 @@ class _Import:
             return False
         if not define_packages(self._file, [package], self._loader.workspace):
             return False
-        self._loader.replacements.update(modules(package))
+        self._loader.add_interfaces(package)
         return True
 
     def _python_module(
@@ -650,7 +682,7 @@ class _Import:
     def _last_found(self, name: str) -> ModuleType:
         """Return an interface package that is imported by its bare name, or a folder; else raise."""
         top = name.partition(".")[0]
-        found = self._loader.replacements[name] if name == top and self._define(top) else None
+        found = self._find(name) if name == top and self._define(top) else None
         found = found or self._space.find(name, self._folder, bare=True)
         if found is not None:
             return found
@@ -692,6 +724,7 @@ class _Import:
         for length in range(len(parts) - 1, 0, -1):
             above = ".".join(parts[:length])
             parent = self._space.imported(above, self._folder, bare=True) or ModuleType(above)
+            parent = self._loader.interfaces(self._library).get(above, parent)
             setattr(parent, parts[length], module)
             module = parent
         return module

@@ -22,6 +22,7 @@ from volery.components.loader import Loader, ScriptSpace, SourceFile, parse
 from volery.kernel.api import Kernel
 from volery.kernel.task import Scope, Task
 from volery.kernel.waiting import Rate, sleep
+from volery.ros.messages import Library
 
 RUN = "run"
 ENTRY = "main"
@@ -146,12 +147,18 @@ class ScriptProgram:
         arguments: Its command-line arguments.
         function: Function that is called after the file has been executed, as an entry point of its package
             does; empty for a file that calls what it defines by itself.
+        library: Client library that it is written for.
     """
 
     def __init__(
-        self, loader: Loader, source: SourceFile, arguments: Sequence[str] = (), function: str = ""
+        self,
+        loader: Loader,
+        source: SourceFile,
+        arguments: Sequence[str] = (),
+        function: str = "",
+        library: Library = "",
     ) -> None:
-        self._loader = loader
+        self._loader, self._library = loader, library
         self._source = source
         self._arguments = arguments
         self._function = function
@@ -187,7 +194,8 @@ class ScriptProgram:
         """See ``Program``."""
         instance = component_of(caller("a script")[1])
         assert instance is not None, "a script runs in the flow of control of its component"
-        ScriptSpace(self._loader, instance, self._source, self._arguments).run(self._function)
+        space = ScriptSpace(self._loader, instance, self._source, self._arguments, self._library)
+        space.run(self._function)
 
 
 def load_program(
@@ -199,6 +207,7 @@ def load_program(
     *,
     arguments: Sequence[str] = (),
     function: str = "",
+    library: Library = "",
 ) -> Program:
     """Load the program of an instance.
 
@@ -210,6 +219,7 @@ def load_program(
         where: Line of the model that names the file.
         arguments: Command-line arguments of a script.
         function: Function of a script that is called; by default, that of its package's entry point.
+        library: Client library that the file is written for.
 
     Raises:
         ModelError: The file is missing, is not Python or does not contain the class or the function.
@@ -220,9 +230,9 @@ def load_program(
         if function and not source.defines(function):
             raise ModelError(f"no function {function!r}, which 'main' names", where=Location(str(path), 1))
         called = function or ("" if source.is_script() else entry_function(source))
-        return ScriptProgram(loader, source, arguments, called)
+        return ScriptProgram(loader, source, arguments, called, library)
     _require_class(source, class_name)
-    module = loader.load(source, name)
+    module = loader.load(source, name, library)
     cls = getattr(module, class_name, None)
     if not isinstance(cls, type):
         raise ModelError(

@@ -178,7 +178,7 @@ def test_the_instruments_of_the_pilot(rig: Any) -> None:
         8.5,
         8.0,
         90,
-        0.45,
+        pytest.approx(0.45),  # a float32
         500.5,
         -0.5,
     )

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import NoReturn
 
+from volery.ros import messages
 from volery.ros.client_libraries import actionlib, message_filters, rclpy, rospy, tf2
 from volery.ros.client_libraries.library_base import AtEnd, Launch, ignore_end
 from volery.ros.graph import Node, RosGraph
@@ -24,11 +25,15 @@ def importable_modules(
     nodes: Mapping[str, Node] | None = None,
     at_end: AtEnd = ignore_end,
 ) -> dict[str, ModuleType]:
-    """Return the modules by name. For the arguments see ``rospy.modules``."""
+    """Return the modules by name; interface packages have the graph's classes, not those of a library.
+
+    For the arguments see ``rospy.modules``.
+    """
     given = launched, nodes, at_end
     found = {**rospy.modules(graph, *given), **rclpy.modules(graph, *given)}
     return {
         **found,
+        **messages.modules(),
         **tf2.modules(graph.kernel, found["rospy"], found["rclpy.executors"]),
         **actionlib.modules(found["rospy"]),
         **message_filters.modules(found["rospy"], found["rclpy.time"]),

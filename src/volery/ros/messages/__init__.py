@@ -5,6 +5,7 @@ definitions of the installed ROS 2 distribution (Jazzy without one); packages th
 ``definitions/``. Messages of other definitions are converted. Depends on ``base`` only.
 """
 
+from volery.ros.messages.client_classes import Library
 from volery.ros.messages.encodings import (
     Ros1Service,
     Ros1Type,
@@ -36,6 +37,7 @@ from volery.ros.messages.store import (
 from volery.ros.messages.workspace import Workspace
 
 __all__ = [
+    "Library",
     "Message",
     "Ros1Service",
     "Ros1Type",

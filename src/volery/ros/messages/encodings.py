@@ -21,8 +21,7 @@ from volery.ros.messages import lazy_rosbags as rosbags
 from volery.ros.messages.cdr_encoder import CDR_HEADER, FORMATS, encode
 from volery.ros.messages.conversion import FILLER, HEADER, Conversion
 from volery.ros.messages.message import Message
-from volery.ros.messages.packages import ROS1_SPELLING
-from volery.ros.messages.store import message_class, message_name, service, service_name, store
+from volery.ros.messages.store import ROS1_SPELLING, message_class, message_name, service, service_name, store
 
 
 @cache

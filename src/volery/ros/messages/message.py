@@ -1,16 +1,19 @@
 """Classes of message values: every field has a default, an unknown field is an error, copies are cheap.
 
 A class is a slotted dataclass. Arrays of numbers are numpy arrays of the field's type; an assigned list
-becomes an array when the message is copied, as by publishing. Times and durations have arithmetic and also
-ROS 1's spelling (``stamp.secs``, ``stamp.to_sec()``), so that files written for it work.
+becomes an array when the message is copied, as by publishing, and numbers become what their encoding gives.
+Client libraries have classes derived from these (``client_classes``). Times and durations have arithmetic and
+also ROS 1's spelling (``stamp.secs``, ``stamp.to_sec()``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Sequence
 from dataclasses import field, make_dataclass
 from functools import partial
-from operator import attrgetter
+from operator import attrgetter, index
+from types import MemberDescriptorType
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
 import numpy as np
@@ -18,17 +21,57 @@ import numpy as np
 from volery.base.errors import UsageError
 
 Copy = Callable[[Any], Any]
-_MISFITS = (TypeError, ValueError, AttributeError, OverflowError)
+_MISFITS = (TypeError, ValueError, AttributeError, OverflowError, struct.error)
 """What a value that does not fit its field raises."""
 
 
-def generated_copy(cls: Any, fields: list[Any]) -> Copy:
-    """Return the method ``copy`` of a message class.
+class Received:
+    """A list of numbers as the graph delivered it; a client library converts it when it is read first."""
+
+    __slots__ = ("array",)
+
+    def __init__(self, array: np.ndarray[Any, Any]) -> None:
+        self.array = array
+
+
+class Law(NamedTuple):
+    """How a client library encodes single values of other types than their field's.
+
+    Attributes:
+        number: Returns a field's value as it arrives, of the kind (``float64``), the value, the message and
+            the path of the field. Called for values whose type is not the field's. May raise.
+        infinite: Whether ``float32`` out of range becomes infinite; else it is an error.
+        wraps: Whether whole numbers out of range are given to ``number``; else the encoder refuses them.
+    """
+
+    number: Callable[[str, Any, Any, str], Any]
+    infinite: bool = False
+    wraps: bool = False
+
+
+def plain_number(base: str, value: Any, message: Any, path: str) -> Any:
+    """Return a value as ROS 1's encoding gives it: 1 in a ``float64`` is 1.0, 1 in a ``bool`` True."""
+    if base == "bool":
+        if value not in (0, 1):
+            raise TypeError("not a bool")
+        return bool(value)
+    if base.startswith("float"):
+        if isinstance(value, str):
+            raise TypeError("not a number")
+        return float(value)
+    return int(index(value))
+
+
+PLAIN = Law(plain_number)
+
+
+def generated_copy(cls: Any, fields: list[Any], law: Law = PLAIN) -> Copy:
+    """Return the method ``copy`` of a message class; its result is of the graph's classes.
 
     Generated code takes half the time of a loop over the fields.
     """
-    writing = _Writing()
-    made = writing.expression(cls, fields, "self")
+    writing = _Writing(law)
+    made = writing.expression(cls, fields, "self", "")
     return _compiled(f"copy of {cls.__msgtype__}", [*writing.lines, f"return {made}"], writing.names)
 
 
@@ -52,30 +95,87 @@ def _compiled(title: str, lines: list[str], names: dict[str, Any]) -> Copy:
     return written
 
 
+def _singles(infinite: bool, *values: float) -> tuple[float, ...]:
+    """Return floats in the precision of ``float32``."""
+    packing = _SINGLE[len(values)] if len(values) < len(_SINGLE) else struct.Struct(f"<{len(values)}f")
+    try:
+        return packing.unpack(packing.pack(*values))
+    except OverflowError:
+        if not infinite:
+            raise
+        with np.errstate(over="ignore"):
+            return tuple(float(np.float32(one)) for one in values)
+
+
+_SINGLE = [struct.Struct(f"<{count}f") for count in range(12)]
+
+
 class _Writing:
-    """Source of one copying function; nested messages are assigned to variables first."""
+    """Source of one copying function; nested messages and numbers are assigned to variables first."""
 
-    def __init__(self) -> None:
+    def __init__(self, law: Law) -> None:
+        self.law = law
         self.lines: list[str] = []
-        self.names: dict[str, Any] = {}
+        self.names: dict[str, Any] = {"number": law.number, "singles": partial(_singles, law.infinite)}
 
-    def expression(self, cls: Any, fields: list[Any], of: str) -> str:
+    def expression(self, cls: Any, fields: list[Any], of: str, path: str) -> str:
         """Return the expression that makes a `cls` of the fields of the variable `of`."""
         kind = f"kind_{len(self.names)}"
         self.names[kind] = cls
         values = []
+        floats: list[str] = []
         for one in fields:
             value = f"{of}.{one.name}"
             if one.length is not None:
-                copier = f"copier_{len(self.names)}"
+                copier, slot = f"copier_{len(self.names)}", f"slot_{len(self.names)}"
                 self.names[copier] = _copier(one)
-                value = f"{copier}({value})"
+                self.names[slot] = slot_of(cls, one.name).__get__
+                value = f"{copier}({slot}({of}))"
             elif one.nested is not None:
-                variable = f"part_{len(self.lines)}"
-                self.lines.append(f"{variable} = {value}")
-                value = self.expression(one.nested, one.nested.fields_of, variable)
+                variable = self._assigned(value)
+                value = self.expression(one.nested, one.nested.fields_of, variable, f"{path}{one.name}.")
+            elif one.base != "string":
+                value = self._number(cls, one, of, f"{path}{one.name}")
+                if one.base == "float32":
+                    floats.append(value)
             values.append(value)
+        if floats:
+            self.lines.append(f"{', '.join(floats)}, = singles({', '.join(floats)})")
+        if issubclass(cls, Header):
+            values.append(f"{of}.{SEQ}")
         return f"{kind}({', '.join(values)})"
+
+    def _assigned(self, value: str) -> str:
+        variable = f"part_{len(self.lines)}"
+        self.lines.append(f"{variable} = {value}")
+        return variable
+
+    def _number(self, cls: Any, one: Any, of: str, path: str) -> str:
+        """Write the assignment of a number to a variable, and its check."""
+        if one.base in BYTES:
+            slot = f"slot_{len(self.names)}"
+            self.names[slot] = slot_of(cls, one.name).__get__
+            variable = self._assigned(f"{slot}({of})")
+        else:
+            variable = self._assigned(f"{of}.{one.name}")
+        kind = "float" if one.base.startswith("float") else "bool" if one.base == "bool" else "int"
+        wrong = f"{variable}.__class__ is not {kind}"
+        if kind == "int" and self.law.wraps:
+            limits = np.iinfo(_dtype(one.base))
+            wrong += f" or not {limits.min} <= {variable} <= {limits.max}"
+        self.lines.append(f"if {wrong}: {variable} = number({one.base!r}, {variable}, self, {path!r})")
+        return variable
+
+
+BYTES = ("byte", "octet")
+"""Names of ROS 2's ``byte``, which rclpy has as ``bytes`` of length 1."""
+
+
+def slot_of(cls: Any, name: str) -> Any:
+    """Return the descriptor of a field as messages of type *cls* keep it, whatever their client library."""
+    return next(
+        vars(one)[name] for one in cls.__mro__ if isinstance(vars(one).get(name), MemberDescriptorType)
+    )
 
 
 def _conversions(fields: list[Any], of: str, names: dict[str, Any]) -> list[str] | None:
@@ -88,6 +188,9 @@ def _conversions(fields: list[Any], of: str, names: dict[str, Any]) -> list[str]
             if inner is None:
                 return None
             lines += inner
+            if one.base == "float32":
+                names["singles"] = partial(_singles, False)
+                lines.append(f"{value}, = singles({value})")
         elif one.nested is not None or one.base == "string":
             return None
         else:
@@ -111,8 +214,13 @@ class Message:
     __match_args__: ClassVar[tuple[str, ...]] = ()
     _copiers: ClassVar[tuple[tuple[int, Copier], ...]] = ()
     _values: ClassVar[Callable[[Any], tuple[Any, ...]]]
+    _copied: ClassVar[Callable[[Any], Any]]
+    of_graph: ClassVar[Any]
+    """Class of the type on the graph; a client library's is derived from it. Private to this package."""
     fields_of: ClassVar[list[Field]] = []
     """Fields of the type. Private to this package."""
+    constants_of: ClassVar[Sequence[tuple[str, str, Any]]] = ()
+    """Name, kind and value of the type's constants. Private to this package."""
     __hash__: ClassVar[Any] = None  # messages are mutable values
 
     if TYPE_CHECKING:  # each class has the fields of its type
@@ -136,13 +244,16 @@ class Message:
         cls = type(self)
         values = cls._values(self)
         copied = list(values)
-        for index, copier in cls._copiers:
+        for place, copier in cls._copiers:
             try:
-                copied[index] = copier(copied[index])
+                copied[place] = copier(copied[place])
             except _MISFITS as error:
-                name = f"{cls.__msgtype__}.{cls.__match_args__[index]}"
-                raise UsageError(f"{name}: {copied[index]!r} does not fit: {error}") from error
-        return cls(*copied)
+                name = f"{cls.__msgtype__}.{cls.__match_args__[place]}"
+                raise UsageError(f"{name}: {copied[place]!r} does not fit: {error}") from error
+        made = cls.of_graph(*copied)
+        if isinstance(self, Header):
+            made.seq = self.seq
+        return made
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Message) or other.__msgtype__ != self.__msgtype__:
@@ -156,19 +267,23 @@ def _same(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
+SEQ = "ros1_seq"
+"""Slot of a header in which ``seq`` is kept."""
+
+
 class Header(Message):
-    """A header. ROS 1's ``seq`` may be assigned but is always 0, as ROS 2 has no such field."""
+    """A header. ROS 1's ``seq`` is carried on the embedded graph; ROS 2 has no such field."""
 
     __slots__ = ()
 
     @property
     def seq(self) -> int:
-        """Always 0."""
-        return 0
+        """ROS 1's count of messages."""
+        return int(getattr(self, SEQ))
 
     @seq.setter
     def seq(self, value: int) -> None:
-        """Ignore the value."""
+        setattr(self, SEQ, value)
 
 
 class Nothing(Message):
@@ -197,19 +312,22 @@ class Field(NamedTuple):
 
 
 def make_class(
-    name: str, base: type[Message], constants: dict[str, Any], fields: list[Field]
+    name: str, base: type[Message], constants: Sequence[tuple[str, str, Any]], fields: list[Field]
 ) -> type[Message]:
     """Create the class of message type `name` (``package/msg/Name``), derived from `base`."""
     package, kind, label = name.split("/")
-    members = []
+    members: list[tuple[str, Any, Any]] = []
     copiers = []
-    for index, one in enumerate(fields):
+    for place, one in enumerate(fields):
         members.append((one.name, Any, _default(name, one)))
         copier = _copier(one)
         if copier:
-            copiers.append((index, copier))
+            copiers.append((place, copier))
+    if issubclass(base, Header):
+        members.append((SEQ, int, field(default=0)))
     namespace = {
-        **constants,
+        **{label: value for label, _, value in constants},
+        "constants_of": constants,
         "__msgtype__": name,
         "__module__": f"{package}.{kind}",
         "_type": name,
@@ -220,10 +338,24 @@ def make_class(
     made: Any = make_dataclass(
         label, members, bases=(base,), namespace=namespace, init=bool(fields), eq=False, slots=True
     )
-    for method, write in (("copy", generated_copy), ("converted", generated_conversion)):
-        if method not in made.__match_args__:  # a field of that name comes first
-            setattr(made, method, _written_at_first_use(made, method, partial(write, made, fields)))
+    setattr(made, "__match_args__", tuple(one.name for one in fields))  # noqa: B010 - fixed to mypy
+    made.of_graph = made
+    set_written(made, {"_copied": partial(generated_copy, made, fields)})
+    set_written(
+        made,
+        {
+            "copy": partial(generated_copy, made, fields),
+            "converted": partial(generated_conversion, made, fields),
+        },
+    )
     return cast("type[Message]", made)
+
+
+def set_written(cls: Any, methods: dict[str, Callable[[], Copy]]) -> None:
+    """Give a message class methods that are written at their first use; a field of that name comes first."""
+    for name, write in methods.items():
+        if name not in cls.__match_args__:
+            setattr(cls, name, _written_at_first_use(cls, name, write))
 
 
 def _written_at_first_use(cls: Any, name: str, write: Callable[[], Copy]) -> Copy:
@@ -245,17 +377,21 @@ def _values_of(names: tuple[str, ...]) -> Callable[[Any], tuple[Any, ...]]:
 
 
 def _default(owner: str, one: Field) -> Any:
+    default = default_value(owner, one)
+    return field(default_factory=default) if callable(default) else field(default=default)
+
+
+def default_value(owner: str, one: Field) -> Any:
+    """Return a field's default, or what makes it."""
     if one.length is None:
-        if one.nested:
-            return field(default_factory=one.nested)
-        return field(default=_ROS2_DEFAULTS.get((owner, one.name), _zero(one.base)))
+        return one.nested or _ROS2_DEFAULTS.get((owner, one.name), _zero(one.base))
     count = one.length
     if one.nested:
         nested = one.nested
-        return field(default_factory=lambda: [nested() for _ in range(count)])
+        return lambda: [nested() for _ in range(count)]
     if one.base == "string":
-        return field(default_factory=lambda: [""] * count)
-    return field(default_factory=partial(np.zeros, count, _dtype(one.base)))
+        return lambda: [""] * count
+    return partial(np.zeros, count, _dtype(one.base))
 
 
 def _zero(base: str) -> Any:
@@ -272,7 +408,9 @@ def _dtype(base: str) -> np.dtype[Any]:
 
 def _copier(one: Field) -> Copier | None:
     if one.length is None:
-        return partial(_copy_nested, one.nested) if one.nested else None
+        if one.nested:
+            return partial(_copy_nested, one.nested)
+        return None if one.base == "string" else partial(_number_or_as_is, one.base)
     if one.nested:
         return partial(_copy_list, partial(_copy_nested, one.nested), one.length)
     if one.base == "string":
@@ -280,12 +418,21 @@ def _copier(one: Field) -> Copier | None:
     return partial(_copy_array, _dtype(one.base), one.length)
 
 
+def _number_or_as_is(base: str, value: Any) -> Any:
+    """Return a number as it is encoded, or a value that the encoder refuses."""
+    try:
+        number = plain_number(base, value, None, "")
+        return _singles(False, number)[0] if base == "float32" else number
+    except _MISFITS:
+        return value
+
+
 def _copy_nested(cls: type[Message], value: Any) -> Any:
-    if not cls._copiers:
-        return cls(*cls._values(value))
+    if isinstance(value, cls):
+        return type(value)._copied(value)
     copied = list(cls._values(value))
-    for index, copier in cls._copiers:
-        copied[index] = copier(copied[index])
+    for place, copier in cls._copiers:
+        copied[place] = copier(copied[place])
     return cls(*copied)
 
 
@@ -303,8 +450,14 @@ def _copy_list(copier: Copier, count: int, values: Any) -> list[Any]:
 
 
 def _copy_array(dtype: np.dtype[Any], count: int, values: Any) -> Any:
-    if isinstance(values, bytes):
+    if isinstance(values, Received):
+        values = values.array
+    elif isinstance(values, bytes | bytearray):
         values = np.frombuffer(values, np.uint8)
+    elif dtype.kind in "iu" and isinstance(values, list | tuple):
+        given = np.array(values)
+        if given.dtype.kind == "f" and given.size:
+            raise TypeError("not whole numbers")
     copied = np.array(values, dtype)
     if copied.ndim != 1 or (count and copied.shape[0] != count):
         wanted = count or "one row of"

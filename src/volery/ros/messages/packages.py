@@ -15,27 +15,27 @@ from types import ModuleType
 from typing import Any
 
 from volery.base.errors import Location, ModelError, UsageError, choices, did_you_mean
+from volery.ros.messages.client_classes import RCLPY, Library, message_of, service_of
 from volery.ros.messages.store import (
+    ROS1_SPELLING,
     action_types,
     define_all,
     define_ros1_action,
-    message_class,
-    service,
     service_types,
     types,
 )
 from volery.ros.messages.workspace import Workspace, entries
 
-ROS1_SPELLING = {"mavros_msgs": {"VFR_HUD": "VfrHud"}}
-"""Types with another spelling in ROS 1: by package, ROS 1's name and ROS 2's."""
+_OF_ROS1 = ("std_msgs/msg/Duration", "std_msgs/msg/Time")
+"""Types that ROS 2 has not, of packages that it has."""
 
 
 class _Definitions(ModuleType):
     """Module ``package.msg``, ``package.srv`` or ``package.action``, whose classes are created on demand."""
 
-    def __init__(self, package: str, kind: str, names: list[str]) -> None:
+    def __init__(self, package: str, kind: str, names: list[str], library: Library) -> None:
         super().__init__(f"{package}.{kind}", f"The {kind} types of {package}.")
-        self._package, self._kind = package, kind
+        self._package, self._kind, self._library = package, kind, library
         self._known = names
         ends = ("", "Request", "Response") if kind == "srv" else ("",)
         self.__all__ = [f"{name}{end}" for name in names for end in ends]
@@ -47,64 +47,56 @@ class _Definitions(ModuleType):
         for ending in ("Request", "Response"):
             if self._kind == "srv" and wanted.endswith(ending) and wanted not in self._known:
                 pair = getattr(self, wanted.removesuffix(ending).removesuffix("_"))
-                return getattr(pair, ending)
+                return getattr(pair, f"_{ending.lower()}_class")
         if wanted not in self._known and self._kind == "msg" and define_ros1_action(self._package, wanted):
             self._known.append(wanted)
         if wanted not in self._known:
             hint = did_you_mean(name, self._known)
             raise AttributeError(f"{self.__name__} has no {name!r}{hint}; it has {choices(self._known)}")
         full = f"{self._package}/{self._kind}/{wanted}"
-        made = _MAKERS[self._kind](full)
+        made = _MAKERS[self._kind](full, self._library)
         setattr(self, name, made)
         return made
 
 
-def service_class(full: str) -> type:
-    """Return the class of ``from package.srv import Name``, with ``Request`` and ``Response``."""
-    pair = service(full)
-    members = {
-        "_type": full,
-        "_request_class": pair.request,
-        "_response_class": pair.response,
-        "Request": pair.request,
-        "Response": pair.response,
-    }
-    return type(full.rpartition("/")[2], (), members)
-
-
-def _action_class(full: str) -> type:
+def _action_class(full: str, library: Library) -> type:
     """Return the class of ``from package.action import Name``."""
     inner = full.replace("/action/", "/msg/")
     members = {
         "_type": full,
-        **{part: message_class(f"{inner}_{part}") for part in ("Goal", "Result", "Feedback")},
-        "SendGoal": service_class(f"{full}_SendGoal"),
-        "GetResult": service_class(f"{full}_GetResult"),
-        "FeedbackMessage": message_class(f"{full}_FeedbackMessage"),
+        **{part: message_of(f"{inner}_{part}", library) for part in ("Goal", "Result", "Feedback")},
+        "SendGoal": service_of(f"{full}_SendGoal", library),
+        "GetResult": service_of(f"{full}_GetResult", library),
+        "FeedbackMessage": message_of(f"{full}_FeedbackMessage", library),
     }
     return type(full.rpartition("/")[2], (), members)
 
 
-_MAKERS: dict[str, Callable[[str], type]] = {
-    "msg": message_class,
-    "srv": service_class,
+_MAKERS: dict[str, Callable[[str, Library], type]] = {
+    "msg": message_of,
+    "srv": service_of,
     "action": _action_class,
 }
 
 
-def modules(only: str = "") -> dict[str, ModuleType]:
-    """Return the modules of all packages (``std_msgs``, ``std_msgs.msg``, ...), or of one, by import name."""
+def modules(only: str = "", library: Library = "") -> dict[str, ModuleType]:
+    """Return the modules of all packages (``std_msgs``, ``std_msgs.msg``, ...), or of one, by import name.
+
+    Args:
+        only: Name of the package; empty for all.
+        library: Client library whose classes they have; empty for the graph's.
+    """
     found: dict[str, ModuleType] = {}
     for kind, names in (("msg", types()), ("srv", service_types()), ("action", action_types())):
         by_package: dict[str, list[str]] = {}
         for full in names:
             package = full.split("/")[0]
-            if only in ("", package):
+            if only in ("", package) and not (library == RCLPY and full in _OF_ROS1):
                 by_package.setdefault(package, []).append(full.split("/")[-1])
         for package, listed in by_package.items():
             parent = found.setdefault(package, ModuleType(package))
             parent.__path__ = []
-            inner = _Definitions(package, kind, listed)
+            inner = _Definitions(package, kind, listed, library)
             setattr(parent, kind, inner)
             found[f"{package}.{kind}"] = inner
     return found

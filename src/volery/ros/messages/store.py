@@ -78,6 +78,8 @@ class ServiceType(NamedTuple):
     response: type[Message]
 
 
+ROS1_SPELLING = {"mavros_msgs": {"VFR_HUD": "VfrHud"}}
+"""Types with another spelling in ROS 1: by package, ROS 1's name and ROS 2's."""
 DISTRIBUTIONS = {3: "humble", 4: "iron", 7: "jazzy", 9: "kilted", 10: "lyrical"}
 """ROS 2 distributions by the major version of their rclpy; those between them were no releases."""
 NOT_INSTALLED = "jazzy"
@@ -334,7 +336,7 @@ def message_class(name: str) -> type[Message]:
         described = [
             _describe(rosbags.normalize_fieldname(key), what) for key, what in fields if key != _FILLER
         ]
-        named = {rosbags.normalize_fieldname(label): value for label, _, value in constants}
+        named = [(rosbags.normalize_fieldname(label), kind, value) for label, kind, value in constants]
         made = make_class(full, _BASES.get(full, Message if described else Nothing), named, described)
         _classes[full] = made
         store().types[full] = made  # what bytes are decoded to

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from volery.base.position import Position
 from volery.components.instance import Instance
@@ -35,7 +35,7 @@ from volery.ros.graph import EmbeddedGraph, Node, RosGraph
 from volery.ros.graph.embedded_graph import record_all
 from volery.ros.graph.graph_context import Records
 from volery.ros.graph.unserved import Surroundings
-from volery.ros.messages import Workspace, define_imported
+from volery.ros.messages import Library, Workspace, define_imported
 from volery.run.assembly.component_ends import ComponentEnds
 from volery.run.assembly.computers import Platform, commanded_by, is_node
 from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
@@ -437,6 +437,7 @@ def python_program(system: System, model: InstanceModel, loader: Loader) -> Prog
         chosen = ""
     elif component.language in PYTHON_ROS and not component.stated_class:
         chosen = script_or_class(path, chosen, component.where)
+    library = component.language if component.language in PYTHON_ROS else ""
     program = load_program(
         loader,
         model.name,
@@ -445,6 +446,7 @@ def python_program(system: System, model: InstanceModel, loader: Loader) -> Prog
         component.where,
         arguments=model.arguments,
         function=component.main,
+        library=cast("Library", library),
     )
     if isinstance(program, ClassProgram):
         for signature in provided_operations(system, model).values():

@@ -227,7 +227,7 @@ def test_ros_1_spelling_of_stamps_and_headers() -> None:
     assert (header.stamp.secs, header.stamp.nsecs, header.stamp.to_nsec()) == (1, 2, 1_000_000_002)
     header.stamp.secs = 3
     header.seq = 7
-    assert (header.stamp.sec, header.seq) == (3, 0)
+    assert (header.stamp.sec, header.seq) == (3, 7)
     assert messages.from_cdr("std_msgs/Header", messages.to_cdr(header)).stamp.sec == 3
 
 

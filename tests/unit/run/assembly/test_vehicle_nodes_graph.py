@@ -5,6 +5,7 @@ from __future__ import annotations
 from random import Random
 from typing import Any
 
+import numpy as np
 import pytest
 
 from volery.base.time import MS, S
@@ -74,7 +75,7 @@ class Pair:
 
 def test_whole_it_passes_everything_in_two_milliseconds_and_records_nothing() -> None:
     pair = Pair()
-    assert pair.say(100) == [number + 0.1 for number in range(100)]
+    assert pair.say(100) == [float(np.float32(number + 0.1)) for number in range(100)]
     assert pair.heard[0][0] == 2 * MS
     assert not [event for event in pair.events if type(event).__name__ in ("Message", "Published", "Charge")]
 

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns, S, from_seconds
 from volery.kernel.waiting import Signal
+from volery.ros.client_libraries.library_base import caller
 from volery.ros.client_libraries.rclpy.context import Context, InvalidHandle, RCLError
 from volery.ros.client_libraries.rclpy.events import (
     PublisherEventCallbacks,
@@ -21,6 +22,7 @@ from volery.ros.client_libraries.rclpy.ros_time import Clock
 from volery.ros.graph import CallFailedError, EmbeddedGraph, RosGraph, ServiceError, Work
 from volery.ros.graph import Node as GraphNode
 from volery.ros.messages import Message, from_cdr, to_cdr
+from volery.ros.messages.client_classes import Odd, adopt, library_of, receiving, take_odd_values
 
 
 class EntityNode(Protocol):
@@ -48,6 +50,9 @@ class EntityNode(Protocol):
     def execute(self, callback: Callable[..., Any], *args: Any) -> Future | None:
         """Run a callback; return the task of one that is a coroutine function."""
 
+    def get_logger(self) -> Any:
+        """Return the logger of the node."""
+
 
 def type_name(caller: str, given: Any) -> str:
     """Return the name of a message class; raise ``TypeError`` in the name of *caller* for anything else."""
@@ -63,6 +68,9 @@ def service_name(caller: str, given: Any) -> str:
     if not name or not hasattr(given, "Request"):
         raise TypeError(f"{caller}: {given!r} is no service class; import one, as in std_srvs.srv")
     return str(name)
+
+
+_REMEDY = "convert it to the field's type: float(), bool(), int()"
 
 
 class Publisher:
@@ -81,6 +89,7 @@ class Publisher:
         name = node.absolute_name(topic)
         kind = type_name("create_publisher", msg_type)
         self._node = node
+        self._warned: set[str] = set()
         self._made = node.graph_node.advertise(name, kind, graph_qos(self.qos_profile))
         self.topic = self.topic_name = self._made.topic
         if events is not None and events[0] is not None:
@@ -89,10 +98,23 @@ class Publisher:
     def publish(self, msg: Any) -> None:
         """Publish a message, or the bytes of one; raise ``TypeError`` if it is of another type."""
         if isinstance(msg, bytes):
-            msg = from_cdr(self.msg_type.__msgtype__, msg)
-        if not isinstance(msg, self.msg_type):
+            msg = adopt(from_cdr(self.msg_type.__msgtype__, msg), library_of(self.msg_type))
+        if not isinstance(msg, self.msg_type.of_graph):
             raise TypeError(f"Expected {self.msg_type}, got {type(msg)}")
         self._made.publish(msg)
+        for one in take_odd_values(msg):
+            self._warn(one)
+
+    def _warn(self, odd: Odd) -> None:
+        """Log once a source line and field that rclpy sends another value than it is given."""
+        where = caller(2)
+        text = (
+            f"{where.file}:{where.line}: {self.topic_name}: {odd.path} is {odd.given!r}, a "
+            f"{type(odd.given).__name__}; rclpy sends {odd.sent!r} ({_REMEDY})"
+        )
+        if text not in self._warned:
+            self._warned.add(text)
+            self._node.get_logger().warning(text)
 
     @property
     def logger_name(self) -> str:
@@ -170,6 +192,7 @@ class Subscription:
         self.callback_group: CallbackGroup = queue.group
         self.raw = raw
         kind = type_name("create_subscription", msg_type)
+        self._adopt = receiving(msg_type)
         self._node = node
         self._wants_info = _wants_info(callback)
         self._received = 0
@@ -183,6 +206,8 @@ class Subscription:
 
     def _call(self, message: Any) -> None:
         given = to_cdr(message) if self.raw else message
+        if self._adopt is not None and not self.raw:
+            self._adopt(message)
         if not self._wants_info:
             self._node.execute(self.callback, given)
             return
@@ -242,6 +267,7 @@ class Service:
         queue.add(self)
 
     def _handle(self, request: Any) -> Any:
+        adopt(request, library_of(self.srv_type.Request))
         return self._checked(self.callback(request, self.srv_type.Response()))
 
     def _checked(self, response: Any) -> Any:
@@ -251,6 +277,7 @@ class Service:
 
     def _await_response(self, request: Any) -> Any:
         """Let the executor run the coroutine; wait for its result in a task beside the executor."""
+        adopt(request, library_of(self.srv_type.Request))
         started: list[Future] = []
 
         def start() -> None:
@@ -320,7 +347,7 @@ class Client:
     def _send(self, request: Any, executor: Executor | None) -> Future:
         if self._destroyed:
             raise InvalidHandle("the client was destroyed")
-        if not isinstance(request, self.srv_type.Request):
+        if not isinstance(request, self.srv_type.Request.of_graph):
             raise TypeError(f"Expected {self.srv_type.Request}, got {type(request)}")
         future = Future(executor=executor)
         self._pending.append(future)
@@ -335,6 +362,7 @@ class Client:
                 failure = error
                 self._enqueue(lambda: future.set_exception(failure))
             else:
+                adopt(response, library_of(self.srv_type.Response))
                 self._enqueue(lambda: future.set_result(response))
 
         context.spawn(call, f"call of {self.srv_name}")

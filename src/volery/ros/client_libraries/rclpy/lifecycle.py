@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from volery.ros.client_libraries.rclpy.entities import Publisher
 from volery.ros.client_libraries.rclpy.node import Node
 from volery.ros.messages import message_class, new
-from volery.ros.messages.packages import service_class
+from volery.ros.messages.client_classes import service_of
 
 
 class TransitionCallbackReturn(IntEnum):
@@ -191,7 +191,7 @@ class LifecycleNode(Node, ManagedEntity):
             ("get_available_transitions", "GetAvailableTransitions", self._handle_transitions),
             ("get_transition_graph", "GetAvailableTransitions", self._handle_graph),
         ):
-            self.create_service(service_class(f"lifecycle_msgs/srv/{kind}"), f"~/{name}", answer)
+            self.create_service(service_of(f"lifecycle_msgs/srv/{kind}"), f"~/{name}", answer)
 
     def create_lifecycle_publisher(self, msg_type: Any, topic: str, qos_profile: Any, **options: Any) -> Any:
         """Create a publisher that publishes only while the node is active."""

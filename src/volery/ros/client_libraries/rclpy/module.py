@@ -45,6 +45,7 @@ from volery.ros.client_libraries.rclpy.node import Node
 from volery.ros.client_libraries.rclpy.qos import QOS, graph_qos
 from volery.ros.graph import Node as GraphNode
 from volery.ros.graph import RosGraph
+from volery.ros.messages.client_classes import RCLPY, adopt, library_of
 
 
 def modules(
@@ -76,7 +77,7 @@ def modules(
         above, _, last = f"rclpy.{part}".rpartition(".")
         made = found[f"rclpy.{part}"] = library_module(f"rclpy.{part}", inside, REFUSED)
         setattr(found[above], last, made)
-    return {**messages.modules(), **found}
+    return {**messages.modules(library=RCLPY), **found}
 
 
 def _bound_classes(contexts: Contexts) -> dict[str, Any]:
@@ -301,9 +302,8 @@ def serialize_message(message: Any) -> bytes:
 
 def deserialize_message(serialized_message: bytes, message_type: Any) -> Any:
     """Return the message in bytes of CDR."""
-    return messages.from_cdr(
-        entities.type_name("deserialize_message", message_type), bytes(serialized_message)
-    )
+    kind = entities.type_name("deserialize_message", message_type)
+    return adopt(messages.from_cdr(kind, bytes(serialized_message)), library_of(message_type))
 
 
 def check_is_valid_msg_type(msg_type: Any) -> None:

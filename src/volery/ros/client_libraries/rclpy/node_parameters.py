@@ -22,7 +22,7 @@ from volery.ros.client_libraries.rclpy.context import (
 )
 from volery.ros.graph import Node
 from volery.ros.messages import new
-from volery.ros.messages.packages import service_class
+from volery.ros.messages.client_classes import service_of
 
 _RESULT = "rcl_interfaces/msg/SetParametersResult"
 _DESCRIPTOR = "rcl_interfaces/msg/ParameterDescriptor"
@@ -530,4 +530,4 @@ def serve_parameters(node: NodeParameters, create_service: Callable[..., object]
         return respond
 
     for name, (kind, handler) in _SERVICES.items():
-        create_service(service_class(f"rcl_interfaces/srv/{kind}"), f"~/{name}", callback(handler))
+        create_service(service_of(f"rcl_interfaces/srv/{kind}"), f"~/{name}", callback(handler))

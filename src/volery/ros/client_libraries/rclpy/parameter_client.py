@@ -16,7 +16,7 @@ from volery.ros.client_libraries.rclpy.node import Node
 from volery.ros.client_libraries.rclpy.node_parameters import Parameter
 from volery.ros.client_libraries.rclpy.qos import qos_profile_parameter_events
 from volery.ros.messages import message_class, new
-from volery.ros.messages.packages import service_class
+from volery.ros.messages.client_classes import service_of
 
 # -- values in text
 
@@ -118,7 +118,7 @@ class AsyncParameterClient:
         self.node, self.remote_node_name = node, remote_node_name
         self._clients = {
             name: node.create_client(
-                service_class(f"rcl_interfaces/srv/{kind}"),
+                service_of(f"rcl_interfaces/srv/{kind}"),
                 f"{remote_node_name}/{name}",
                 callback_group=callback_group,
             )

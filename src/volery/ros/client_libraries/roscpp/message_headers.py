@@ -9,7 +9,7 @@ from pathlib import Path
 from volery.base.errors import UsageError
 from volery.ros import messages
 from volery.ros.messages.encodings import Constant, FieldLayout, Layout, ros1_layout
-from volery.ros.messages.packages import ROS1_SPELLING
+from volery.ros.messages.store import ROS1_SPELLING
 
 INCLUDE = Path(__file__).parent / "include"
 _HEADER = re.compile(r"^(\w+)/(\w+)\.h$")

@@ -6,9 +6,8 @@ components of a run. As in a launch file, the name of the component names the no
 
 Intended differences from the real library: a missing attribute is reported with the available ones; there is
 one thread per subscription and per service request, as in rospy, but two threads never execute Python code at
-the same instant; connecting takes no time; ``Header.seq`` is always 0; a ``Quaternion`` is initially the
-identity (as in ROS 2), not zero; a node joins ``/rosout`` when it logs its first line that has a subscriber;
-at the end of a run shutdown hooks are called, but the code after ``spin`` is not executed.
+the same instant; connecting takes no time; a node joins ``/rosout`` when it logs its first line that has a
+subscriber; at the end of a run shutdown hooks are called, but the code after ``spin`` is not executed.
 """
 
 from volery.ros.client_libraries.library_base import Launch

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
@@ -17,6 +17,7 @@ from volery.ros.client_libraries.rospy.session import (
 )
 from volery.ros.graph import BEST_AVAILABLE, LATCHED, QoS, ServiceError, Subscription
 from volery.ros.messages import Message, ros1_type, to_ros1
+from volery.ros.messages.client_classes import adopt, library_of, receiving
 
 _TYPE_POLL: Ns = 100 * MS
 """Period at which an ``AnyMsg`` subscription looks for the type of its topic."""
@@ -112,6 +113,7 @@ class Publisher:
         qos = LATCHED if latch else QoS(queue_size or None)
         self.data_class = data_class
         self.type = type_name("Publisher", data_class)
+        self._count: int | None = 0 if getattr(data_class, "_has_header", False) else None
         self._publisher = session.node.advertise(name, self.type, qos)
         self.name = self.resolved_name = self._publisher.topic
 
@@ -120,9 +122,12 @@ class Publisher:
         if not self._session.initialised:
             raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
         if len(args) == 1 and not fields and isinstance(args[0], Message):
-            message = args[0]
+            message: Any = args[0]
         else:
             message = _message(self.data_class, args, fields)
+        if self._count is not None:
+            self._count += 1
+            message.header.seq = self._count
         try:
             self._publisher.publish(message)
         except UsageError as error:
@@ -140,7 +145,7 @@ class Publisher:
 def _message(data_class: Any, args: tuple[Any, ...], fields: dict[str, Any]) -> Any:
     try:
         return data_class(*args, **fields)
-    except TypeError as error:
+    except (TypeError, AttributeError) as error:
         raise ROSSerializationException(f"{data_class.__msgtype__}: {error}") from error
 
 
@@ -164,6 +169,7 @@ class Subscriber:
         self.data_class = data_class
         self.callback = callback
         self._args = callback_args
+        self._received: Callable[[Any], Any] | None = None
         topic = self.name = self.resolved_name = session.node.resolve(name)
         qos = _subscriber_qos(queue_size)
         self._subscription: AnySubscription | Subscription
@@ -173,12 +179,16 @@ class Subscriber:
             return
         self.type = type_name("Subscriber", data_class)
         group = session.spinning_group(topic, f"callback of {topic}")
-        call = self._call if callback is None or callback_args is not None else callback
+        self._received = receiving(data_class)
+        simple = callback is not None and callback_args is None and self._received is None
+        call = cast("Callable[[Any], None]", callback) if simple else self._call
         self._subscription = session.node.subscribe(name, self.type, call, qos, group)
 
     def _call(self, message: Any) -> None:
         if self.callback is None:
             return
+        if self._received is not None:
+            self._received(message)
         if self._args is None:
             self.callback(message)
         else:
@@ -212,7 +222,7 @@ def wait_for_message(session: Session, topic: str, data_class: Any, timeout: Ns 
     session.check()
     if not received:
         raise ROSException(f"timeout exceeded while waiting for message on topic {subscription.topic}")
-    return received[0]
+    return adopt(received[0], library_of(data_class))
 
 
 def _service_type(caller: str, service_class: Any) -> str:
@@ -249,6 +259,7 @@ class Service:
         self.resolved_name = resolved
 
     def _handle(self, request: Any) -> Any:
+        adopt(request, library_of(self.service_class._request_class))
         return _to_response(self.service_class, self._handler(request))
 
     def spin(self) -> None:
@@ -304,10 +315,10 @@ class ServiceProxy:
         given = len(args) == 1 and not fields and isinstance(args[0], kind)
         try:
             request = args[0] if given else kind(*args, **fields)
-            return self._client.call(request)
+            return adopt(self._client.call(request), library_of(kind))
         except ServiceError as error:
             raise ServiceException(f"service [{self.resolved_name}]: {error.what}") from error
-        except TypeError as error:
+        except (TypeError, AttributeError) as error:
             raise ServiceException(f"service [{self.resolved_name}]: bad request: {error}") from error
 
     def wait_for_service(self, timeout: Any = None) -> None:

@@ -27,6 +27,7 @@ from volery.ros.client_libraries.rospy.session import (
     as_ns,
 )
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
+from volery.ros.messages.client_classes import ROSPY, message_of
 from volery.trace.events import Text
 
 LEVELS = {"DEBUG": 1, "INFO": 2, "WARN": 4, "ERROR": 8, "FATAL": 16}
@@ -202,10 +203,11 @@ def modules(
     sessions = Sessions(graph, launched, nodes, at_end)
     names: dict[str, Any] = {**EXCEPTIONS, **LEVELS, **loggers(sessions), **_functions(sessions)}
     for kind in _BOUND:
-        names[kind.__name__] = type(kind.__name__, (kind,), {"__slots__": (), "sessions": sessions})
+        members = {"__slots__": (), "__module__": kind.__module__, "sessions": sessions}
+        names[kind.__name__] = type(kind.__name__, (kind,), members)
     names["Duration"] = Duration
     names["TimerEvent"] = TimerEvent
-    names["Header"] = messages.message_class("std_msgs/msg/Header")
+    names["Header"] = message_of("std_msgs/msg/Header", ROSPY)
     names["Message"] = messages.Message
     names["AnyMsg"] = entities.AnyMsg
     parts: dict[str, Mapping[str, Any]] = {
@@ -216,7 +218,7 @@ def modules(
     }
     found = {f"rospy.{part}": library_module(f"rospy.{part}", inside) for part, inside in parts.items()}
     rospy = library_module("rospy", {**names, **{part: found[f"rospy.{part}"] for part in parts}})
-    return {**messages.modules(), "rospy": rospy, **found}
+    return {**messages.modules(library=ROSPY), "rospy": rospy, **found}
 
 
 def numpy_msg(msg_type: Any) -> Any:

@@ -19,7 +19,7 @@ from volery.kernel.task import Scope
 from volery.kernel.waiting import Signal, current_task, read_clock
 from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComponents, Rosout
 from volery.ros.graph import LATCHED, Group, Node, RosGraph, Work
-from volery.ros.messages import message_class
+from volery.ros.messages.client_classes import ROSPY, message_of
 from volery.ros.messages.message import nanoseconds
 from volery.trace.events import Failure, Text
 
@@ -251,24 +251,13 @@ class Sessions(LaunchedComponents):
         return node.now()
 
 
-_TimeMessage: Any = message_class("builtin_interfaces/msg/Time")
-_DurationMessage: Any = message_class("builtin_interfaces/msg/Duration")
+_TimeMessage: Any = message_of("builtin_interfaces/msg/Time", ROSPY)
+_DurationMessage: Any = message_of("builtin_interfaces/msg/Duration", ROSPY)
 
 
 def as_ns(value: Any) -> Ns:
     """Return a number of seconds, or a ``Duration``, in ns."""
     return from_seconds(value) if isinstance(value, (int, float)) else nanoseconds(value)
-
-
-def _parts(secs: float, nsecs: int) -> tuple[int, int]:
-    whole = _truncated(secs) if isinstance(secs, float) else secs * S
-    return divmod(whole + nsecs, S)
-
-
-def _truncated(seconds: float) -> Ns:
-    """Return seconds in ns, truncated as by genpy: integer and fractional part separately."""
-    whole = int(seconds)
-    return whole * S + int((seconds - whole) * S)
 
 
 class Time(_TimeMessage):  # type: ignore[misc]  # the class is made when this module is loaded
@@ -277,20 +266,10 @@ class Time(_TimeMessage):  # type: ignore[misc]  # the class is made when this m
     __slots__ = ()
     sessions: ClassVar[Sessions]
 
-    def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
-        super().__init__(*_parts(secs, nsecs))
-
     @classmethod
     def now(cls) -> Self:
         """Return the current time."""
         return cls(0, cls.sessions.now())
-
-    @classmethod
-    def from_sec(cls, seconds: float) -> Self:
-        """Return the value of seconds, truncated as by genpy."""
-        return cls(0, _truncated(seconds))
-
-    from_seconds = from_sec
 
 
 class Duration(_DurationMessage):  # type: ignore[misc]  # the class is made when this module is loaded
@@ -298,15 +277,8 @@ class Duration(_DurationMessage):  # type: ignore[misc]  # the class is made whe
 
     __slots__ = ()
 
-    def __init__(self, secs: float = 0, nsecs: int = 0) -> None:
-        super().__init__(*_parts(secs, nsecs))
 
-    @classmethod
-    def from_sec(cls, seconds: float) -> Self:
-        """Return the value of seconds, truncated as by genpy."""
-        return cls(0, _truncated(seconds))
-
-    from_seconds = from_sec
+Time.__module__ = Duration.__module__ = "rospy.rostime"
 
 
 class Rate:

@@ -1,0 +1,761 @@
+"""Classes of messages as rospy and rclpy have them, made of the same definitions as the graph's.
+
+A client library's class is derived from the graph's and has the same slots. A received message, which is a
+copy for its subscription, becomes one of the library in place: only classes are assigned. A list of numbers
+is converted when it is read first, as rospy (tuple, bytes) and rclpy (``array.array``) have it. Publishing
+copies to the graph's class and gives values as the library's encoding does.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import sys
+from array import array
+from collections.abc import Callable
+from functools import cache, partial
+from typing import IO, TYPE_CHECKING, Any, Literal, NamedTuple, cast
+
+import numpy as np
+
+from volery.ros.messages.encodings import from_ros1, ros1_name, ros1_service, ros1_type, to_ros1
+from volery.ros.messages.message import (
+    BYTES,
+    SEQ,
+    DurationValue,
+    Field,
+    Header,
+    Law,
+    Message,
+    Received,
+    Stamp,
+    TimeValue,
+    default_value,
+    generated_copy,
+    plain_number,
+    set_written,
+    slot_of,
+)
+from volery.ros.messages.store import idl_fields, message_class, service
+
+Library = Literal["", "rospy", "rclpy"]
+"""A client library with classes of its own; empty for the graph's classes."""
+ROSPY: Library = "rospy"
+RCLPY: Library = "rclpy"
+_CODES = {
+    "int8": "b", "uint8": "B", "char": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
+    "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
+}  # fmt: skip
+"""Type codes of ``array.array``."""
+_UNSET: Any = object()
+
+
+@cache
+def message_of(name: str, library: Library = "") -> type[Message]:
+    """Return a client library's class of a message type; raise ``UsageError`` if the type is unknown."""
+    of_graph = message_class(name)
+    if not library:
+        return of_graph
+    if of_graph.__msgtype__ != name:
+        return message_of(of_graph.__msgtype__, library)
+    return cast("type[Message]", _rospy_class(of_graph) if library == ROSPY else _rclpy_class(of_graph))
+
+
+@cache
+def service_of(full: str, library: Library = "") -> type:
+    """Return the class of ``from package.srv import Name`` as a client library has it."""
+    pair = service(full)
+    request, response = (message_of(one.__msgtype__, library) for one in (pair.request, pair.response))
+    members: dict[str, Any] = {"_type": full, "_request_class": request, "_response_class": response}
+    if library == ROSPY:
+        members |= {"_type": ros1_name(full), "_md5sum": _Lazy(lambda _: ros1_service(full).md5)}
+    else:
+        members |= {"Request": request, "Response": response}
+    if library == RCLPY:
+        members["__init__"] = _no_instance
+    return type(full.rpartition("/")[2], (), members)
+
+
+def _no_instance(self: Any) -> None:
+    raise NotImplementedError("Service classes can not be instantiated")
+
+
+def library_of(cls: Any) -> Library:
+    """Return the client library of a message class."""
+    return cast("Library", getattr(cls, "client_library", ""))
+
+
+def adopt(message: Any, library: Library) -> Any:
+    """Make a message of the graph one of a client library's class, in place, and return it.
+
+    Only for a message of the caller alone.
+    """
+    if library and isinstance(message, Message):
+        cls: Any = message_of(message.__msgtype__, library)
+        cls._adopt(message)
+    return message
+
+
+def receiving(cls: Any) -> Callable[[Any], Any] | None:
+    """Return what makes a received message one of *cls*, or None if the graph's messages are."""
+    return getattr(cls, "_adopt", None)
+
+
+class _Lazy:
+    """An attribute of a class that is computed when it is read first."""
+
+    def __init__(self, compute: Callable[[Any], Any]) -> None:
+        self._compute = compute
+
+    def __get__(self, instance: Any, owner: Any) -> Any:
+        return self._compute(owner)
+
+
+class _Absent:
+    """An attribute that a class of a client library does not have, though the graph's has it."""
+
+    def __set_name__(self, owner: Any, name: str) -> None:
+        self._name = name
+
+    def __get__(self, instance: Any, owner: Any) -> Any:
+        raise AttributeError(f"{owner.__name__!r} object has no attribute {self._name!r}")
+
+    def __set__(self, instance: Any, value: Any) -> None:
+        raise AttributeError(f"{type(instance).__name__!r} object has no attribute {self._name!r}")
+
+
+def _derived(
+    of_graph: Any, name: str, module: str, library: Library, bases: tuple[type, ...], members: dict[str, Any]
+) -> Any:
+    namespace = {"__slots__": (), "__module__": module, "client_library": library, **members}
+    made: Any = type(name, (*bases, of_graph), namespace)
+    made._adopt = _adopting(made, library)
+    return made
+
+
+def _fields(of_graph: Any) -> list[Field]:
+    return list(of_graph.fields_of)
+
+
+class _Source:
+    """Source of a function with its names."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+        self.names: dict[str, Any] = {"unset": _UNSET}
+
+    def name(self, value: Any) -> str:
+        """Return a name for a value."""
+        label = f"name_{len(self.names)}"
+        self.names[label] = value
+        return label
+
+    def function(self, head: str, title: str) -> Any:
+        """Return the function."""
+        source = f"def function({head}):" + "".join(f"\n    {line}" for line in self.lines)
+        exec(compile(source, f"<{title}>", "exec"), self.names)
+        return self.names["function"]
+
+
+def _adopting(cls: Any, library: Library) -> Callable[[Any], Any]:
+    """Return what makes a message of the graph one of *cls*; it is written at its first use."""
+
+    def first(message: Any) -> Any:
+        writing = _Source()
+        _write_adoption(writing, cls, "message", library)
+        cls._adopt = writing.function("message", f"reception of {cls.__msgtype__}")
+        return cls._adopt(message)
+
+    return first
+
+
+def _write_adoption(writing: _Source, cls: Any, of: str, library: Library) -> None:
+    writing.lines.append(f"{of}.__class__ = {writing.name(cls)}")
+    for one in _fields(cls):
+        inner: Any = message_of(one.nested.__msgtype__, library) if one.nested else None
+        if one.length is not None:
+            if inner is not None:
+                # the class attribute, since the first call replaces it
+                writing.lines.append(f"for item in {of}.{one.name}: {writing.name(inner)}._adopt(item)")
+            elif one.base != "string" and not _as_numpy(one, library):
+                slot = slot_of(cls, one.name)
+                get, put = writing.name(slot.__get__), writing.name(slot.__set__)
+                writing.lines.append(f"{put}({of}, {writing.name(_boxed)}({get}({of})))")
+        elif inner is not None:
+            part = f"part_{len(writing.lines)}"
+            writing.lines.append(f"{part} = {of}.{one.name}")
+            _write_adoption(writing, inner, part, library)
+    if of == "message":
+        writing.lines.append("return message")
+
+
+def _boxed(value: Any) -> Any:
+    return Received(value) if isinstance(value, np.ndarray) else value
+
+
+def _as_numpy(one: Field, library: Library) -> bool:
+    """Return whether a client library has a list of numbers as numpy array, as the graph has."""
+    return library == RCLPY and bool(one.length) and one.base in _CODES
+
+
+def _converting(cls: Any, one: Field, convert: Callable[[Any], Any], put: Callable[[Any], Any] | None) -> Any:
+    """Return the property of a list of numbers; *put* is applied to what is assigned."""
+    slot = slot_of(cls, one.name)
+    get, assign = slot.__get__, slot.__set__
+
+    def read(self: Any) -> Any:
+        value = get(self)
+        if value.__class__ is Received:
+            value = convert(value.array)
+            assign(self, value)
+        return value
+
+    def write(self: Any, value: Any) -> None:
+        assign(self, value if put is None else put(value))
+
+    return property(read, write)
+
+
+# -- rospy
+
+
+def _rospy_class(of_graph: Any) -> Any:
+    name = of_graph.__msgtype__
+    label = ros1_name(name).rpartition("/")[2].replace("_Request", "Request").replace("_Response", "Response")
+    fields = _fields(of_graph)
+    slots = [one.name for one in fields]
+    types = [_ros1_type_of(one) for one in fields]
+    bases: tuple[type, ...] = (_RospyMessage,)
+    if issubclass(of_graph, Header):
+        slots, types = ["seq", *slots], ["uint32", *types]
+    if issubclass(of_graph, TimeValue):
+        bases = (Ros1Time,)
+    elif issubclass(of_graph, DurationValue):
+        bases = (Ros1Duration,)
+    members: dict[str, Any] = {
+        "_type": ros1_name(name).replace("_Request", "Request").replace("_Response", "Response"),
+        "_slot_types": types,
+        "_md5sum": _Lazy(lambda _: ros1_type(name).md5),
+        "_full_text": _Lazy(lambda _: ros1_type(name).text),
+        "_has_header": _Lazy(lambda _: ros1_type(name).has_header),
+    }
+    for one in fields:
+        if one.length is not None and one.nested is None and one.base != "string":
+            members[one.name] = _converting(of_graph, one, partial(_as_tuple, one.base), None)
+    package = name.partition("/")[0]
+    stamps = issubclass(of_graph, Stamp)
+    module = "genpy.rostime" if stamps else f"{package}.{name.split('/')[1]}._{label}"
+    made = _derived(of_graph, label, module, ROSPY, bases, members)
+    if not stamps:
+        made.__slots__ = slots
+        made.__init__ = _rospy_init(made, of_graph, fields, slots)
+    return made
+
+
+def _ros1_type_of(one: Field) -> str:
+    base = ros1_name(one.nested.__msgtype__) if one.nested else one.base.replace("octet", "byte")
+    base = {"builtin_interfaces/Time": "time", "builtin_interfaces/Duration": "duration"}.get(base, base)
+    return base if one.length is None else f"{base}[{one.length or ''}]"
+
+
+def _as_tuple(base: str, values: Any) -> Any:
+    if base in ("uint8", "char"):
+        return values.tobytes()
+    return tuple((values.view(np.int8) if base in BYTES else values).tolist())
+
+
+def _rospy_init(cls: Any, of_graph: Any, fields: list[Field], slots: list[str]) -> Callable[..., None]:
+    """Return ``__init__``: no arguments, all fields in order, or some by name; None means the default."""
+    writing = _Source()
+    defaults = {one.name: _rospy_default(one) for one in fields} | ({"seq": "0"} if "seq" in slots else {})
+    for key, value in list(defaults.items()):
+        if callable(value):
+            defaults[key] = f"{writing.name(value)}()"
+    count = len(slots)
+    writing.lines += [
+        "if args:",
+        "    if fields: raise TypeError('Message constructor may only use args OR keywords, not both')",
+        f"    if len(args) != {count}: raise TypeError('Invalid number of arguments, args should be '"
+        f"{str(slots)!r} ' args are' + str(args))",
+        f"    {''.join(f'{one}, ' for one in (f'value_{slot}' for slot in slots))} = args" if count else "",
+        "elif fields:",
+        "    for one in fields:",
+        f"        if one not in known: raise AttributeError(one + ' is not an attribute of {cls.__name__}')",
+        *(f"    value_{slot} = fields.get({slot!r})" for slot in slots),
+        "else:",
+        *(f"    self.{slot} = {defaults[slot]}" for slot in slots),
+        "    return",
+        *(f"self.{slot} = {defaults[slot]} if value_{slot} is None else value_{slot}" for slot in slots),
+    ]
+    writing.lines = [line for line in writing.lines if line]
+    if issubclass(of_graph, Header):
+        writing.lines.insert(0, f"self.{SEQ} = 0")
+    writing.names["known"] = frozenset(slots)
+    init: Callable[..., None] = writing.function("self, *args, **fields", f"{cls.__name__} of rospy")
+    return init
+
+
+def _rospy_default(one: Field) -> Any:
+    """Return the source of a field's default, or what makes it."""
+    if one.nested is not None:
+        nested = message_of(one.nested.__msgtype__, ROSPY)
+        count = one.length
+        return nested if count is None else lambda: [nested() for _ in range(count)]
+    if one.length is None:
+        zero: Any = "" if one.base == "string" else False if one.base == "bool" else 0
+        return repr(float(zero) if one.base.startswith("float") else zero)
+    if one.base in ("uint8", "char"):
+        return repr(bytes(one.length))
+    zero = "" if one.base == "string" else False if one.base == "bool" else 0
+    return f"[{float(zero) if one.base.startswith('float') else zero!r}] * {one.length}"
+
+
+class _RospyMessage:
+    """What rospy's messages have beside their fields."""
+
+    __slots__: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return _yaml(self)
+
+    __repr__ = __str__
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, type(self)):
+            return False
+        return all(getattr(self, one) == getattr(other, one) for one in type(self).__slots__)
+
+    __hash__: Any = None
+
+    def __getstate__(self) -> list[Any]:
+        return [getattr(self, one) for one in type(self).__slots__]
+
+    def __setstate__(self, state: list[Any]) -> None:
+        for name, value in zip(type(self).__slots__, state, strict=True):
+            setattr(self, name, value)
+
+    def _get_types(self) -> list[str]:
+        return list(cast("Any", self)._slot_types)
+
+    def _check_types(self, exc: Exception | None = None) -> None:
+        to_ros1(cast("Message", self))
+
+    def serialize(self, buff: IO[bytes]) -> None:
+        """Write the message's ROS 1 bytes to a file-like object."""
+        data = to_ros1(cast("Message", self))
+        if cast("Any", self)._has_header:
+            data = struct.pack("<I", cast("Any", self).header.seq) + data[4:]
+        buff.write(data)
+
+    def deserialize(self, str: bytes) -> Any:  # noqa: A002 - rospy's name
+        """Read the fields from ROS 1 bytes; return the message."""
+        cls: Any = type(self)
+        made = cls._adopt(from_ros1(cls.__msgtype__, str))
+        for one in cls.__slots__:
+            setattr(self, one, getattr(made, one))
+        if cls._has_header:
+            cast("Any", self).header.seq = struct.unpack("<I", str[:4])[0]
+        return self
+
+
+def _yaml(value: Any, indent: str = "") -> str:
+    """Return a value of a message as rospy prints it."""
+    if isinstance(value, Stamp):
+        return f"{indent}secs: {value.secs}\n{indent}nsecs: {value.nsecs:9d}"
+    if isinstance(value, _RospyMessage | Message):
+        names = type(value).__slots__ if isinstance(value, _RospyMessage) else value.__match_args__
+        return "\n".join(
+            f"{indent}{name}: {_yaml_inside(getattr(value, name), indent)}" for name in cast("Any", names)
+        )
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False) if value else "''"
+    return str(value)
+
+
+def _yaml_inside(value: Any, indent: str) -> str:
+    if isinstance(value, Message):
+        return f"\n{_yaml(value, indent + '  ')}"
+    if isinstance(value, bytes | list | tuple | np.ndarray):
+        values = list(value)
+        if not values:
+            return "[]"
+        inner = indent + "  "
+        if isinstance(values[0], Stamp | Message):
+            return "".join(f"\n{inner}- \n{_yaml(one, inner + '  ')}" for one in values)
+        if isinstance(values[0], str):
+            return "".join(f"\n{inner}- {one}" for one in values)
+        return str(values)
+    return _yaml(value)
+
+
+_SECOND = 1_000_000_000
+
+
+class _Ros1Stamp:
+    """Arithmetic of genpy's times and durations: a value takes part in its own kind's only."""
+
+    __slots__ = ()
+    if TYPE_CHECKING:  # of the message
+        sec: Any
+        nanosec: Any
+
+    def __init__(self, secs: Any = 0, nsecs: int = 0) -> None:
+        if not isinstance(secs, int):
+            if nsecs:
+                raise ValueError("if secs is a float, nsecs cannot be set")
+            whole = int(secs)
+            secs, nsecs = whole, int((secs - whole) * _SECOND)
+        self.set(*divmod(secs * _SECOND + nsecs, _SECOND))
+        if self.sec < 0 and isinstance(self, TimeValue):
+            raise TypeError("time values must be positive")
+
+    @classmethod
+    def from_sec(cls, float_secs: float) -> Any:
+        """Return the value of seconds; the integer and the fractional part are truncated by themselves."""
+        whole = int(float_secs)
+        return cls(whole, int((float_secs - whole) * _SECOND))
+
+    from_seconds = from_sec
+
+    def to_nsec(self) -> int:
+        """Return the value in ns."""
+        return int(self.sec * _SECOND + self.nanosec)
+
+    def set(self, secs: int, nsecs: int) -> None:
+        """Set seconds and nanoseconds."""
+        self.sec = secs
+        self.nanosec = nsecs
+
+    def canon(self) -> None:
+        """Carry whole seconds from the nanoseconds."""
+        self.set(*divmod(self.to_nsec(), _SECOND))
+
+    def __str__(self) -> str:
+        return str(self.to_nsec())
+
+    def __repr__(self) -> str:
+        return f"{type(self).__module__.partition('.')[0]}.{type(self).__name__}[{self.to_nsec()}]"
+
+    def __hash__(self) -> int:
+        return hash((self.sec, self.nanosec))
+
+    def _ns(self, other: Any) -> int | None:
+        """Return another value of the same kind in ns, or None."""
+        kind = TimeValue if isinstance(self, TimeValue) else DurationValue
+        return other.to_nsec() if isinstance(other, kind) else None
+
+    def __eq__(self, other: object) -> bool:
+        ns = self._ns(other)
+        return ns is not None and self.to_nsec() == ns
+
+    def __lt__(self, other: Any) -> Any:
+        ns = self._ns(other)
+        return NotImplemented if ns is None else self.to_nsec() < ns
+
+    def __le__(self, other: Any) -> Any:
+        ns = self._ns(other)
+        return NotImplemented if ns is None else self.to_nsec() <= ns
+
+    def __gt__(self, other: Any) -> Any:
+        ns = self._ns(other)
+        return NotImplemented if ns is None else self.to_nsec() > ns
+
+    def __ge__(self, other: Any) -> Any:
+        ns = self._ns(other)
+        return NotImplemented if ns is None else self.to_nsec() >= ns
+
+
+class Ros1Time(_Ros1Stamp):
+    """``genpy.Time``: a point in time, never negative."""
+
+    __slots__ = ()
+
+    def to_time(self) -> float:
+        """Return the value in s."""
+        return cast("Stamp", self).to_sec()
+
+    def __add__(self, other: Any) -> Any:
+        if not isinstance(other, DurationValue):
+            return NotImplemented
+        return type(self)(0, self.to_nsec() + other.to_nsec())
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        if isinstance(other, TimeValue):
+            return message_of("builtin_interfaces/msg/Duration", ROSPY)(0, self.to_nsec() - other.to_nsec())
+        if not isinstance(other, DurationValue):
+            return NotImplemented
+        return type(self)(0, self.to_nsec() - other.to_nsec())
+
+
+class Ros1Duration(_Ros1Stamp):
+    """``genpy.Duration``; a negative one has negative seconds and nanoseconds that count upward."""
+
+    __slots__ = ()
+
+    def _of(self, ns: int) -> Any:
+        return type(self)(0, ns)
+
+    def __neg__(self) -> Any:
+        return self._of(-self.to_nsec())
+
+    def __abs__(self) -> Any:
+        return self._of(abs(self.to_nsec()))
+
+    def __add__(self, other: Any) -> Any:
+        return (
+            self._of(self.to_nsec() + other.to_nsec()) if isinstance(other, DurationValue) else NotImplemented
+        )
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        return (
+            self._of(self.to_nsec() - other.to_nsec()) if isinstance(other, DurationValue) else NotImplemented
+        )
+
+    def __mul__(self, factor: Any) -> Any:
+        if isinstance(factor, int):
+            return self._of(self.to_nsec() * factor)
+        if isinstance(factor, float):
+            return type(self).from_sec(cast("Stamp", self).to_sec() * factor)
+        return NotImplemented
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, by: Any) -> Any:
+        if isinstance(by, int | float):
+            return type(self).from_sec(cast("Stamp", self).to_sec() / by)
+        if isinstance(by, DurationValue):
+            return cast("Stamp", self).to_sec() / by.to_sec()
+        return NotImplemented
+
+    def __floordiv__(self, by: Any) -> Any:
+        if isinstance(by, int):
+            return self._of(self.to_nsec() // by)
+        if isinstance(by, float):
+            return type(self).from_sec(cast("Stamp", self).to_sec() // by)
+        if isinstance(by, DurationValue):
+            return self.to_nsec() // by.to_nsec()
+        return NotImplemented
+
+    def __mod__(self, by: Any) -> Any:
+        return self._of(self.to_nsec() % by.to_nsec()) if isinstance(by, DurationValue) else NotImplemented
+
+    def __divmod__(self, by: Any) -> Any:
+        return (self // by, self % by) if isinstance(by, DurationValue) else NotImplemented
+
+
+# -- rclpy
+
+
+class Odd(NamedTuple):
+    """A value of another type than its field's, which rclpy sends as something else.
+
+    Attributes:
+        message: The message.
+        path: Path of the field.
+        given: The value.
+        sent: What arrives.
+    """
+
+    message: Any
+    path: str
+    given: Any
+    sent: Any
+
+
+odd_values: list[Odd] = []
+"""What rclpy has sent so far that is not what was given; the publisher takes its own."""
+
+
+def take_odd_values(message: Any) -> list[Odd]:
+    """Return what copying *message* has sent otherwise than given."""
+    if not odd_values:
+        return []
+    found = [one for one in odd_values if one.message is message]
+    odd_values.clear()
+    return found
+
+
+def _c_number(base: str, value: Any, message: Any, path: str) -> Any:
+    """Return what rclpy's generated code in C sends for a value of another type.
+
+    It reads a ``float`` from the object's memory without looking at its type (an int of Python 3.11 has its
+    number of digits there, from 3.12 on a tag), takes nothing but ``True`` as true, and cuts whole numbers.
+    """
+    if base == "bool":
+        sent: Any = value is True
+        same = bool(sent) == bool(value)
+    elif base.startswith("float"):
+        if isinstance(value, float):
+            return float(value)
+        sent = _as_c_double(value)
+        same = sent == value
+    else:
+        limits = np.iinfo(base if base not in BYTES and base != "char" else "uint8")
+        if isinstance(value, bytes) and base in BYTES:
+            return value[0]
+        number = plain_number(base, value, message, path)
+        widest = np.iinfo(np.int64 if limits.min else np.uint64)
+        if not widest.min <= number <= widest.max:
+            raise OverflowError(f"not a {base}")
+        span = 1 << limits.bits
+        sent = (number - limits.min) % span + limits.min
+        same = sent == number
+    if not same:
+        odd_values.append(Odd(message, path, value, sent))
+    return sent
+
+
+def _as_c_double(value: Any) -> float:
+    if isinstance(value, np.generic):
+        data = value.tobytes()[:8].ljust(8, b"\0")
+    elif isinstance(value, int):
+        digits = -(-abs(value).bit_length() // sys.int_info.bits_per_digit)
+        if sys.version_info >= (3, 12):
+            sign = 0 if value > 0 else 1 if value == 0 else 2
+            data = struct.pack("<Q", digits << 3 | sign)
+        else:
+            data = struct.pack("<q", -digits if value < 0 else digits)
+    else:
+        raise TypeError("not a float")
+    return float(struct.unpack("<d", data)[0])
+
+
+_C = Law(_c_number, infinite=True, wraps=True)
+
+
+def _rclpy_class(of_graph: Any) -> Any:
+    name = of_graph.__msgtype__
+    package, kind, label = name.split("/")
+    fields = _fields(of_graph)
+    members: dict[str, Any] = {
+        "get_fields_and_field_types": classmethod(lambda _: dict(idl_fields(name))),
+        "_fields_and_field_types": _Lazy(lambda _: dict(idl_fields(name))),
+    }
+    for one in fields:
+        if one.nested is not None or one.base == "string":
+            continue
+        if one.length is not None:
+            members[one.name] = _rclpy_list(of_graph, one)
+        elif one.base in BYTES:
+            members[one.name] = _rclpy_byte(of_graph, one)
+    if issubclass(of_graph, Header):
+        members |= {"seq": _Absent(), "_values": staticmethod(lambda one: (one.stamp, one.frame_id))}
+    if issubclass(of_graph, Stamp):
+        shown = ("secs", "nsecs", "to_nsec", "to_sec", "to_time", "is_zero")
+        members |= {one: _Absent() for one in shown}
+        members |= {one: getattr(object, one) for one in ("__lt__", "__le__", "__gt__", "__ge__")}
+        operators = ("add", "radd", "sub", "neg", "abs", "mul", "rmul", "truediv", "bool")
+        members |= {f"__{one}__": None for one in operators if hasattr(of_graph, f"__{one}__")}
+        members["__bool__"] = lambda _: True
+    file = "".join(f"_{one.lower()}" if one.isupper() else one for one in label)
+    made = _derived(of_graph, label, f"{package}.{kind}.{file}", RCLPY, (_RclpyMessage,), members)
+    made.__slots__ = [*(f"_{one.name}" for one in fields), "_check_fields"]
+    for constant, value in _byte_constants(of_graph):
+        setattr(made, constant, value)
+    made.__init__ = _rclpy_init(made, of_graph, fields)
+    set_written(made, {one: partial(generated_copy, of_graph, fields, _C) for one in ("_copied", "copy")})
+    return made
+
+
+def _byte_constants(of_graph: Any) -> list[tuple[str, bytes]]:
+    found = of_graph.constants_of
+    return [(name, bytes([value])) for name, base, value in found if base in BYTES and isinstance(value, int)]
+
+
+def _rclpy_list(of_graph: Any, one: Field) -> Any:
+    if one.base not in _CODES:  # bool and byte
+        as_list = (
+            (lambda values: [bytes([item]) for item in values]) if one.base in BYTES else np.ndarray.tolist
+        )
+        return _converting(of_graph, one, as_list, None)
+    if one.length:
+        dtype = np.dtype("uint8" if one.base == "char" else one.base)
+        return _converting(of_graph, one, np.asarray, lambda values: np.array(values, dtype))
+    code = _CODES[one.base]
+
+    def as_array(values: Any) -> array[Any]:
+        made = array(code)
+        made.frombytes(np.ascontiguousarray(values).data.cast("B"))
+        return made
+
+    return _converting(of_graph, one, as_array, lambda values: array(code, values))
+
+
+def _as_bytes(values: Any) -> list[bytes]:
+    return [bytes([one]) for one in values]
+
+
+def _rclpy_byte(of_graph: Any, one: Field) -> Any:
+    slot = slot_of(of_graph, one.name)
+
+    def read(self: Any) -> Any:
+        value = slot.__get__(self)
+        return bytes([value]) if isinstance(value, int) else value
+
+    return property(read, slot.__set__)
+
+
+def _rclpy_init(cls: Any, of_graph: Any, fields: list[Field]) -> Callable[..., None]:
+    """Return ``__init__``, which takes fields by name and ignores what is none, as rclpy's does."""
+    writing = _Source()
+    head = ["self"]
+    for one in fields:
+        default = default_value(of_graph.__msgtype__, one)
+        if one.nested is not None and one.length is None:
+            default = message_of(one.nested.__msgtype__, RCLPY)
+        elif one.nested is not None:
+            nested, count = message_of(one.nested.__msgtype__, RCLPY), one.length or 0
+            default = partial(_several, nested, count)
+        if callable(default):
+            made = writing.name(default)
+            head.append(f"{one.name}=unset")
+            writing.lines.append(f"self.{one.name} = {made}() if {one.name} is unset else {one.name}")
+        else:
+            head.append(f"{one.name}={writing.name(default)}")
+            writing.lines.append(f"self.{one.name} = {one.name}")
+    if issubclass(of_graph, Header):
+        writing.lines.append(f"self.{SEQ} = 0")
+    if fields:
+        head.insert(1, "*")
+    writing.lines.append("return None")
+    init: Callable[..., None] = writing.function(", ".join([*head, "**others"]), f"{cls.__name__} of rclpy")
+    return init
+
+
+def _several(cls: Any, count: int) -> list[Any]:
+    return [cls() for _ in range(count)]
+
+
+class _RclpyMessage:
+    """What rclpy's messages have beside their fields."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        cls: Any = type(self)
+        shown = (f"{one}={_shown(getattr(self, one))}" for one in cls.__match_args__)
+        return f"{cls.__module__.rpartition('.')[0]}.{cls.__name__}({', '.join(shown)})"
+
+    def __eq__(self, other: object) -> bool:
+        cls: Any = type(self)
+        if not isinstance(other, cls):
+            return False
+        return all(_equal(getattr(self, one), getattr(other, one)) for one in cls.__match_args__)
+
+    __hash__: Any = None
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, array):
+        return repr(value)[len("array('f', ") : -1] if value else "[]"
+    return repr(value)
+
+
+def _equal(one: Any, other: Any) -> bool:
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        return bool(np.array_equal(one, other))
+    return bool(one == other)
