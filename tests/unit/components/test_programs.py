@@ -395,7 +395,10 @@ def test_packages_import_as_they_do_elsewhere(desk):
         ("from pkg import nothing", "no module|cannot import|has no attribute 'nothing'"),
         ("from .absent import x", "no module .absent"),
         ("from threading import Barrier", "threading.Barrier is not available in the files of components"),
-        ("from asyncio import run", "asyncio.run is not available in the files of components"),
+        (
+            "from asyncio import open_connection",
+            "asyncio.open_connection is not available in the files of components",
+        ),
         ("import nowhere_to_be_found", "No module named 'nowhere_to_be_found'"),
     ],
 )
@@ -434,3 +437,54 @@ def test_a_component_that_sleeps_only_when_there_is_time_left_misses_each_cycle(
     assert len([one for one in found if one.finished > one.deadline]) == (10 if late else 0)
     responses = sorted((one.finished - one.released) / MS for one in found)
     assert responses[-10:] == ([146.0, *[242.0] * 5, *[338.0] * 4] if late else [20.0] * 10)
+
+
+def test_asyncio_and_pools_of_threads_run_in_virtual_time(desk):
+    path = desk.write(
+        "user.py",
+        """
+        import asyncio
+        import time
+        from concurrent.futures import ThreadPoolExecutor, as_completed, wait
+        from log import tell
+
+        async def after(seconds):
+            await asyncio.sleep(seconds)
+            return seconds
+
+        async def main():
+            begun = time.monotonic()
+            tell(await asyncio.gather(after(0.3), after(0.2)))
+            try:
+                await asyncio.wait_for(after(5), timeout=0.1)
+            except asyncio.TimeoutError:
+                tell("late")
+            await asyncio.to_thread(time.sleep, 0.5)
+            tell(round(time.monotonic() - begun, 3))
+            turns = 0
+            while time.monotonic() < begun + 1.0:  # asks without waiting
+                await asyncio.sleep(0)
+                turns += 1
+            tell(turns > 1)
+
+        def work(seconds):
+            time.sleep(seconds)
+            return seconds
+
+        class User:
+            def run(self):
+                asyncio.run(main())
+                with ThreadPoolExecutor(max_workers=2) as pool:
+                    futures = [pool.submit(work, each) for each in (0.3, 0.1, 0.1)]
+                    tell([one.result() for one in as_completed(futures)])
+                    tell(list(pool.map(work, (0.2, 0.1))))
+                    done, left = wait([pool.submit(work, 1), pool.submit(work, 3)], timeout=2)
+                    tell((len(done), len(left)))
+                    tell(type(pool.submit(work, -1).exception()).__name__)
+        """,
+    )
+    desk.start(path, "User")
+    desk.start(path, "User", "other")
+    desk.kernel.run(20 * S)
+    expected = [[0.3, 0.2], "late", 0.9, True, [0.1, 0.1, 0.3], [0.2, 0.1], (1, 1), "ValueError"]
+    assert sorted(map(str, desk.log)) == sorted(map(str, expected * 2))

@@ -10,14 +10,14 @@ from __future__ import annotations
 from types import ModuleType
 
 from volery.base.time import Ns, S
-from volery.components.virtual_stdlib import process_environment, synchronization
+from volery.components.virtual_stdlib import concurrency, process_environment, synchronization
 from volery.components.virtual_stdlib.process_environment import make_module
 from volery.kernel.api import Kernel
 
 EPOCH: Ns = 1_700_000_000 * S
 """``time.time_ns()`` at the start of a run in virtual time: 2023-11-14 22:13:20 UTC."""
 
-REFUSED = ("asyncio", "concurrent.futures", "multiprocessing", "sched", "selectors", "signal")
+REFUSED = ("multiprocessing", "sched", "selectors", "signal")
 """Modules that wait for the machine's clock or its events; their replacements have no names."""
 
 
@@ -32,6 +32,8 @@ def virtual_modules(kernel: Kernel, seed: int, epoch: Ns = EPOCH) -> dict[str, M
     refused = {name: make_module(name, {}) for name in REFUSED}
     return {
         **refused,
+        **concurrency.asyncio_modules(kernel),
+        "concurrent.futures": concurrency.futures_module(kernel),
         "builtins": process_environment.builtins_module(kernel),
         "time": process_environment.time_module(kernel, epoch),
         "datetime": process_environment.datetime_module(kernel, epoch),

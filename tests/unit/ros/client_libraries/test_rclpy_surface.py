@@ -325,3 +325,23 @@ out(n.declare_parameter("pos.first", 1.0).value)
 out(n.declare_parameter("a-b", 3).value)
 """
     assert said(stage, text) == [2.0, 3]
+
+
+def test_a_node_serves_the_levels_of_its_loggers(stage: Stage) -> None:
+    text = """
+from rcl_interfaces.msg import LoggerLevel
+from rcl_interfaces.srv import GetLoggerLevels, SetLoggerLevels
+m = rclpy.create_node("m", enable_logger_service=True)
+change = n.create_client(SetLoggerLevels, "/m/set_logger_levels")
+ask = n.create_client(GetLoggerLevels, "/m/get_logger_levels")
+executor = rclpy.executors.SingleThreadedExecutor()
+executor.add_node(n)
+executor.add_node(m)
+level = LoggerLevel(name="m", level=LoggerLevel.LOG_LEVEL_ERROR)
+for request in (change.call_async(SetLoggerLevels.Request(levels=[level])),
+                ask.call_async(GetLoggerLevels.Request(names=["m", "other"]))):
+    executor.spin_until_future_complete(request)
+out([one.level for one in request.result().levels])
+out(m.get_logger().info("quiet"))
+"""
+    assert said(stage, text) == [[40, 0], False]

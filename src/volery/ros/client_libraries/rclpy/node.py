@@ -43,7 +43,8 @@ from volery.ros.client_libraries.rclpy.qos import QoSProfile, profile_of
 from volery.ros.client_libraries.rclpy.qos_overrides import QoSOverridingOptions, overridden
 from volery.ros.client_libraries.rclpy.ros_time import Clock, ClockType, Rate
 from volery.ros.graph import RELIABLE, TRANSIENT_LOCAL, EmbeddedGraph, QoS, RosGraph, Work
-from volery.ros.messages import message_class
+from volery.ros.messages import message_class, new
+from volery.ros.messages.packages import service_class
 
 _PARAMETER_EVENTS = "/parameter_events"
 _ROSOUT = QoS(1000, RELIABLE, TRANSIENT_LOCAL)
@@ -97,6 +98,25 @@ class Node(NodeParameters):
                 self._declared.declare(override.name, override.value)
         if services.get("start_parameter_services", True) and isinstance(self.contexts.graph, EmbeddedGraph):
             serve_parameters(self, self.create_service)  # on real ROS the node of the transport serves them
+
+        if services.get("enable_logger_service"):
+            for name, kind, handler in (
+                ("get_logger_levels", "GetLoggerLevels", self._get_logger_levels),
+                ("set_logger_levels", "SetLoggerLevels", self._set_logger_levels),
+            ):
+                self.create_service(service_class(f"rcl_interfaces/srv/{kind}"), f"~/{name}", handler)
+
+    def _get_logger_levels(self, request: Any, response: Any) -> Any:
+        for name in request.names:
+            level = self.contexts.levels.get(name, 0)
+            response.levels.append(new("rcl_interfaces/msg/LoggerLevel", name=name, level=level))
+        return response
+
+    def _set_logger_levels(self, request: Any, response: Any) -> Any:
+        for one in request.levels:
+            self.contexts.levels[one.name] = one.level
+            response.results.append(new("rcl_interfaces/msg/SetLoggerLevelsResult", successful=True))
+        return response
 
     # -- identity
 
