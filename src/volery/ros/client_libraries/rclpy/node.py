@@ -44,7 +44,7 @@ from volery.ros.client_libraries.rclpy.qos_overrides import QoSOverridingOptions
 from volery.ros.client_libraries.rclpy.ros_time import Clock, ClockType, Rate
 from volery.ros.graph import RELIABLE, TRANSIENT_LOCAL, EmbeddedGraph, QoS, RosGraph, Work
 from volery.ros.messages import message_class, new
-from volery.ros.messages.packages import service_class
+from volery.ros.messages.client_classes import service_of
 
 _PARAMETER_EVENTS = "/parameter_events"
 _ROSOUT = QoS(1000, RELIABLE, TRANSIENT_LOCAL)
@@ -104,7 +104,7 @@ class Node(NodeParameters):
                 ("get_logger_levels", "GetLoggerLevels", self._get_logger_levels),
                 ("set_logger_levels", "SetLoggerLevels", self._set_logger_levels),
             ):
-                self.create_service(service_class(f"rcl_interfaces/srv/{kind}"), f"~/{name}", handler)
+                self.create_service(service_of(f"rcl_interfaces/srv/{kind}"), f"~/{name}", handler)
 
     def _get_logger_levels(self, request: Any, response: Any) -> Any:
         for name in request.names:
