@@ -9,7 +9,7 @@ what the autopilot leaves of a command.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import dist, hypot, isfinite, nan
+from math import copysign, dist, hypot, isfinite, nan
 from typing import NamedTuple
 
 from volery.base.errors import ControlLost, OffTrack, ThrustSaturated
@@ -231,9 +231,7 @@ ASKED_M, ASKED_M_S, ASKED_DEG, ASKED_DEG_S = 1.5, 0.4, 30.0, 10.0
 ASKED_LEAN_DEG, ASKED_THRUST = 3.0, 0.35
 """Mean lean, and distance of the thrust from 0.5, from which an effect must show."""
 EFFECT_SHARE, EFFECT_M, EFFECT_DEG, EFFECT_CLIMB_M = 0.1, 0.5, 5.0, 0.3
-"""What counts as an effect: this share of what was asked for, or this way, turn or climb, in any direction: a
-vehicle that is still busy with the set-point before follows.
-"""
+"""What counts as an effect: this share of what was asked for, or this way, turn or climb."""
 
 
 class Demand(NamedTuple):
@@ -263,7 +261,9 @@ class FollowMonitor:
 
     It sums up what is asked for over time, and what comes of it: way, turn, lean and climb. A control loop
     that asks for this and then that asks for nothing in the sum. A vehicle that shows an effect in any of
-    these follows; how well is not judged. Firmware ignores what it does not take without a word:
+    these follows; how well is not judged. Of way by velocity and of turns only what comes in the direction
+    that was asked for counts: a vehicle that swings in front of its own fence, or whose heading is noisy,
+    goes nowhere. Firmware ignores what it does not take without a word:
     ArduCopter from 4.6 on a single body rate, others a set-point beyond their own fence.
 
     Args:
@@ -320,6 +320,9 @@ class FollowMonitor:
         self._enough = None
         self._speed: Vector = (0.0, 0.0, 0.0)  # that accelerations have asked for
         self._way: Vector = (0.0, 0.0, 0.0)
+        self._gone: Vector = (0.0, 0.0, 0.0)
+        self._at_first: Vector = seen.velocity if isfinite(hypot(*seen.velocity)) else (0.0, 0.0, 0.0)
+        self._accelerated = False
         self._turn = self._thrust = 0.0
         self._lean = (0.0, 0.0)
         self._moved = self._turned = self._leant = self._climbed = 0.0
@@ -338,6 +341,7 @@ class FollowMonitor:
         self._summed = seen.moment()
         self._sum_what_came(passed)
         if demand.acceleration is not None:
+            self._accelerated = True
             self._speed = _plus(self._speed, demand.acceleration, passed)
             self._way = _plus(self._way, self._speed, passed)
         elif demand.velocity is not None:
@@ -356,9 +360,10 @@ class FollowMonitor:
         speed = hypot(*self._telemetry.velocity)
         if isfinite(speed):
             self._moved += speed * passed
+            self._gone = _plus(self._gone, self._telemetry.velocity, passed)
             self._climbed += abs(self._telemetry.velocity.up) * passed
         if isfinite(heading):
-            self._turned += abs(_wrapped(heading - self._heading)) if isfinite(self._heading) else 0.0
+            self._turned += _wrapped(heading - self._heading) if isfinite(self._heading) else 0.0
             self._heading = heading
         if isfinite(roll) and isfinite(pitch):
             self._leant += hypot(roll, pitch) * passed
@@ -369,13 +374,18 @@ class FollowMonitor:
         found: list[tuple[bool, str]] = []
         way = hypot(*self._way)
         if way >= max(ASKED_M, ASKED_M_S * seconds):
-            follows = self._moved > min(EFFECT_M, EFFECT_SHARE * way)
-            found.append((follows, f"{way:.1f} m were asked for and {self._moved:.1f} m came"))
-        off = abs(self._off) if isfinite(self._off) else 0.0
-        turn = max(abs(self._turn), off)
-        if off >= ASKED_DEG or turn >= max(ASKED_DEG, ASKED_DEG_S * seconds):
-            words = f"a turn of {turn:.0f} degrees was asked for and {self._turned:.1f} came"
-            found.append((self._turned > EFFECT_DEG, words))
+            came = self._moved  # of an acceleration, which holds a place against wind, too
+            if not self._accelerated:
+                came = _along(self._gone, self._way)
+                came -= min(0.0, _along(self._at_first, self._way) * seconds)  # it brakes first
+            follows = came > min(EFFECT_M, EFFECT_SHARE * way)
+            found.append((follows, f"{way:.1f} m were asked for and {came:.1f} m came"))
+        off = self._off if isfinite(self._off) else 0.0
+        turn = max(self._turn, off, key=abs)
+        if abs(off) >= ASKED_DEG or abs(turn) >= max(ASKED_DEG, ASKED_DEG_S * seconds):
+            came = copysign(1.0, turn) * self._turned
+            words = f"a turn of {abs(turn):.0f} degrees was asked for and {came:.1f} came"
+            found.append((came > EFFECT_DEG, words))
         lean, leant = hypot(*self._lean) / seconds, self._leant / seconds
         if lean >= ASKED_LEAN_DEG:
             words = f"a lean of {lean:.1f} degrees was asked for and {leant:.1f} came"
@@ -385,6 +395,11 @@ class FollowMonitor:
             words = f"a {what} by thrust was asked for and {self._climbed:.1f} m came"
             found.append((self._climbed > EFFECT_CLIMB_M, words))
         return found
+
+
+def _along(one: Vector, way: Vector) -> float:
+    """Return the part of a vector in the direction of *way*, which is not zero."""
+    return sum(mine * other for mine, other in zip(one, way, strict=True)) / hypot(*way)
 
 
 def _plus(one: Vector, other: Sequence[float], factor: float) -> Vector:

@@ -273,6 +273,35 @@ def test_a_vehicle_that_follows_at_least_in_part(demand: Demand, did: dict[str, 
     assert Streamed().asked(demand, **{"seconds": 12.0, **did}) is None
 
 
+@pytest.mark.parametrize(
+    ("demand", "moves", "turns"),
+    [
+        (NORTH, (0.6, 0.0, 0.0), 0.0),  # to and fro, as in front of a fence
+        (NORTH, (0.0, 0.6, 0.0), 0.0),  # across
+        (Demand(velocity=(0.0, 0.0, 0.0), yaw_rate=30.0), (0.0, 0.0, 0.0), 8.0),  # a noisy heading
+    ],
+)
+def test_motion_to_and_fro_leads_nowhere(
+    demand: Demand, moves: tuple[float, float, float], turns: float
+) -> None:
+    streamed = Streamed()
+    found = []
+    for number in range(20):
+        sign = (-1.0) ** number
+        swing = (moves[0] * sign, moves[1] * sign, moves[2] * sign)
+        found.append(streamed.asked(demand, seconds=0.3, moves=swing, turns=turns * sign))
+    assert any(found)
+
+
+def test_a_fast_vehicle_that_is_asked_to_come_back_brakes_first() -> None:
+    streamed = Streamed()
+    speed = -15.0
+    assert streamed.asked(NORTH, seconds=0.1, moves=(speed, 0.0, 0.0)) is None
+    while speed < 2.0:
+        speed += 0.25
+        assert streamed.asked(NORTH, seconds=0.1, moves=(speed, 0.0, 0.0)) is None
+
+
 def test_a_loop_that_asks_for_this_and_that_asks_for_nothing() -> None:
     streamed = Streamed()
     for number in range(40):
