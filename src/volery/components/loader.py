@@ -31,6 +31,7 @@ from typing import Any
 
 from volery.base.errors import ComponentError, Location, ModelError, VoleryError, did_you_mean
 from volery.components.instance import COMPONENT_MARK, Instance, describe
+from volery.components.polling import Polling, empty_turns
 from volery.components.virtual_stdlib.process_modules import ProcessModules
 from volery.cost import StepCounter
 from volery.kernel.task import ExecutionContext
@@ -250,6 +251,7 @@ class Loader:
         replacements: Modules that are imported in place of others, by dotted name. Interface packages are
             added when they are first imported.
         steps: Counter of the code, or None where code is not counted.
+        polling: What lets time pass in loops that poll, or None on the wall clock.
         libraries: Top-level names of imported libraries whose code is not counted: those outside Python's
             own, and ``COMPUTING_MODULES``.
         workspace: The packages that scripts can import.
@@ -258,6 +260,7 @@ class Loader:
 
     replacements: MutableMapping[str, ModuleType] = field(default_factory=dict)
     steps: StepCounter | None = None
+    polling: Polling | None = None
     libraries: set[str] = field(default_factory=set)
     workspace: Workspace = field(default_factory=Workspace)
     host: Host = field(default_factory=Host)
@@ -308,7 +311,9 @@ class Loader:
         code = self._codes.get(source.path)
         if code is None:
             try:
+                empty = empty_turns(source.tree)
                 tree = self.steps.instrument(source.tree) if self.steps else source.tree
+                tree = self.polling.instrument(tree, source.path, empty) if self.polling else tree
                 code = compile(tree, str(source.path), "exec", dont_inherit=True)
             except SyntaxError as error:  # such as a return outside a function: its tree can be made
                 raise not_python(source.path, error) from error
@@ -317,6 +322,8 @@ class Loader:
             self._codes[source.path] = code
         if self.steps:
             module.__dict__.update(self.steps.names())
+        if self.polling:
+            module.__dict__.update(self.polling.names())
         return code
 
     def sibling(self, name: str, folder: Path) -> ModuleType | None:

@@ -77,6 +77,7 @@ class Task:
         self.released: Ns | None = None  # release time of the activation in progress
         self.counted_from: Ns = 0  # the next release is due a period after this
         self.readings: dict[object, Ns] = {}  # last reading of the clock in this activation, by its place
+        self.polls = 0  # calls in this activation that only look whether something has changed
         self.is_activated = True  # False while what it does belongs to no activation, as a construction
         self.done = False
         self.adopted = False  # the flow of a script: the kernel did not start it and cannot end it
@@ -114,6 +115,7 @@ class Task:
         self.released = due
         self.counted_from = due if counted_from is None else counted_from
         self.readings.clear()
+        self.polls = 0
         hook = self.contexts[0].on_release
         if hook is not None:
             hook(self)

@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Generic, Self, TypeVar, overload
 
 from volery.base.errors import UsageError
-from volery.base.time import Ns
+from volery.base.time import US, Ns
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext, Task
 
@@ -70,6 +70,45 @@ def read_clock(kernel: Kernel) -> Ns:
                 _end_if_late(kernel, task, earlier)
             task.readings[place] = now
         return now
+
+
+FREE_POLLS = 1000
+"""Calls of one activation that are no polling yet."""
+POLLS = 64
+POLLED: Ns = 100 * US
+"""Calls of a polling loop, and what they take, ns, after which their time is executed."""
+
+
+def execute_polling(kernel: Kernel, amount: Ns) -> None:
+    """Execute `amount` ns of a loop that polls; without a processor that time passes as well."""
+    before = kernel.now()
+    if kernel.consume(amount) and kernel.now() == before:
+        kernel.sleep_until(before + amount)
+
+
+def poll(kernel: Kernel, price: Ns, *, executed: bool = False) -> bool:
+    """Execute a call that loops repeat until something has changed. An interaction point.
+
+    Such a call is too short to be priced. But after ``FREE_POLLS`` of them in one activation they are what
+    the task spends its time with: each counts `price` ns, which are executed for several of them at once.
+    With *executed* each call executes its price.
+
+    Returns:
+        Whether it is polling.
+    """
+    task = kernel.current()
+    if task is None or task.adopted:
+        return False
+    task.polls += 1
+    if executed and task.contexts[-1].processor is not None:
+        kernel.consume(price)
+        return True
+    if task.polls <= FREE_POLLS:
+        return False
+    together = max(1, min(POLLS, POLLED // price))
+    if task.polls % together == 0:
+        execute_polling(kernel, together * price)
+    return True
 
 
 def _period_of(task: Task) -> Ns | None:

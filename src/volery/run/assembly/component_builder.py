@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 from volery.base.position import Position
 from volery.components.instance import Instance
 from volery.components.loader import Loader
+from volery.components.polling import Polling
 from volery.components.ports import ObservedVehicle, Port, PortList
 from volery.components.programs import (
     ClassProgram,
@@ -24,6 +25,7 @@ from volery.components.virtual_stdlib import virtual_modules
 from volery.cost import StepCounter, library_table
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
+from volery.kernel.virtual import VirtualKernel
 from volery.model.components import VEHICLE_INTERFACES, Signature
 from volery.model.instances import Connection, TargetKind
 from volery.model.instances import Instance as InstanceModel
@@ -237,7 +239,11 @@ class Builder:
         self._cpp = CppPrograms(self._kernel, self._graph, ready, launches, self._nodes, traces)
         modules = importable_modules(self._graph, launches, self._nodes, self._ending.farewell)
         loader = Loader(
-            {**virtual_modules(self._kernel, seed), **modules}, steps, workspace=workspace, host=self._ends
+            {**virtual_modules(self._kernel, seed), **modules},
+            steps,
+            Polling(self._kernel) if isinstance(self._kernel, VirtualKernel) else None,
+            workspace=workspace,
+            host=self._ends,
         )
         self._instances = {model.name: self._instance(model, steps) for model in self._models}
         starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in self._models))

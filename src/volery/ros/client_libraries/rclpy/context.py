@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, S, from_seconds
-from volery.kernel.waiting import Signal, current_task, read_clock
+from volery.kernel.waiting import Signal, current_task, poll, read_clock
 from volery.ros.client_libraries.library_base import (
     AtEnd,
     Caller,
@@ -28,6 +28,10 @@ from volery.ros.client_libraries.library_base import (
 )
 from volery.ros.graph import Node, RosGraph
 from volery.trace.events import Text
+
+OK: Ns = 960
+READ_CLOCK: Ns = 1700
+"""Time of ``rclpy.ok`` and ``Clock.now`` in a loop that polls, ns; of rclpy Jazzy, measured."""
 
 
 class RCLError(RuntimeError):
@@ -199,8 +203,10 @@ class Context:
 
     def ok(self) -> bool:
         """Return whether the context runs. An interaction point, as every call is."""
-        with self.kernel:
-            return self._started
+        if not poll(self.kernel, OK):
+            with self.kernel:
+                pass
+        return self._started
 
     @property
     def running(self) -> bool:
@@ -309,7 +315,8 @@ class Contexts(LaunchedComponents):
 
     def now(self) -> Ns:
         """Return ROS time. An interaction point."""
-        return self.graph.epoch + read_clock(self.kernel)
+        polling = poll(self.kernel, READ_CLOCK)
+        return self.graph.epoch + (self.kernel.now() if polling else read_clock(self.kernel))
 
 
 class LoggingSeverity(IntEnum):

@@ -13,6 +13,7 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, S, from_seconds
+from volery.kernel.waiting import poll
 from volery.ros import messages
 from volery.ros.client_libraries.library_base import AtEnd, Caller, Launch, caller, ignore_end, library_module
 from volery.ros.client_libraries.rospy import entities
@@ -248,11 +249,17 @@ def init_node(
     sessions.join(name, anonymous)
 
 
+IS_SHUTDOWN: Ns = 30
+"""Time of ``is_shutdown`` in a loop that polls, ns; of rospy 1.15, measured."""
+
+
 def is_shutdown(sessions: Sessions) -> bool:
     """Return whether this node is shutting down. An interaction point, as every call is."""
-    with sessions.kernel:
-        session = sessions.find()
-        return session is not None and bool(session.shutdown)
+    if not poll(sessions.kernel, IS_SHUTDOWN):
+        with sessions.kernel:
+            pass
+    session = sessions.find()
+    return session is not None and bool(session.shutdown)
 
 
 def signal_shutdown(sessions: Sessions, reason: str = "") -> None:

@@ -1,0 +1,89 @@
+"""Time passes in loops that poll, others run meanwhile, and the loop is named once."""
+
+from __future__ import annotations
+
+import pytest
+
+from volery.base.time import MS, S
+from volery.components.loader import Loader, parse
+from volery.components.polling import IDLE, Polling
+from volery.cost import StepCounter
+from volery.kernel.task import ExecutionContext
+from volery.kernel.virtual import VirtualKernel
+from volery.trace.events import Text
+
+READY = 200 * MS
+EMPTY = "while not ready: pass\n"
+FULL = "turns = 0\nwhile not ready:\n    turns += 1\n"
+BEGIN = "ready = []\ngive(ready)\nclass poll:\n    ok = staticmethod(lambda: False)\n"
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Execute a file whose list ``ready`` gets an item at 0.2 s; return its end, ns, and the warnings."""
+
+    def execute(text, steps=None):
+        file = tmp_path / "busy.py"
+        file.write_text(BEGIN + text)
+        events = []
+        kernel = VirtualKernel(events.append)
+        loader = Loader({}, steps, Polling(kernel))
+        ends = []
+
+        def body():
+            source = parse(file)
+            module = loader.shared.module("busy", file)
+            module.give = lambda ready: kernel.call_at(READY, lambda: ready.append(1))
+            exec(loader.compile(source, module), vars(module))
+            ends.append(kernel.now())
+
+        kernel.spawn(body, "busy", ExecutionContext("busy"))
+        kernel.run(S)
+        (end,) = ends
+        return end, [event.text for event in events if isinstance(event, Text)]
+
+    return execute
+
+
+IF = """while True:
+    if ready:
+        break
+    elif len(ready) > 1:
+        pass
+"""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [EMPTY, IF.replace("len(ready) > 1", "ready is None"), EMPTY.replace("not", "not poll.ok() and not")],
+)
+@pytest.mark.parametrize("counted", [False, True])
+def test_an_empty_loop_ends_soon_after_what_it_waits_for(run, text, counted):
+    end, warnings = run(text, StepCounter() if counted else None)
+    assert READY <= end <= READY + IDLE
+    assert len(warnings) == 1
+    assert warnings[0].startswith("the loop of busy.py:")
+    assert "has no sleep" in warnings[0]
+
+
+def test_a_loop_that_counts_ends_too_and_computes_for_free_until_it_is_long(run):
+    end, warnings = run(FULL)
+    assert READY <= end <= READY + MS
+    assert [text[:22] for text in warnings] == ["the loop of busy.py:6 "]
+    assert run("n = 0\nwhile n < 15000: n += 1\n") == (0, [])
+
+
+def test_turns_are_counted_so_that_each_run_is_the_same(run):
+    assert run(FULL) == run(FULL)
+
+
+@pytest.mark.parametrize("counted", [False, True])
+def test_only_the_turns_that_do_nothing_wait(run, counted):
+    text = "n = 0\nwhile n < 900:\n    if n < 899: n += 1\n    elif ready: n += 1\n"
+    end, _ = run(text, StepCounter() if counted else None)
+    assert READY <= end <= READY + IDLE
+
+
+def test_a_condition_that_calls_is_no_empty_loop(run):
+    end, warnings = run("items = iter(range(100))\nwhile next(items) < 90: pass\n")
+    assert (end, warnings) == (0, [])
