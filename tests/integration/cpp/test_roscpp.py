@@ -75,6 +75,39 @@ def test_two_nodes_talk(run_model):
     }
 
 
+QUEUES = """
+volery: 1
+name: queues
+components:
+  Queues:
+    language: roscpp
+    path: queues.cpp
+    build: {flags: -O0}
+    active: true
+    at: {processor: intel-i5-3470, frequency: 3000 MHz}
+    activation: {time: 10 us}
+application: {queues: {is: Queues}}
+platform: {processors: {pc: {is: intel-i5-3470, frequency: 3000 MHz}}}
+allocations: {only: {queues: pc}}
+run: {duration: 10 s}
+"""
+FORMS = ["pointer 7", "reference 7", "value 7", "fixed 7", "event 7 1", "changed 7", "function 7"]
+
+
+def test_queues_spinners_and_forms_of_callbacks(run_model):
+    outcome = run_model(QUEUES, "queues.cpp")
+    assert outcome.run.completed, outcome.run.record.outcome
+    said = [one.text for one in outcome.of(Text) if one.source == "queues"]
+    first, second = said.index("own queue 7"), len(said) - said[::-1].index("own queue 7")
+    assert said[0] == "welcome /queues on /greetings"
+    assert sorted(said[1:8]) == sorted(FORMS), "two tasks spin"
+    assert said[8:first] == ["disconnected", "nobody spins"]
+    assert said[first:second] == ["own queue 7", "own queue 7"]
+    assert said[second : second + 3] == ["empty 1", "search 1 /level", "out of range"]
+    assert sorted(said[second + 3 : -1]) == sorted(FORMS)
+    assert said[-1] == "tick"
+
+
 def test_it_compiles_without_boost(tmp_path):
     headers = roscpp.generate_headers(_includes("pose_keeper.cpp"), FILES / "pose_keeper.cpp")
     for name, text in headers.items():
@@ -88,6 +121,7 @@ def test_it_compiles_with_the_real_roscpp():
         lacking("there is no roscpp (scripts/debian-packages roscpp)")
     flags = subprocess.run(["pkg-config", "--cflags", "roscpp"], capture_output=True, text=True, check=True)
     _check("pose_keeper.cpp", *flags.stdout.split())
+    _check("queues.cpp", *flags.stdout.split())
 
 
 def _includes(name: str) -> list[str]:

@@ -118,7 +118,9 @@ class Fiber:
         dispatch: int,
         handlers: RequestHandlers,
         on_output: OnOutput,
+        call_beside: Callable[[int], bytes],
     ) -> None:
+        self._call_beside = call_beside
         self._runtime = runtime
         self._handle = runtime.new_fiber(component, dispatch)
         self._state = self._handle.contents
@@ -139,6 +141,10 @@ class Fiber:
             return self._run(callable_number, argument)
         finally:
             self._depth -= 1
+
+    def call_beside(self, callable_number: int) -> bytes:
+        """See ``abi_codec.CppFiber``."""
+        return self._call_beside(callable_number)
 
     def _run(self, callable_number: int, argument: bytes) -> bytes:
         state, handle, resume = self._state, self._handle, self._runtime.resume
@@ -213,7 +219,7 @@ class FiberPool:
         handlers: RequestHandlers,
         on_output: OnOutput,
     ) -> None:
-        self._new_fiber = partial(Fiber, runtime, component, dispatch, handlers, on_output)
+        self._new_fiber = partial(Fiber, runtime, component, dispatch, handlers, on_output, self.call)
         self._idle: list[Fiber] = []
 
     def call(self, callable_number: int, argument: bytes = b"") -> bytes:

@@ -90,6 +90,9 @@ class CppFiber(Protocol):
         Raises the error that the callable raised.
         """
 
+    def call_beside(self, callable_number: int) -> bytes:
+        """Run a callable on another fiber of the same code, in another task."""
+
 
 RequestHandler = Callable[[CppFiber, Reader], bytes]
 """Handles a request in the requesting task; it may block and may ``call`` the fiber."""

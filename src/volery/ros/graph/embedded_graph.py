@@ -93,6 +93,11 @@ class LocalNode:
         """Whether it has left the graph."""
         return self._node.closed
 
+    @property
+    def own_group(self) -> CallbackGroup:
+        """Group of the callbacks that are given none."""
+        return self._own
+
     def resolve(self, name: str) -> str:
         """Return the absolute name, remappings applied."""
         absolute = absolute_name(name, self.namespace, self.name)

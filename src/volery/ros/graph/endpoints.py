@@ -118,6 +118,7 @@ class EmbeddedPublisher:
         self._open = True
         self._want = node.want(PUBLISHED, topic.name, topic.type)
         self.latest: Ns | None = None  # when the last message was sent
+        self._on_change: Callable[[Connection, bool], None] | None = None
         topic.publishers.append(self)
         for subscription in topic.subscriptions:
             self.connect(subscription)
@@ -150,11 +151,23 @@ class EmbeddedPublisher:
                 if self.qos.lifespan and node.kernel.now() > sent + self.qos.lifespan:
                     continue
                 connection.deliver(content.copy(), sent, node.name, size)
+        if self._on_change is not None:
+            self._on_change(connection, True)
 
     def disconnect(self, subscription: SubscriptionEnd) -> None:
         """Stop sending to a subscription."""
+        ended = [one for one in self._connections if one.to is subscription]
         self._connections = [one for one in self._connections if one.to is not subscription]
         self._set_spacing()
+        if self._on_change is not None:
+            for connection in ended:
+                self._on_change(connection, False)
+
+    def watch(self, on_change: Callable[[Connection, bool], None]) -> None:
+        """Call *on_change* with each connection, also those there are, and whether it begins or ends."""
+        self._on_change = on_change
+        for connection in self._connections:
+            on_change(connection, True)
 
     def _set_spacing(self) -> None:
         graph, self._due = self.node.graph, 0
@@ -171,6 +184,17 @@ class EmbeddedPublisher:
                 kind = getattr(message, "__msgtype__", "") or f"a {type(message).__name__}"
                 raise UsageError(f"topic {self.topic} carries {self.type}, not {kind}")
             self.send(message, node.consume("publish", float(len(self._connections))))
+
+    def publish_to(self, connection: Connection, message: Any) -> None:
+        """Send a message over one connection only."""
+        node = self.node
+        with node.kernel:
+            sent = node.consume("publish", 1.0)
+            content = message.copy()
+            data = copied_to_cdr(content)
+            if self._recorded:
+                node.kernel.record(Published(sent, self.topic, self.type, node.name, data))
+            connection.deliver(content, sent, node.name, len(data))
 
     @property
     def connected(self) -> int:

@@ -240,6 +240,9 @@ class Group(Protocol):
     def spin(self) -> None:
         """Run callbacks as they become ready until the node is closed."""
 
+    def __len__(self) -> int:
+        """Return the number of callbacks that are ready."""
+
     on_ready: Callable[[], None] | None
     """Called whenever a callback has become ready, for executors that wait for several groups and ``take``
     from them. It must not block."""
@@ -268,6 +271,10 @@ class Node(Protocol):
     @property
     def closed(self) -> bool:
         """Whether it has left the graph."""
+
+    @property
+    def own_group(self) -> Group:
+        """Group of the callbacks that are given none."""
 
     def resolve(self, name: str) -> str:
         """Return the absolute name, remappings applied; ``UsageError`` if it is no valid ROS name."""

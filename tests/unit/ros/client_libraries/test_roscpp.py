@@ -113,7 +113,10 @@ def test_callbacks_run_on_the_stack_of_the_spinning_fiber(stage):
     def body() -> None:
         code.ask("init", Writer().text("other").flag(False))
         topic = Writer().text("/words").text("std_msgs/msg/String")
-        code.ask("subscribe", Writer().text("/words").text("std_msgs/msg/String").integer(5).integer(7))
+        code.ask(
+            "subscribe",
+            Writer().text("/words").text("std_msgs/msg/String").integer(5).integer(7).integer(-1),
+        )
         publisher = code.ask("advertise", topic.integer(5).flag(False)).integer()
         for _ in range(3):
             code.ask("publish", Writer().integer(publisher).raw(word))
@@ -160,7 +163,7 @@ def test_a_handler_that_returns_false_is_a_refusal_and_no_failure(stage):
 
     def serve() -> None:
         server.ask("init", Writer().text("server").flag(False))
-        server.ask("serve", Writer().text("/set").text("std_srvs/srv/SetBool_Request").integer(3))
+        server.ask("serve", Writer().text("/set").text("std_srvs/srv/SetBool_Request").integer(3).integer(-1))
         server.ask("spin")
 
     def call() -> None:

@@ -6,10 +6,9 @@ installed, the part of it that roscpp's interface needs is in ``fallback/``.
 
 As in a launch file, the name of the component names the node, whatever name ``ros::init`` gets.
 
-Intended differences from the real library: what is not offered does not compile; a component has one flow of
-control, so ``AsyncSpinner`` and ``MultiThreadedSpinner`` are refused; wall time is the time of the run;
-connecting takes no time; ``Header.seq`` is not transmitted; custom callback queues, ``tf`` and
-``XmlRpcValue`` are not available.
+Intended differences from the real library: what is not offered does not compile; threads of spinners are
+tasks of the run, which change at requests only; wall time is the time of the run; connecting takes no time;
+``Header.seq`` is not transmitted; ``XmlRpcValue`` is not available.
 """
 
 from pathlib import Path

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
+from volery.kernel.waiting import Rate, sleep
 from volery.ros.client_libraries.abi_codec import CppFiber, Reader, RequestHandler, Writer
 from volery.ros.client_libraries.roscpp.session import RefusedRequestError, Session
-from volery.ros.graph import BEST_AVAILABLE, LATCHED, Client, QoS, ServiceError, Timer
+from volery.ros.graph import BEST_AVAILABLE, LATCHED, Client, Group, QoS, ServiceError, Timer
+from volery.ros.graph.endpoints import Connection, EmbeddedPublisher
+from volery.ros.graph.work import Work
 from volery.ros.messages import from_cdr, service, to_cdr
 from volery.trace.events import Text
 
@@ -35,19 +38,50 @@ class _Publisher:
         """Publish the message that *data* encodes."""
         self.made.publish(from_cdr(self._type, data))
 
+    def publish_to(self, connection: Connection, data: bytes) -> None:
+        """Publish to one subscription."""
+        assert isinstance(self.made, EmbeddedPublisher)
+        self.made.publish_to(connection, from_cdr(self._type, data))
+
 
 def _publish(session: Session, arguments: Reader) -> None:
     session.find(arguments.integer(), _Publisher).publish(arguments.raw())
 
 
+def _watch(session: Session, arguments: Reader) -> None:
+    """Call back for each subscription that is connected to a publisher, or disconnected from it."""
+    publisher = session.find(arguments.integer(), _Publisher).made
+    callback, group = arguments.integer(), session.group(arguments.integer())
+    if not isinstance(publisher, EmbeddedPublisher):
+        raise UsageError(
+            f"{session.component}: advertise() with callbacks of connections needs a simulated graph"
+        )
+
+    def on_change(connection: Connection, connected: bool) -> None:
+        event = Writer().flag(connected).integer(session.keep(connection) if connected else -1)
+        event.text(publisher.topic).text(connection.to.node.name)
+
+        def tell() -> None:
+            session.call_back(callback, event.done())
+
+        group.add(Work(session.kernel.now(), tell))
+
+    publisher.watch(on_change)
+
+
+def _publish_to(session: Session, arguments: Reader) -> None:
+    publisher, connection = session.find(arguments.integer(), _Publisher), arguments.integer()
+    publisher.publish_to(session.find(connection, Connection), arguments.raw())
+
+
 def _subscribe(session: Session, arguments: Reader) -> int:
     topic, kind = arguments.text(), arguments.text()
-    depth, callback = arguments.integer(), arguments.integer()
+    depth, callback, group = arguments.integer(), arguments.integer(), session.group(arguments.integer())
 
     def on_message(message: Any) -> None:
         session.call_back(callback, to_cdr(message))
 
-    return session.keep(session.node.subscribe(topic, kind, on_message, _subscriber_qos(depth)))
+    return session.keep(session.node.subscribe(topic, kind, on_message, _subscriber_qos(depth), group))
 
 
 def _publisher_count(session: Session, arguments: Reader) -> int:
@@ -78,6 +112,7 @@ def _timeout(timeout: Ns) -> Ns | None:
 
 def _serve(session: Session, arguments: Reader) -> int:
     name, request_type, callback = arguments.text(), arguments.text(), arguments.integer()
+    group = session.group(arguments.integer())
     kind = service(request_type.removesuffix("_Request"))
 
     def handler(request: Any) -> Any:
@@ -86,7 +121,7 @@ def _serve(session: Session, arguments: Reader) -> int:
             raise RefusedRequestError(name, "its handler returned false")
         return from_cdr(kind.response.__msgtype__, result.raw())
 
-    return session.keep(session.node.serve(name, kind.name, handler))
+    return session.keep(session.node.serve(name, kind.name, handler, group))
 
 
 class _Client:
@@ -123,7 +158,7 @@ def _wait_for_service(session: Session, arguments: Reader) -> bool:
 class _Timer:
     """A ``ros::Timer``, which calls the callable numbered *callback* each *period*, or once."""
 
-    def __init__(self, session: Session, period: Ns, callback: int, *, oneshot: bool) -> None:
+    def __init__(self, session: Session, period: Ns, callback: int, group: Group, *, oneshot: bool) -> None:
         if period <= 0:
             raise UsageError(
                 f"{session.component}: a ros::Timer with a period of {period} ns; it must be above 0"
@@ -131,6 +166,7 @@ class _Timer:
         self._session = session
         self._period = period
         self._callback = callback
+        self._group = group
         self._oneshot = oneshot
         self._timer: Timer | None = None
         self._expected: Ns = 0
@@ -146,7 +182,7 @@ class _Timer:
         """Start the timer; the first call is one period from now. A running timer is not changed."""
         if self._timer is None:
             self._expected = self._session.now() + self._period
-            self._timer = self._session.node.timer(self._period, self._fire)
+            self._timer = self._session.node.timer(self._period, self._fire, self._group)
 
     def close(self) -> None:
         """Stop the timer."""
@@ -176,7 +212,8 @@ class _Timer:
 
 def _create_timer(session: Session, arguments: Reader) -> int:
     period, oneshot, autostart = arguments.integer(), arguments.flag(), arguments.flag()
-    timer = _Timer(session, period, arguments.integer(), oneshot=oneshot)
+    callback, group = arguments.integer(), session.group(arguments.integer())
+    timer = _Timer(session, period, callback, group, oneshot=oneshot)
     if autostart:
         timer.start()
     return session.keep(timer)
@@ -186,9 +223,72 @@ def _find_timer(session: Session, arguments: Reader) -> _Timer:
     return session.find(arguments.integer(), _Timer)
 
 
+# -- queues of callbacks, and tasks beside the one of main()
+
+
+class _Spinner:
+    """Tasks that run the callbacks of a queue until they are stopped or the node shuts down."""
+
+    def __init__(self, session: Session, group: Group) -> None:
+        self._session, self._group = session, group
+        self._spinning = 0
+        self._stopped = False
+
+    def spin(self) -> None:
+        """Run callbacks in the current task."""
+        self._spinning += 1
+        while not (self._stopped or self._session.node.closed):
+            self._group.spin_once()
+
+    def stop(self) -> None:
+        """Let the tasks end: work that does nothing wakes each of them."""
+        self._stopped = True
+        for _ in range(self._spinning):
+            self._group.add(Work(self._session.kernel.now(), lambda: None))
+
+
+def _call_available(group: Group, timeout: Ns) -> bool:
+    """Run all callbacks that are ready, the first of which is awaited."""
+    if timeout <= 0 or group.oldest is not None or group.spin_once(timeout):
+        group.spin_available()
+    return True
+
+
+def _queue_call(how: Callable[[Group, Ns], bool]) -> Callable[[Session, CppFiber, Reader], bool]:
+    def handle(session: Session, fiber: CppFiber, arguments: Reader) -> bool:
+        group, timeout = session.group(arguments.integer()), arguments.integer()
+        called: list[bool] = []
+        session.spin(fiber, lambda: called.append(how(group, timeout)))
+        return called[-1]
+
+    return handle
+
+
+def _queue_clear(session: Session, arguments: Reader) -> None:
+    group = session.group(arguments.integer())
+    while group.oldest is not None:
+        group.take()
+
+
+def _spin_spinner(session: Session, fiber: CppFiber, arguments: Reader) -> None:
+    session.spin(fiber, session.find(arguments.integer(), _Spinner).spin)
+
+
+def _spawn(session: Session, fiber: CppFiber, arguments: Reader) -> None:
+    number, label = arguments.integer(), arguments.text()
+    session.spawn(lambda: fiber.call_beside(number), label)
+
+
 SIMPLE: dict[str, Callable[[Session, Reader], Any]] = {
     "advertise": lambda session, arguments: session.keep(_Publisher(session, arguments)),
     "publish": _publish,
+    "watch": _watch,
+    "publish_to": _publish_to,
+    "queue": lambda session, arguments: session.keep(session.node.group()),
+    "queue_length": lambda session, arguments: len(session.group(arguments.integer())),
+    "queue_clear": _queue_clear,
+    "spinner": lambda session, arguments: session.keep(_Spinner(session, session.group(arguments.integer()))),
+    "spinner_stop": lambda session, arguments: session.find(arguments.integer(), _Spinner).stop(),
     "subscribers": lambda session, arguments: session.find(
         arguments.integer(), _Publisher
     ).made.subscribers(),
@@ -211,6 +311,10 @@ SIMPLE: dict[str, Callable[[Session, Reader], Any]] = {
 WITH_FIBER: dict[str, Callable[[Session, CppFiber, Reader], Any]] = {
     "spin_once": lambda session, fiber, arguments: session.spin(fiber, session.node.spin_available),
     "spin": lambda session, fiber, arguments: session.spin(fiber, session.node.spin),
+    "queue_call_one": _queue_call(lambda group, timeout: group.spin_once(max(timeout, 0))),
+    "queue_call_available": _queue_call(_call_available),
+    "spinner_spin": _spin_spinner,
+    "spawn": _spawn,
 }
 
 
@@ -294,6 +398,7 @@ _NAMES: dict[str, Simple] = {
     "node_handle": _node_handle,
     "name": lambda session, arguments: session.node.name,
     "namespace": lambda session, arguments: session.node.namespace,
+    "nodes": lambda session, arguments: _texts(sorted(session.graph.node_names())),
 }
 
 
@@ -307,7 +412,7 @@ class _Rate:
         if period <= 0:
             raise UsageError(f"{session.component}: ros::Rate with a period of {period} ns; give one above 0")
         self._session = session
-        self._rate = session.node.rate(period)
+        self._rate = session.node.rate(period) if session.opened else Rate(session.kernel, period)
         self._began = session.now()
 
     def sleep(self) -> Ns:
@@ -318,9 +423,17 @@ class _Rate:
         return took
 
 
+def _sleep(session: Session, arguments: Reader) -> None:
+    """Sleep; before ``ros::init`` there is no node that the call is charged to."""
+    if session.opened is None:
+        sleep(session.kernel, arguments.integer())
+    else:
+        session.node.sleep(arguments.integer())
+
+
 _TIME: dict[str, Simple] = {
     "now": lambda session, arguments: session.now(),
-    "sleep": lambda session, arguments: session.node.sleep(arguments.integer()),
+    "sleep": _sleep,
     "rate": lambda session, arguments: session.keep(_Rate(session, arguments.integer())),
     "rate_sleep": lambda session, arguments: session.find(arguments.integer(), _Rate).sleep(),
 }
@@ -389,11 +502,28 @@ def _delete_parameter(session: Session, arguments: Reader) -> bool:
 
 
 def _parameter_names(session: Session, arguments: Reader) -> bytes:
-    names = sorted(_leaf_names(session.node.get_parameter("/", {})))
+    return _texts(sorted(_leaf_names(session.node.get_parameter("/", {}))))
+
+
+def _texts(names: Sequence[str]) -> bytes:
     reply = Writer().integer(len(names))
     for name in names:
         reply.text(name)
     return reply.done()
+
+
+def _search_parameter(session: Session, arguments: Reader) -> str:
+    """Return the full name of the parameter that is found first from a namespace upwards, or ``""``."""
+    namespace, key = arguments.text() or session.node.name, arguments.text()
+    if key.startswith(("/", "~")):
+        return session.node.resolve(key) if session.node.has_parameter(key) else ""
+    first = key.partition("/")[0]
+    above = [part for part in namespace.split("/") if part]
+    for length in range(len(above), -1, -1):
+        place = "/".join(("", *above[:length]))
+        if session.node.has_parameter(f"{place}/{first}"):
+            return f"{place}/{key}"
+    return ""
 
 
 _PARAMETERS: dict[str, Simple] = {
@@ -402,4 +532,5 @@ _PARAMETERS: dict[str, Simple] = {
     "param_has": lambda session, arguments: session.node.has_parameter(arguments.text()),
     "param_delete": _delete_parameter,
     "param_names": _parameter_names,
+    "param_search": _search_parameter,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from volery.base.errors import UsageError
@@ -13,7 +13,8 @@ from volery.kernel.task import Task
 from volery.kernel.waiting import Signal, current_task, read_clock
 from volery.ros.client_libraries.abi_codec import CppFiber
 from volery.ros.client_libraries.library_base import Launch
-from volery.ros.graph import Node, RosGraph, ServiceError
+from volery.ros.graph import Group, Node, RosGraph, ServiceError
+from volery.trace.events import Failure
 
 Entity = TypeVar("Entity")
 
@@ -86,6 +87,24 @@ class Session:
     def now(self) -> Ns:
         """Return ROS time, also before ``ros::init``. An interaction point."""
         return self.graph.epoch + read_clock(self.kernel)
+
+    def group(self, number: int) -> Group:
+        """Return the queue with a number, of which -1 is the node's own."""
+        return self.node.own_group if number < 0 else self.entity(number)
+
+    def spawn(self, body: Callable[[], object], label: str) -> None:
+        """Run *body* in a task beside that of ``main``, as a thread; what it raises is a failure."""
+        task = current_task(self.kernel)
+        context = replace(task.contexts[0], deadline=None, period=None, on_release=None)
+
+        def guarded() -> None:
+            try:
+                body()
+            except Exception as error:
+                what = f"a thread ({label}) raised {error}"
+                self.kernel.record(Failure(self.kernel.now(), self.component, what))
+
+        self.kernel.spawn(guarded, f"{self.component} ({label})", context, task.scope)
 
     # -- entities that the code refers to
 

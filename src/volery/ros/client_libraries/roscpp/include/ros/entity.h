@@ -1,5 +1,7 @@
 // An entity of this node on the graph: a publisher, a subscription, a service or a timer.
 #pragma once
+#include <boost/shared_ptr.hpp>
+#include <boost/weak_ptr.hpp>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -7,10 +9,30 @@
 
 #include "volery/abi.h"
 
+// Marks a function that is not offered: code that calls it does not compile, and the compiler says why.
+#define VOLERY_REFUSED(what) __attribute__((error("volery: " what)))
+
 namespace ros {
 namespace detail {
 
 constexpr std::int64_t NO_CALLABLE = -1;
+
+using VoidConstPtr = boost::shared_ptr<void const>;
+
+// An object that callbacks belong to: they are not called once it is gone. Without an object always alive.
+class Tracked {
+public:
+    explicit Tracked(const VoidConstPtr& object) : object_(object), stated_(object != nullptr) {}
+    // Return false if the object is gone; otherwise hold it while the callback runs.
+    bool hold(VoidConstPtr& held) const {
+        held = object_.lock();
+        return !stated_ || held != nullptr;
+    }
+
+private:
+    boost::weak_ptr<void const> object_;
+    bool stated_;
+};
 
 // Removed from the graph with the last handle that shares it.
 class Entity {

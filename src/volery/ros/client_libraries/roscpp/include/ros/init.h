@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "ros/names.h"
+#include "ros/spinner.h"
 
 namespace ros {
 
@@ -31,38 +32,6 @@ inline void shutdown() { volery::request("ros.shutdown"); }
 inline void requestShutdown() { shutdown(); }
 inline void waitForShutdown() { volery::request("ros.wait_for_shutdown"); }
 
-// Run the callbacks that are ready.
-inline void spinOnce() { volery::request("ros.spin_once"); }
-// Run callbacks as they become ready, until the node shuts down.
-inline void spin() { volery::request("ros.spin"); }
-
-class SingleThreadedSpinner {
-public:
-    void spin() { ros::spin(); }
-};
-template <class Spinner>
-void spin(Spinner& spinner) {
-    spinner.spin();
-}
-
-#define VOLERY_REFUSED(what) __attribute__((error("volery: " what)))
-
-// A component has one flow of control, so spinners with threads of their own are refused.
-class AsyncSpinner {
-public:
-    VOLERY_REFUSED("ros::AsyncSpinner is not offered: a component has one flow of control; call ros::spin() or "
-                   "ros::spinOnce(), or make it two components")
-    explicit AsyncSpinner(std::uint32_t threads);
-    void start();
-    void stop();
-};
-class MultiThreadedSpinner {
-public:
-    VOLERY_REFUSED("ros::MultiThreadedSpinner is not offered: a component has one flow of control; call ros::spin()")
-    explicit MultiThreadedSpinner(std::uint32_t threads = 0);
-    void spin();
-};
-
 inline void removeROSArgs(int count, const char* const* arguments, std::vector<std::string>& left) {
     left.clear();
     for (int index = 0; index < count; ++index)
@@ -71,6 +40,12 @@ inline void removeROSArgs(int count, const char* const* arguments, std::vector<s
 
 namespace master {
 inline bool check() { return true; }
+inline bool getNodes(V_string& nodes) {
+    auto answer = volery::request("ros.nodes");
+    nodes.resize(static_cast<std::size_t>(answer.integer()));
+    for (auto& node : nodes) node = answer.text();
+    return true;
+}
 }  // namespace master
 
 }  // namespace ros

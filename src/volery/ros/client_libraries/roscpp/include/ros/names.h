@@ -1,6 +1,7 @@
 // Resolution of graph names, and the name of this node.
 #pragma once
 #include <map>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -10,6 +11,7 @@ namespace ros {
 
 using M_string = std::map<std::string, std::string>;
 using V_string = std::vector<std::string>;
+using S_string = std::set<std::string>;
 
 class InvalidNameException : public Exception {
 public:

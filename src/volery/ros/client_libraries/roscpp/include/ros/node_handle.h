@@ -39,45 +39,114 @@ public:
 
     template <class Message>
     Publisher advertise(const std::string& topic, std::uint32_t queue_size, bool latch = false) {
-        auto const name = resolveName(topic);
-        auto with = volery::Writer().put(name).put(Message::name_());
-        with.put(static_cast<std::int64_t>(queue_size)).put(latch);
-        return Publisher(create("ros.advertise", with, name), latch);
+        AdvertiseOptions options;
+        options.init<Message>(topic, queue_size);
+        options.latch = latch;
+        return advertise(options);
+    }
+    template <class Message>
+    Publisher advertise(const std::string& topic, std::uint32_t queue_size, const SubscriberStatusCallback& connect,
+                        const SubscriberStatusCallback& disconnect = SubscriberStatusCallback(),
+                        const VoidConstPtr& tracked = VoidConstPtr(), bool latch = false) {
+        auto options = AdvertiseOptions::create<Message>(topic, queue_size, connect, disconnect, tracked, nullptr);
+        options.latch = latch;
+        return advertise(options);
+    }
+    Publisher advertise(AdvertiseOptions& options) {
+        auto const name = resolveName(options.topic);
+        auto with = volery::Writer().put(name).put(options.datatype);
+        with.put(static_cast<std::int64_t>(options.queue_size)).put(options.latch);
+        auto const publisher = create("ros.advertise", with, name);
+        if (options.connect_cb || options.disconnect_cb) watch(*publisher, options);
+        return Publisher(publisher, options.latch);
     }
 
+    // A member function of an object, which may take the message in each of the forms that Adapter knows. An object
+    // that is given as a shared pointer is tracked.
     template <class Parameter, class Class>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size, void (Class::*callback)(Parameter),
                          Class* object, const TransportHints& = {}) {
-        return make_subscriber<Parameter>(topic, queue_size, [=](Parameter message) { (object->*callback)(message); });
+        return call_member<Parameter>(topic, queue_size, callback, object, {});
     }
     template <class Parameter, class Class>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
                          void (Class::*callback)(Parameter) const, Class* object, const TransportHints& = {}) {
-        return make_subscriber<Parameter>(topic, queue_size, [=](Parameter message) { (object->*callback)(message); });
+        return call_member<Parameter>(topic, queue_size, callback, object, {});
     }
     template <class Parameter, class Class>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size, void (Class::*callback)(Parameter),
                          const boost::shared_ptr<Class>& object, const TransportHints& = {}) {
-        return make_subscriber<Parameter>(topic, queue_size,
-                                          [=](Parameter message) { (object.get()->*callback)(message); });
+        return call_member<Parameter>(topic, queue_size, callback, object.get(), object);
+    }
+    template <class Parameter, class Class>
+    Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
+                         void (Class::*callback)(Parameter) const, const boost::shared_ptr<Class>& object,
+                         const TransportHints& = {}) {
+        return call_member<Parameter>(topic, queue_size, callback, object.get(), object);
+    }
+    // The same where the type of the message is given: subscribe<Message>(...).
+    template <class Message, class Class>
+    Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
+                         void (Class::*callback)(const boost::shared_ptr<Message const>&), Class* object,
+                         const TransportHints& = {}) {
+        return call_member<const boost::shared_ptr<Message const>&>(topic, queue_size, callback, object, {});
+    }
+    template <class Message, class Class>
+    Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
+                         void (Class::*callback)(const boost::shared_ptr<Message const>&) const, Class* object,
+                         const TransportHints& = {}) {
+        return call_member<const boost::shared_ptr<Message const>&>(topic, queue_size, callback, object, {});
+    }
+    template <class Message, class Class>
+    Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
+                         void (Class::*callback)(const boost::shared_ptr<Message const>&),
+                         const boost::shared_ptr<Class>& object, const TransportHints& = {}) {
+        return call_member<const boost::shared_ptr<Message const>&>(topic, queue_size, callback, object.get(), object);
+    }
+    template <class Message, class Class>
+    Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
+                         void (Class::*callback)(const boost::shared_ptr<Message const>&) const,
+                         const boost::shared_ptr<Class>& object, const TransportHints& = {}) {
+        return call_member<const boost::shared_ptr<Message const>&>(topic, queue_size, callback, object.get(), object);
     }
     template <class Parameter>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size, void (*callback)(Parameter),
                          const TransportHints& = {}) {
-        return make_subscriber<Parameter>(topic, queue_size, callback);
+        return call<Parameter>(topic, queue_size, callback, {});
+    }
+    template <class Message>
+    Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
+                         void (*callback)(const boost::shared_ptr<Message const>&), const TransportHints& = {}) {
+        return call<const boost::shared_ptr<Message const>&>(topic, queue_size, callback, {});
     }
     template <class Message>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
                          const boost::function<void(const boost::shared_ptr<Message const>&)>& callback,
-                         const VoidConstPtr& = VoidConstPtr(), const TransportHints& = {}) {
-        return make_subscriber<const boost::shared_ptr<Message const>&>(topic, queue_size, callback);
+                         const VoidConstPtr& tracked = VoidConstPtr(), const TransportHints& = {}) {
+        return call<const boost::shared_ptr<Message const>&>(topic, queue_size, callback, tracked);
     }
     template <class Message, class Parameter>
     Subscriber subscribe(const std::string& topic, std::uint32_t queue_size,
                          const boost::function<void(Parameter)>& callback,
-                         const VoidConstPtr& = VoidConstPtr(), const TransportHints& = {}) {
-        return make_subscriber<Parameter>(topic, queue_size, callback);
+                         const VoidConstPtr& tracked = VoidConstPtr(), const TransportHints& = {}) {
+        return call<Parameter>(topic, queue_size, callback, tracked);
     }
+    Subscriber subscribe(SubscribeOptions& options) {
+        detail::Tracked const tracked(options.tracked_object);
+        auto const callable =
+            volery::register_callable([deliver = options.deliver_, tracked](volery::Reader in, volery::Writer&) {
+                VoidConstPtr held;
+                if (tracked.hold(held)) deliver(in);
+            });
+        auto const name = resolveName(options.topic);
+        auto with = volery::Writer().put(name).put(options.datatype);
+        with.put(static_cast<std::int64_t>(options.queue_size)).put(callable).put(queue_of(options.callback_queue));
+        return Subscriber(create("ros.subscribe", with, name, callable));
+    }
+
+    // Queue of the callbacks that are made from now on; null for the node's own.
+    void setCallbackQueue(CallbackQueueInterface* queue) { queue_ = queue; }
+    CallbackQueueInterface* getCallbackQueue() const { return queue_ != nullptr ? queue_ : getGlobalCallbackQueue(); }
 
     // -- services
 
@@ -125,7 +194,11 @@ public:
     }
     Timer createTimer(Duration period, const TimerCallback& callback, bool oneshot = false,
                       bool autostart = true) const {
-        return Timer::make(period, callback, oneshot, autostart);
+        return Timer::make(period, callback, oneshot, autostart, queue_of(nullptr));
+    }
+    Timer createTimer(TimerOptions& options) const {
+        auto const queue = queue_of(options.callback_queue);
+        return Timer::make(options.period, options.callback, options.oneshot, options.autostart, queue);
     }
     template <class Class>
     WallTimer createWallTimer(WallDuration period, void (Class::*callback)(const WallTimerEvent&), Class* object,
@@ -135,7 +208,7 @@ public:
     }
     WallTimer createWallTimer(WallDuration period, const WallTimerCallback& callback, bool oneshot = false,
                               bool autostart = true) const {
-        return WallTimer::make(period, callback, oneshot, autostart);
+        return WallTimer::make(period, callback, oneshot, autostart, queue_of(nullptr));
     }
 
     // -- parameters
@@ -155,6 +228,10 @@ public:
     void setParam(const std::string& name, const char* value) const { param::set(resolveName(name), value); }
     bool hasParam(const std::string& name) const { return param::has(resolveName(name)); }
     bool deleteParam(const std::string& name) const { return param::del(resolveName(name)); }
+    // Search upwards from this namespace; the result is the full name.
+    bool searchParam(const std::string& key, std::string& result) const {
+        return param::search(namespace_, key, result);
+    }
     bool getParamNames(std::vector<std::string>& names) const { return param::getParamNames(names); }
     template <class Value>
     bool param(const std::string& name, Value& value, const Value& otherwise) const {
@@ -175,18 +252,39 @@ private:
         return std::make_shared<detail::Entity>(volery::request(request_name, with).integer(), name, callable);
     }
 
+    std::int64_t queue_of(CallbackQueueInterface* stated) const {
+        return detail::number_of(stated != nullptr ? stated : queue_);
+    }
     template <class Parameter, class Callback>
-    Subscriber make_subscriber(const std::string& topic, std::uint32_t queue_size, Callback callback) {
-        using Adapter = detail::Adapted<Parameter>;
-        using Message = typename Adapter::Message;
-        auto const callable = volery::register_callable([callback](volery::Reader in, volery::Writer&) {
-            auto const message = detail::received<Message>(in);
-            callback(Adapter::from(message));
-        });
-        auto const name = resolveName(topic);
-        auto with = volery::Writer().put(name).put(Message::name_());
-        with.put(static_cast<std::int64_t>(queue_size)).put(callable);
-        return Subscriber(create("ros.subscribe", with, name, callable));
+    Subscriber call(const std::string& topic, std::uint32_t queue_size, Callback callback, const VoidConstPtr& tracked) {
+        SubscribeOptions options;
+        options.topic = topic;
+        options.queue_size = queue_size;
+        options.datatype = detail::Adapted<Parameter>::Message::name_();
+        options.deliver_ = detail::delivering<Parameter>(callback);
+        options.tracked_object = tracked;
+        return subscribe(options);
+    }
+    template <class Parameter, class Member, class Class>
+    Subscriber call_member(const std::string& topic, std::uint32_t queue_size, Member callback, Class* object,
+                           const VoidConstPtr& tracked) {
+        return call<Parameter>(
+            topic, queue_size, [=](Parameter message) { (object->*callback)(message); }, tracked);
+    }
+    void watch(const detail::Entity& publisher, const AdvertiseOptions& options) {
+        detail::Tracked const tracked(options.tracked_object);
+        auto const callable = volery::register_callable(
+            [handle = publisher.handle(), options, tracked](volery::Reader in, volery::Writer&) {
+                bool const connected = in.flag();
+                auto const connection = in.integer();
+                auto const topic = in.text();
+                SingleSubscriberPublisher const one(handle, connection, topic, in.text());
+                VoidConstPtr held;
+                auto const& callback = connected ? options.connect_cb : options.disconnect_cb;
+                if (callback && tracked.hold(held)) callback(one);
+            });
+        auto const with = volery::Writer().put(publisher.handle()).put(callable).put(queue_of(options.callback_queue));
+        volery::request("ros.watch", with);
     }
 
     template <class Request, class Response, class Handler>
@@ -199,11 +297,12 @@ private:
             out.put(done).put(detail::to_bytes(response));
         });
         auto const name = resolveName(service);
-        auto const with = volery::Writer().put(name).put(Request::name_()).put(callable);
+        auto const with = volery::Writer().put(name).put(Request::name_()).put(callable).put(queue_of(nullptr));
         return ServiceServer(create("ros.serve", with, name, callable));
     }
 
     std::string namespace_;
+    CallbackQueueInterface* queue_ = nullptr;
 };
 
 namespace topic {

@@ -123,6 +123,12 @@ Value param(const std::string& name, const Value& otherwise) {
     param(name, value, otherwise);
     return value;
 }
+inline bool search(const std::string& ns, const std::string& key, std::string& result) {
+    auto answer = volery::request("ros.param_search", volery::Writer().put(ns).put(key));
+    result = answer.text();
+    return !result.empty();
+}
+inline bool search(const std::string& key, std::string& result) { return search("", key, result); }
 inline bool getParamNames(std::vector<std::string>& names) {
     auto answer = volery::request("ros.param_names");
     names.resize(static_cast<std::size_t>(answer.integer()));

@@ -1,5 +1,6 @@
 // roscpp on the embedded graph: the content of <ros/ros.h> in virtual time.
 #pragma once
+#include "ros/callback_queue.h"
 #include "ros/console.h"
 #include "ros/init.h"
 #include "ros/names.h"
@@ -8,6 +9,7 @@
 #include "ros/publisher.h"
 #include "ros/rate.h"
 #include "ros/service.h"
+#include "ros/spinner.h"
 #include "ros/subscriber.h"
 #include "ros/time.h"
 #include "ros/timer.h"

@@ -1,6 +1,7 @@
 // ros::ServiceServer, ros::ServiceClient and the functions about services.
 #pragma once
 #include <string>
+#include <vector>
 
 #include "ros/entity.h"
 #include "ros/message.h"
@@ -14,6 +15,8 @@ public:
     using Handle::Handle;
     std::string getService() const { return name(); }
 };
+
+using V_ServiceServer = std::vector<ServiceServer>;
 
 namespace detail {
 

@@ -25,6 +25,13 @@ inline std::int64_t nanoseconds(double seconds) {
     return static_cast<std::int64_t>(whole) * SECOND + std::llround((seconds - whole) * 1e9);
 }
 
+// Times are from 0 to 2^32 s. Before the start of the clock there is none, and roscpp throws.
+inline std::uint64_t checked_time(std::int64_t total) {
+    if (total < 0 || total / SECOND > std::numeric_limits<std::uint32_t>::max())
+        throw std::runtime_error("Time is out of dual 32-bit range");
+    return static_cast<std::uint64_t>(total);
+}
+
 }  // namespace detail
 
 // Base class of durations; Self is the derived class.
@@ -104,7 +111,7 @@ public:
 
     double toSec() const { return sec + 1e-9 * nsec; }
     std::uint64_t toNSec() const { return sec * static_cast<std::uint64_t>(detail::SECOND) + nsec; }
-    Self& fromSec(double seconds) { return fromNSec(static_cast<std::uint64_t>(detail::nanoseconds(seconds))); }
+    Self& fromSec(double seconds) { return fromNSec(detail::checked_time(detail::nanoseconds(seconds))); }
     Self& fromNSec(std::uint64_t total) {
         sec = static_cast<std::uint32_t>(total / detail::SECOND);
         nsec = static_cast<std::uint32_t>(total % detail::SECOND);
@@ -116,16 +123,19 @@ public:
     Span operator-(const Self& other) const {
         return Span().fromNSec(static_cast<std::int64_t>(toNSec() - other.toNSec()));
     }
-    Self operator+(const Span& span) const { return Self().fromNSec(toNSec() + span.toNSec()); }
-    Self operator-(const Span& span) const { return Self().fromNSec(toNSec() - span.toNSec()); }
-    Self& operator+=(const Span& span) { return fromNSec(toNSec() + span.toNSec()); }
-    Self& operator-=(const Span& span) { return fromNSec(toNSec() - span.toNSec()); }
+    Self operator+(const Span& span) const { return Self().fromNSec(moved(span.toNSec())); }
+    Self operator-(const Span& span) const { return Self().fromNSec(moved(-span.toNSec())); }
+    Self& operator+=(const Span& span) { return fromNSec(moved(span.toNSec())); }
+    Self& operator-=(const Span& span) { return fromNSec(moved(-span.toNSec())); }
     bool operator==(const Self& other) const { return toNSec() == other.toNSec(); }
     bool operator!=(const Self& other) const { return toNSec() != other.toNSec(); }
     bool operator<(const Self& other) const { return toNSec() < other.toNSec(); }
     bool operator>(const Self& other) const { return toNSec() > other.toNSec(); }
     bool operator<=(const Self& other) const { return toNSec() <= other.toNSec(); }
     bool operator>=(const Self& other) const { return toNSec() >= other.toNSec(); }
+
+private:
+    std::uint64_t moved(std::int64_t by) const { return detail::checked_time(static_cast<std::int64_t>(toNSec()) + by); }
 };
 
 class Time : public TimeBase<Time, Duration> {

@@ -2,6 +2,7 @@
 #pragma once
 #include <boost/function.hpp>
 
+#include "ros/callback_queue.h"
 #include "ros/entity.h"
 #include "ros/time.h"
 
@@ -39,7 +40,8 @@ public:
     bool hasPending() const { return hasStarted(); }
     bool isValid() const { return entity_ != nullptr; }
 
-    static TimerOf make(Span period, boost::function<void(const Event&)> callback, bool oneshot, bool autostart) {
+    static TimerOf make(Span period, boost::function<void(const Event&)> callback, bool oneshot, bool autostart,
+                        std::int64_t queue) {
         auto const callable = volery::register_callable([callback](volery::Reader in, volery::Writer&) {
             Event event;
             event.last_expected = Time().fromNSec(static_cast<std::uint64_t>(in.integer()));
@@ -49,7 +51,7 @@ public:
             event.profile.last_duration.fromNSec(in.integer());
             callback(event);
         });
-        auto const with = volery::Writer().put(period.toNSec()).put(oneshot).put(autostart).put(callable);
+        auto const with = volery::Writer().put(period.toNSec()).put(oneshot).put(autostart).put(callable).put(queue);
         return TimerOf(std::make_shared<Entity>(volery::request("ros.timer", with).integer(), "", callable));
     }
 };
@@ -59,5 +61,18 @@ public:
 using Timer = detail::TimerOf<TimerEvent, Time, Duration>;
 using WallTimer = detail::TimerOf<WallTimerEvent, WallTime, WallDuration>;
 using SteadyTimer = WallTimer;
+
+struct TimerOptions {
+    TimerOptions() = default;
+    TimerOptions(Duration period, const TimerCallback& callback, CallbackQueueInterface* queue, bool oneshot = false,
+                 bool autostart = true)
+        : period(period), callback(callback), callback_queue(queue), oneshot(oneshot), autostart(autostart) {}
+
+    Duration period;
+    TimerCallback callback;
+    CallbackQueueInterface* callback_queue = nullptr;
+    bool oneshot = false;
+    bool autostart = true;
+};
 
 }  // namespace ros
