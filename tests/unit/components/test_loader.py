@@ -10,7 +10,7 @@ import textwrap
 
 import pytest
 
-from volery.base.errors import ComponentError, ModelError
+from volery.base.errors import ComponentError, ModelError, UsageError
 from volery.base.time import S
 from volery.components.entry_points import EntryPoint, entry_points
 from volery.components.instance import Allocation, Instance
@@ -367,6 +367,17 @@ def test_signals_reach_their_handlers(bench):
     for last in reversed(bench.host.last):
         last()
     assert len(bench.log) == 3  # its process is over: no signal reaches it
+
+
+def test_another_process_is_refused_when_it_is_made(bench):
+    text = """
+        import multiprocessing
+        class Worker(multiprocessing.Process):
+            pass
+        Worker()
+        """
+    with pytest.raises(UsageError, match=r"Worker of multiprocessing is not available .*use threading"):
+        bench.run(bench.write("node.py", text))
 
 
 def test_a_process_changes_nothing_of_the_run(bench):

@@ -10,14 +10,22 @@ from __future__ import annotations
 from types import ModuleType
 
 from volery.base.time import Ns, S
-from volery.components.virtual_stdlib import concurrency, process_environment, synchronization
+from volery.components.virtual_stdlib import (
+    concurrency,
+    process_environment,
+    process_modules,
+    synchronization,
+)
 from volery.components.virtual_stdlib.process_environment import make_module
 from volery.kernel.api import Kernel
 
 EPOCH: Ns = 1_700_000_000 * S
 """``time.time_ns()`` at the start of a run in virtual time: 2023-11-14 22:13:20 UTC."""
 
-REFUSED = ("multiprocessing", "sched", "selectors", "signal")
+PROCESSES = ("Array", "Event", "Lock", "Manager", "Pipe", "Pool", "Process", "Queue", "Value")
+"""Names of ``multiprocessing``, which libraries mention: they are refused when they are used."""
+
+REFUSED = ("sched", "selectors", "signal")
 """Modules that wait for the machine's clock or its events; their replacements have no names."""
 
 
@@ -34,6 +42,9 @@ def virtual_modules(kernel: Kernel, seed: int, epoch: Ns = EPOCH) -> dict[str, M
         **refused,
         **concurrency.asyncio_modules(kernel),
         "concurrent.futures": concurrency.futures_module(kernel),
+        "multiprocessing": make_module(
+            "multiprocessing", {name: type(name, (process_modules.RefusedProcess,), {}) for name in PROCESSES}
+        ),
         "builtins": process_environment.builtins_module(kernel),
         "time": process_environment.time_module(kernel, epoch),
         "datetime": process_environment.datetime_module(kernel, epoch),

@@ -32,6 +32,16 @@ _NO_SIGNALS = ("alarm", "setitimer", "getitimer", "sigwait", "sigtimedwait", "pt
 _Handler = Callable[[int, FrameType | None], Any]
 
 
+class RefusedProcess:
+    """Base of the names of ``multiprocessing``: a class may derive from them, but none can be made."""
+
+    def __init__(self, *args: object, **kwargs: object) -> None:
+        raise UsageError(
+            f"{type(self).__name__} of multiprocessing is not available to a component, which is one "
+            "process: use threading, or make another component"
+        )
+
+
 class Output(TextIOBase):
     """Standard output or standard error of a process: each line is recorded, as what ``print`` writes."""
 
