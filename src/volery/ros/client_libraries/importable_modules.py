@@ -7,7 +7,15 @@ from types import ModuleType
 from typing import NoReturn
 
 from volery.ros import messages
-from volery.ros.client_libraries import actionlib, message_filters, rclpy, rospy, tf2
+from volery.ros.client_libraries import (
+    actionlib,
+    mavros_package,
+    message_filters,
+    rclpy,
+    ros1_tools,
+    rospy,
+    tf2,
+)
 from volery.ros.client_libraries.library_base import AtEnd, Launch, ignore_end
 from volery.ros.graph import Node, RosGraph
 
@@ -36,6 +44,8 @@ def importable_modules(
         **messages.modules(),
         **tf2.modules(graph.kernel, found["rospy"], found["rclpy.executors"]),
         **actionlib.modules(found["rospy"]),
+        **ros1_tools.modules(found["rospy"]),
+        **mavros_package.modules(found["rospy"]),
         **message_filters.modules(found["rospy"], found["rclpy.time"]),
         **{name: _unavailable_module(name, instead) for name, instead in _UNAVAILABLE.items()},
     }

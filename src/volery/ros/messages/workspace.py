@@ -82,6 +82,10 @@ class Workspace:
                 return known[name]
         return None
 
+    def names(self, file: Path) -> set[str]:
+        """Return the names of all packages that *file* sees."""
+        return {*self._own(file), *self._sourced}
+
     def python_folder(self, module: str, file: Path) -> Path | None:
         """Return the folder from which *file* imports the top-level *module*, or None if no package has it.
 

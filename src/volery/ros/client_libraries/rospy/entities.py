@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, ClassVar, cast
 
 from volery.base.errors import UsageError
@@ -15,7 +16,8 @@ from volery.ros.client_libraries.rospy.session import (
     Session,
     Sessions,
 )
-from volery.ros.graph import BEST_AVAILABLE, LATCHED, QoS, ServiceError, Subscription
+from volery.ros.graph import BEST_AVAILABLE, LATCHED, QoS, ServiceError, Subscription, Work
+from volery.ros.graph.endpoints import EmbeddedPublisher
 from volery.ros.messages import Message, ros1_type, to_ros1
 from volery.ros.messages.client_classes import adopt, library_of, receiving
 
@@ -86,6 +88,22 @@ def _subscriber_qos(depth: int | None) -> QoS:
     return QoS(depth or None, BEST_AVAILABLE, BEST_AVAILABLE)
 
 
+class SubscribeListener:
+    """Called by a publisher when subscribers come and go; derive from it and override its methods."""
+
+    def peer_subscribe(self, topic_name: str, topic_publish: Any, peer_publish: Any) -> None:
+        """Do nothing. Called when a subscriber has come.
+
+        Args:
+            topic_name: Name of the topic.
+            topic_publish: Publishes a message to all subscribers.
+            peer_publish: Publishes a message to the new one.
+        """
+
+    def peer_unsubscribe(self, topic_name: str, num_peers: int) -> None:
+        """Do nothing. Called when a subscriber has gone, with the number of those left."""
+
+
 class Publisher:
     """Publishes to a topic.
 
@@ -105,10 +123,6 @@ class Publisher:
         *,
         queue_size: int | None = None,
     ) -> None:
-        if subscriber_listener is not None:
-            raise NotImplementedError(
-                "rospy.Publisher: subscriber_listener is not there on the embedded graph"
-            )
         session = self._session = self.sessions.joined()
         qos = LATCHED if latch else QoS(queue_size or None)
         self.data_class = data_class
@@ -116,6 +130,25 @@ class Publisher:
         self._count: int | None = 0 if getattr(data_class, "_has_header", False) else None
         self._publisher = session.node.advertise(name, self.type, qos)
         self.name = self.resolved_name = self._publisher.topic
+        if subscriber_listener is not None:
+            self._tell(subscriber_listener)
+
+    def _tell(self, listener: SubscribeListener) -> None:
+        """Call *listener* of subscribers that come and go, in a thread of its own."""
+        publisher, name = self._publisher, self.name
+        if not isinstance(publisher, EmbeddedPublisher):
+            raise UsageError("rospy.Publisher: subscriber_listener works on the embedded graph only")
+        group = self._session.spinning_group(f"peers of {name}", f"subscriber_listener of {name}")
+
+        def changed(connection: Any, begins: bool) -> None:
+            if begins:
+                to_peer = partial(publisher.publish_to, connection)
+                call = partial(listener.peer_subscribe, name, self.publish, to_peer)
+            else:
+                call = partial(listener.peer_unsubscribe, name, publisher.connected)
+            group.add(Work(self._session.kernel.now(), call))
+
+        publisher.watch(changed)
 
     def publish(self, *args: Any, **fields: Any) -> None:
         """Publish a message, or one made of these fields; raise ``ROSException`` before ``init_node``."""

@@ -17,6 +17,7 @@ from volery.kernel.waiting import poll
 from volery.ros import messages
 from volery.ros.client_libraries.library_base import AtEnd, Caller, Launch, caller, ignore_end, library_module
 from volery.ros.client_libraries.rospy import entities
+from volery.ros.client_libraries.rospy.master import NAMES, master_names, rosgraph_modules
 from volery.ros.client_libraries.rospy.session import (
     EXCEPTIONS,
     Duration,
@@ -98,11 +99,13 @@ def loggers(sessions: Sessions) -> dict[str, Callable[..., None]]:
     found: dict[str, Callable[..., None]] = {}
     for name, (level, severity) in _FUNCTIONS.items():
         log = _Log(sessions, level, severity)
-        found[f"log{name}"] = log.log
-        found[f"log{name}_throttle"] = log.throttle
-        found[f"log{name}_throttle_identical"] = log.throttle_identical
-        found[f"log{name}_once"] = log.once
+        calls: tuple[Callable[..., None], ...] = (log.log, log.throttle, log.throttle_identical, log.once)
+        found |= {f"log{name}{ending}": call for ending, call in zip(_ENDINGS, calls, strict=True)}
     return found
+
+
+_ENDINGS = ("", "_throttle", "_throttle_identical", "_once")
+"""Endings of the names of a severity's functions."""
 
 
 _NO_DEFAULT = object()
@@ -211,15 +214,40 @@ def modules(
     names["Header"] = message_of("std_msgs/msg/Header", ROSPY)
     names["Message"] = messages.Message
     names["AnyMsg"] = entities.AnyMsg
+    names["SubscribeListener"] = entities.SubscribeListener
+    masters = master_names(sessions)
+    master = masters.pop("Master")
+    names |= masters
     parts: dict[str, Mapping[str, Any]] = {
+        **{part: {one: names[one] for one in inside} for part, inside in _PARTS.items()},
+        "names": {**_NAMES_OF_ROSPY, **{one: names[one] for one in _NAMES_OF_NODE}},
         "exceptions": EXCEPTIONS,
         "msg": {"AnyMsg": entities.AnyMsg},
         "numpy_msg": {"numpy_msg": numpy_msg},
         "rostime": {one: names[one] for one in ("Duration", "Time", "get_rostime", "get_time")},
     }
     found = {f"rospy.{part}": library_module(f"rospy.{part}", inside) for part, inside in parts.items()}
+    names.pop("is_initialized")  # rospy has it in core alone
     rospy = library_module("rospy", {**names, **{part: found[f"rospy.{part}"] for part in parts}})
-    return {**messages.modules(library=ROSPY), "rospy": rospy, **found}
+    return {**messages.modules(library=ROSPY), "rospy": rospy, **found, **rosgraph_modules(master, names)}
+
+
+_LOGS = tuple(f"log{name}{ending}" for name in _FUNCTIONS if name != "error" for ending in _ENDINGS)
+_NAMES_OF_NODE = ("get_caller_id", "get_name", "get_namespace", "remap_name", "resolve_name")
+_NAMES_OF_ROSPY = {one: NAMES[one] for one in ("canonicalize_name", "global_name", "scoped_name")}
+_PARTS: dict[str, tuple[str, ...]] = {
+    "client": (
+        *("delete_param", "get_master", "get_param", "get_param_cached", "get_param_names", "has_param"),
+        *("get_published_topics", "init_node", "myargv", "on_shutdown", "search_param", "set_param", "spin"),
+        *("logdebug", "logerr", "loginfo", "logwarn", "wait_for_message"),
+    ),
+    "core": (*_LOGS, *_NAMES_OF_NODE, "is_shutdown", "signal_shutdown", "is_initialized", "ROSException"),
+    "msproxy": ("MasterProxy",),
+    "service": ("ServiceException",),
+    "timer": ("Rate", "Timer", "TimerEvent", "sleep"),
+    "topics": ("Publisher", "SubscribeListener", "Subscriber"),
+}
+"""Names of rospy's modules that files import from them."""
 
 
 def numpy_msg(msg_type: Any) -> Any:
@@ -232,6 +260,7 @@ def _functions(sessions: Sessions) -> dict[str, Callable[..., Any]]:
     found: tuple[Any, ...] = (
         init_node, is_shutdown, signal_shutdown, on_shutdown, spin, sleep, wait_for_message, wait_for_service,
         get_name, get_namespace, get_time, get_rostime, resolve_name, get_published_topics, myargv,
+        is_initialized,
         *FUNCTIONS,
     )  # fmt: skip
     bound: dict[str, Callable[..., Any]] = {one.__name__: partial(one, sessions) for one in found}
@@ -260,6 +289,12 @@ def is_shutdown(sessions: Sessions) -> bool:
             pass
     session = sessions.find()
     return session is not None and bool(session.shutdown)
+
+
+def is_initialized(sessions: Sessions) -> bool:
+    """Return whether ``init_node`` was called."""
+    session = sessions.find()
+    return session is not None and session.initialised
 
 
 def signal_shutdown(sessions: Sessions, reason: str = "") -> None:

@@ -49,6 +49,22 @@ class ROSTimeMovedBackwardsException(ROSInterruptException):
     """Never raised: simulated time does not move backwards."""
 
 
+class ROSInternalException(Exception):  # noqa: N818 - rospy's name
+    """Base class of errors of connections."""
+
+
+class TransportException(ROSInternalException):
+    """A connection has failed. Never raised: messages of a simulated graph need no connections."""
+
+
+class TransportInitError(TransportException):
+    """A connection cannot be made. Never raised."""
+
+
+class TransportTerminated(TransportException):
+    """A connection has ended. Never raised."""
+
+
 class ServiceException(Exception):  # noqa: N818 - rospy's name
     """A service call has failed."""
 
@@ -61,6 +77,10 @@ EXCEPTIONS = {
         ROSSerializationException,
         ROSInterruptException,
         ROSTimeMovedBackwardsException,
+        ROSInternalException,
+        TransportException,
+        TransportInitError,
+        TransportTerminated,
         ServiceException,
     )
 }
@@ -334,6 +354,8 @@ class Timer:
         self._expected = self._session.node.now() + self._period
         self._last: TimerEvent | None = None
         self._took: float | None = None
+        self._stopped = False
+        self._ended = Signal(self._session.kernel, "rospy.Timer (its end)")
         name = getattr(callback, "__name__", "callback")
         group = self._session.spinning_group("timer", f"timer {name}")
         self._timer = self._session.node.timer(self._period, self._fire, group)
@@ -351,10 +373,20 @@ class Timer:
         self._last = event
         self._expected += self._period * max(1, (now - self._expected) // self._period + 1)
         if self._oneshot:
-            self._timer.cancel()
+            self.shutdown()
         self._callback(event)
         self._took = (self._session.node.now() - now) / S
 
+    def is_alive(self) -> bool:
+        """Return whether it will call again."""
+        return not self._stopped and not self._session.shutdown
+
+    def join(self, timeout: float | None = None) -> None:
+        """Block until it is stopped, or for a time in seconds."""
+        self._ended.wait_for(lambda: not self.is_alive(), None if timeout is None else from_seconds(timeout))
+
     def shutdown(self) -> None:
         """Stop the timer."""
+        self._stopped = True
         self._timer.cancel()
+        self._ended.notify()
