@@ -16,11 +16,11 @@ from volery.base.time import MS, Ns
 from volery.kernel.waiting import Signal
 from volery.ros.client_libraries.library_base import library_module
 from volery.ros.client_libraries.rospy.session import ROSInterruptException, as_ns
-from volery.ros.messages import message_class
+from volery.ros.messages.client_classes import ROSPY, message_of
 
-GoalID: Any = message_class("actionlib_msgs/msg/GoalID")
-GoalStatus: Any = message_class("actionlib_msgs/msg/GoalStatus")
-GoalStatusArray: Any = message_class("actionlib_msgs/msg/GoalStatusArray")
+GoalID: Any = message_of("actionlib_msgs/msg/GoalID", ROSPY)
+GoalStatus: Any = message_of("actionlib_msgs/msg/GoalStatus", ROSPY)
+GoalStatusArray: Any = message_of("actionlib_msgs/msg/GoalStatusArray", ROSPY)
 
 _POLL: Ns = 10 * MS
 """Period at which a client looks for its server, as in actionlib."""

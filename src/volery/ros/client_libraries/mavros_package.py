@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 
 from volery.ros.client_libraries.library_base import library_module
 from volery.ros.client_libraries.rospy.session import ROSException
-from volery.ros.messages import message_class, new
-from volery.ros.messages.packages import service_class
+from volery.ros.messages.client_classes import ROSPY, message_of, service_of
 
 DEFAULT_NAMESPACE = "mavros"
 
@@ -88,7 +87,7 @@ class _Namespaces:
         full = self.get_topic(name)
         key = self._component, full
         if key not in self._proxies:
-            self._proxies[key] = self.rospy.ServiceProxy(full, service_class(f"mavros_msgs/srv/{kind}"))
+            self._proxies[key] = self.rospy.ServiceProxy(full, service_of(f"mavros_msgs/srv/{kind}", ROSPY))
         return self._proxies[key]
 
     def proxies(self, module: str) -> dict[str, Any]:
@@ -103,16 +102,16 @@ class _Namespaces:
 
     def publisher(self, topic: str, kind: str, **options: Any) -> Any:
         """Return a publisher of set-points."""
-        return self.rospy.Publisher(self.get_topic(topic), message_class(kind), **options)
+        return self.rospy.Publisher(self.get_topic(topic), message_of(kind, ROSPY), **options)
 
     def subscribe_waypoints(self, cb: Callable[[Any], Any], **options: Any) -> Any:
         """Call *cb* with the mission whenever it changes."""
-        kind = message_class("mavros_msgs/msg/WaypointList")
+        kind = message_of("mavros_msgs/msg/WaypointList", ROSPY)
         return self.rospy.Subscriber(self.get_topic("mission", "waypoints"), kind, cb, **options)
 
     def wait_fcu_connection(self, timeout: float | None = None) -> bool:
         """Block until the server is connected to its autopilot; return False after a time-out in seconds."""
-        kind, topic = message_class("mavros_msgs/msg/State"), self.get_topic("state")
+        kind, topic = message_of("mavros_msgs/msg/State", ROSPY), self.get_topic("state")
         ends = None if timeout is None else self.rospy.get_time() + timeout
         while True:
             left = None if ends is None else ends - self.rospy.get_time()
@@ -148,8 +147,8 @@ class _Namespaces:
     def param_set(self, param_id: str, value: float) -> float:
         """Set a parameter of the autopilot; return its new value, raise ``IOError`` if it is refused."""
         whole = isinstance(value, int)
-        given = new(
-            "mavros_msgs/msg/ParamValue", integer=value if whole else 0, real=0.0 if whole else float(value)
+        given = message_of("mavros_msgs/msg/ParamValue", ROSPY)(
+            integer=value if whole else 0, real=0.0 if whole else float(value)
         )
         answer = self.service("param/set", "ParamSet")(param_id=param_id, value=given)
         if not answer.success:
@@ -200,8 +199,7 @@ class QGroundControlWP:
         for row in rows:
             if row and not row[0].startswith("#"):
                 numbers = [float(one) for one in row[4:11]]
-                yield new(
-                    "mavros_msgs/msg/Waypoint",
+                yield message_of("mavros_msgs/msg/Waypoint", ROSPY)(
                     is_current=bool(int(row[1])),
                     frame=int(row[2]),
                     command=int(row[3]),
@@ -234,15 +232,15 @@ def modules(rospy: ModuleType) -> dict[str, ModuleType]:
         f"get_pub_{name}": partial(of.publisher, *about) for name, about in _SETPOINTS.items()
     }
     for name in ("Header", "Float64"):
-        setpoints[name] = message_class(f"std_msgs/msg/{name}")
+        setpoints[name] = message_of(f"std_msgs/msg/{name}", ROSPY)
     for name in ("TwistStamped", "PoseStamped", "PoseWithCovarianceStamped", "Vector3", "Vector3Stamped"):
-        setpoints[name] = message_class(f"geometry_msgs/msg/{name}")
+        setpoints[name] = message_of(f"geometry_msgs/msg/{name}", ROSPY)
     for name in ("Point", "Quaternion"):
-        setpoints[name] = message_class(f"geometry_msgs/msg/{name}")
+        setpoints[name] = message_of(f"geometry_msgs/msg/{name}", ROSPY)
     missions = {
         "subscribe_waypoints": of.subscribe_waypoints,
         "QGroundControlWP": QGroundControlWP,
-        **{name: message_class(f"mavros_msgs/msg/{name}") for name in ("Waypoint", "WaypointList")},
+        **{name: message_of(f"mavros_msgs/msg/{name}", ROSPY) for name in ("Waypoint", "WaypointList")},
     }
     params = {
         "Parameter": Parameter,

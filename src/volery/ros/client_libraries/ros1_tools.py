@@ -15,7 +15,8 @@ from typing import Any, ClassVar, NamedTuple
 
 from volery.base.errors import did_you_mean
 from volery.ros.client_libraries.library_base import library_module
-from volery.ros.messages import Workspace, message_class, new
+from volery.ros.messages import Workspace
+from volery.ros.messages.client_classes import ROSPY, message_of
 
 # -- packages
 
@@ -209,7 +210,8 @@ def create_cloud(header: Any, fields: Sequence[Any], points: Iterable[Sequence[A
     """Return a ``PointCloud2`` of one row with these fields and points."""
     code = _layout(fields, big=False, wanted=None).code
     listed = [code.pack(*point) for point in points]
-    made = new("sensor_msgs/msg/PointCloud2", header=header, height=1, width=len(listed), fields=list(fields))
+    kind = message_of("sensor_msgs/msg/PointCloud2", ROSPY)
+    made: Any = kind(header=header, height=1, width=len(listed), fields=list(fields))
     made.point_step, made.row_step = code.size, code.size * len(listed)
     made.data = b"".join(listed)
     return made
@@ -218,7 +220,7 @@ def create_cloud(header: Any, fields: Sequence[Any], points: Iterable[Sequence[A
 def create_cloud_xyz32(header: Any, points: Iterable[Sequence[float]]) -> Any:
     """Return a ``PointCloud2`` of one row with the fields x, y and z in single precision."""
     fields = [
-        new("sensor_msgs/msg/PointField", name=name, offset=4 * index, datatype=7, count=1)
+        message_of("sensor_msgs/msg/PointField", ROSPY)(name=name, offset=4 * index, datatype=7, count=1)
         for index, name in enumerate("xyz")
     ]
     return create_cloud(header, fields, points)
@@ -239,7 +241,7 @@ def modules(rospy: ModuleType) -> dict[str, ModuleType]:
         {"get_pkg_dir": partial(get_pkg_dir, rospack), "InvalidROSPkgException": ResourceNotFound},
     )
     tests = _Tests(rospy)
-    classes = {name: message_class(f"sensor_msgs/msg/{name}") for name in ("PointCloud2", "PointField")}
+    classes = {name: message_of(f"sensor_msgs/msg/{name}", ROSPY) for name in ("PointCloud2", "PointField")}
     return {
         "roslib": library_module("roslib", {"load_manifest": load_manifest, "packages": packages}),
         "roslib.packages": packages,

@@ -28,6 +28,7 @@ from volery.ros.client_libraries.tf2.transform_tree import (
     write_transform,
 )
 from volery.ros.messages import message_class, new
+from volery.ros.messages.client_classes import RCLPY, ROSPY, adopt, library_of
 from volery.ros.messages.message import nanoseconds
 from volery.trace.events import Text
 
@@ -132,7 +133,7 @@ def transformed(given: Any, transform: Any) -> Any:
     change(getattr(made, field) if field else made, from_transform(transform.transform))
     if field:
         made.header = transform.header.copy()
-    return made
+    return adopt(made, library_of(type(given)))
 
 
 STAMPED = {
@@ -271,7 +272,7 @@ class Buffer:
         made.header.frame_id = target_frame
         made.header.stamp.sec, made.header.stamp.nanosec = divmod(found, S)
         write_transform(made.transform, rigid)
-        return made
+        return adopt(made, RCLPY if self._tree.ros2 else ROSPY)
 
     def lookup_transform_full(
         self,
