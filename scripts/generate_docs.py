@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from package_map import package_map
+from ros_surface import page as ros_surface
 from typer.main import get_command
 
 from volery.cli.main import application
@@ -504,6 +505,7 @@ def pages() -> dict[Path, str]:
         "conformance.md": MADE + conformance(),
         "faults.md": MADE + faults(),
         "model.md": MADE + model(),
+        "ros-surface.md": MADE + ros_surface({"rclpy": "rclpy 7.1.6 (ROS 2 Jazzy)"}),
         "rules.md": MADE + rules(),
         "versions.md": MADE + versions(),
         "model.schema.json": json.dumps(schema(), indent=2, ensure_ascii=False) + "\n",

@@ -708,7 +708,12 @@ class _Import:
 
     def _missing_below(self, top: str, name: str) -> str:
         below = [one for one in self._loader.replacements if one.startswith(f"{top}.")]
-        return f"{name} is not there on the embedded graph{did_you_mean(name, below)}; see docs/ros.md"
+        hint, instead = did_you_mean(name, below), ""
+        try:
+            getattr(self._loader.replacements[top], name.partition(".")[2])
+        except (AttributeError, ImportError) as error:
+            instead = str(error).partition(";")[2]
+        return f"{name} is not there on the embedded graph{hint};{instead or ' see docs/ros.md'}"
 
     def _submodules(self, package: ModuleType, name: str, wanted: tuple[str, ...]) -> None:
         """Load the modules of ``from package import module`` before the names are looked up."""

@@ -345,3 +345,48 @@ out([one.level for one in request.result().levels])
 out(m.get_logger().info("quiet"))
 """
     assert said(stage, text) == [[40, 0], False]
+
+
+def test_spin_returns_and_an_executor_raises_when_another_thread_shuts_down(stage: Stage) -> None:
+    text = """
+n.create_timer(1.0, rclpy.shutdown)
+rclpy.spin(n)
+out("returned")
+rclpy.init()
+m = rclpy.create_node("m")
+executor = rclpy.executors.SingleThreadedExecutor()
+executor.add_node(m)
+n.context.spawn(rclpy.shutdown, "another thread")
+try:
+    executor.spin()
+except rclpy.executors.ExternalShutdownException:
+    out("raised")
+"""
+    assert said(stage, text) == ["returned", "raised"]
+
+
+def test_futures_and_coroutines_of_transforms(stage: Stage) -> None:
+    text = """
+from geometry_msgs.msg import TransformStamped
+from tf2_ros import Buffer, TransformBroadcaster, TransformListener
+buffer = Buffer()
+listener = TransformListener(buffer, n)
+future = buffer.wait_for_transform_async("map", "base", rclpy.time.Time())
+task = None
+
+async def look():
+    found = await buffer.lookup_transform_async("map", "base", rclpy.time.Time())
+    out(found.transform.translation.x)
+
+sent = TransformStamped(child_frame_id="base")
+sent.header.frame_id, sent.transform.translation.x, sent.transform.rotation.w = "map", 2.0, 1.0
+broadcaster = TransformBroadcaster(n)
+executor = rclpy.executors.SingleThreadedExecutor()
+executor.add_node(n)
+task = executor.create_task(look)
+n.create_timer(1.0, lambda: broadcaster.sendTransform(sent))
+executor.spin_until_future_complete(future)
+out(n.get_clock().now().nanoseconds // 10**9)
+executor.spin_until_future_complete(task)
+"""
+    assert said(stage, text) == [1, 2.0]

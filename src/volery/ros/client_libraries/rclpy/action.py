@@ -141,6 +141,21 @@ class ServerGoalHandle:
         """Do nothing: a handle holds no resources."""
 
 
+def default_goal_callback(goal_request: Any) -> GoalResponse:
+    """Accept each goal."""
+    return GoalResponse.ACCEPT
+
+
+def default_handle_accepted_callback(goal_handle: ServerGoalHandle) -> None:
+    """Execute a goal at once."""
+    goal_handle.execute()
+
+
+def default_cancel_callback(cancel_request: Any) -> CancelResponse:
+    """Reject each cancellation."""
+    return CancelResponse.REJECT
+
+
 class _CancelCode(IntEnum):
     """Answers of ``action_msgs/srv/CancelGoal``."""
 
@@ -161,9 +176,9 @@ class ActionServer:
         execute_callback: Callable[[ServerGoalHandle], Any],
         *,
         callback_group: CallbackGroup | None = None,
-        goal_callback: Callable[[Any], Any] = lambda _: GoalResponse.ACCEPT,
-        handle_accepted_callback: Callable[[ServerGoalHandle], Any] = lambda handle: handle.execute(),
-        cancel_callback: Callable[[ServerGoalHandle], Any] = lambda _: CancelResponse.REJECT,
+        goal_callback: Callback | None = None,
+        handle_accepted_callback: Callback | None = None,
+        cancel_callback: Callback | None = None,
         feedback_pub_qos_profile: Any = 10,
         status_pub_qos_profile: Any = qos_profile_action_status_default,
         **options: Any,
@@ -194,17 +209,17 @@ class ActionServer:
 
     def register_goal_callback(self, goal_callback: Callable[[Any], Any] | None) -> None:
         """Ask *goal_callback* whether a goal is accepted; None accepts each."""
-        self._on_goal = goal_callback or (lambda _: GoalResponse.ACCEPT)
+        self._on_goal = goal_callback or default_goal_callback
 
     def register_cancel_callback(self, cancel_callback: Callable[[Any], Any] | None) -> None:
         """Ask *cancel_callback* whether a goal may be cancelled; None rejects each request."""
-        self._on_cancel = cancel_callback or (lambda _: CancelResponse.REJECT)
+        self._on_cancel = cancel_callback or default_cancel_callback
 
     def register_handle_accepted_callback(
         self, handle_accepted_callback: Callable[[ServerGoalHandle], Any] | None
     ) -> None:
         """Call *handle_accepted_callback* with each accepted goal; None executes it."""
-        self._on_accepted = handle_accepted_callback or (lambda handle: handle.execute())
+        self._on_accepted = handle_accepted_callback or default_handle_accepted_callback
 
     def register_execute_callback(self, execute_callback: Callable[[ServerGoalHandle], Any]) -> None:
         """Execute goals by *execute_callback*."""
@@ -489,6 +504,10 @@ SERVER: dict[str, Any] = {
     "CancelResponse": CancelResponse,
     "GoalResponse": GoalResponse,
     "ServerGoalHandle": ServerGoalHandle,
+    **{
+        one.__name__: one
+        for one in (default_cancel_callback, default_goal_callback, default_handle_accepted_callback)
+    },
 }
 """Content of ``rclpy.action.server``."""
 ACTION: dict[str, Any] = {

@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import partial
+from pathlib import Path
 from typing import Any, ClassVar
 
 from volery.base.errors import UsageError
@@ -237,6 +238,8 @@ class Context:
         """End the context: ``spin`` returns. Nodes exist until they are destroyed, but are not spun."""
         if not self._started:
             raise RuntimeError("rcl_shutdown already called on the given context")
+        if self.executor is not None:
+            self.executor.shutdown()  # so ``rclpy.spin`` returns, where another executor's raises
         self.try_shutdown()
 
     def try_shutdown(self) -> None:
@@ -248,6 +251,16 @@ class Context:
             self._hooks.clear()
             self.executor = None
             self.changed.notify()
+
+    def destroy(self) -> None:
+        """Do nothing: a context holds no resources in C."""
+
+    def __enter__(self) -> Context:
+        self.init()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.try_shutdown()
 
     # -- nodes
 
@@ -427,6 +440,26 @@ class Logger:
         return self._log(message, LoggingSeverity.FATAL, caller(1), options)
 
 
+def initialize() -> None:
+    """Do nothing: logging needs no preparation."""
+
+
+def shutdown() -> None:
+    """Do nothing: log lines are written at once."""
+
+
+def clear_config() -> None:
+    """Do nothing: there is no configuration of logging."""
+
+
+def get_logging_directory() -> Path:
+    """Return the folder of ROS's logs by the environment; lines of a run are in its trace."""
+    return Path(os.environ.get("ROS_LOG_DIR") or Path.home() / ".ros" / "log")
+
+
+_ROUTINES: tuple[Any, ...] = (initialize, shutdown, clear_config, get_logging_directory)
+
+
 def logging_functions(loggers: type[Logger]) -> dict[str, Callable[..., Any]]:
     """Return the functions of ``rclpy.logging`` by name."""
 
@@ -448,4 +481,4 @@ def logging_functions(loggers: type[Logger]) -> dict[str, Callable[..., Any]]:
         get_logger_level,
         get_logging_severity_from_string,
     )
-    return {"get_logger": loggers, **{one.__name__: one for one in found}}
+    return {"get_logger": loggers, **{one.__name__: one for one in (*found, *_ROUTINES)}}

@@ -275,6 +275,11 @@ class Service:
             raise TypeError(f"service {self.srv_name}: its callback returned {response!r}, not a response")
         return response
 
+    @property
+    def logger_name(self) -> str:
+        """Name of the node's logger."""
+        return _logger_name(self._node)
+
     def _await_response(self, request: Any) -> Any:
         """Let the executor run the coroutine; wait for its result in a task beside the executor."""
         adopt(request, library_of(self.srv_type.Request))
@@ -331,6 +336,11 @@ class Client:
     ) -> None:
         """Refuse all but ``OFF``: calls of services are in the trace."""
         _refuse_introspection(introspection_state)
+
+    @property
+    def logger_name(self) -> str:
+        """Name of the node's logger."""
+        return _logger_name(self._node)
 
     def service_is_ready(self) -> bool:
         """Return whether the service is available."""

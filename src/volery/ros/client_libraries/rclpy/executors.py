@@ -468,7 +468,7 @@ class Executor:
                     current_task(kernel).release(arrived)
             if found is None or run is not None:
                 break
-        if run is None and not self._context.running:
+        if run is None and not self._context.running and not self._is_shutdown:
             self._on_context_shutdown()
         return run
 

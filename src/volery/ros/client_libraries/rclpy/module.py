@@ -131,7 +131,13 @@ def _submodules(
         "action.server": action.SERVER,
         "callback_groups": groups,
         "client": {"Client": entities.Client},
-        "clock": {**clock_type, **duration, "Clock": bound["Clock"], "ROSClock": bound["ROSClock"]},
+        "clock": {
+            **ros_time.JUMPS,
+            **clock_type,
+            **duration,
+            "Clock": bound["Clock"],
+            "ROSClock": bound["ROSClock"],
+        },
         "clock_type": clock_type,
         "constants": {"S_TO_NS": S},
         "context": {"Context": Context},
@@ -253,14 +259,34 @@ def get_default_context(contexts: Contexts) -> Context:
 
 # -- helpers
 
+_NO_C = "there is no library in C behind rclpy's classes here"
+_NO_WAIT_SET = "there is no wait set of rcl; use a guard condition, a timer or a subscription"
 REFUSED = {
     "rclpy.experimental": "use an executor of rclpy.executors",
-    "rclpy.impl.implementation_singleton": "use the classes of rclpy; there is no library in C behind them",
+    "rclpy.impl.implementation_singleton": _NO_C,
+    "rclpy.lifecycle.LifecycleNodeMixin": "derive from LifecycleNode",
+    "rclpy.lifecycle.NodeMixin": "derive from LifecycleNode",
+    "rclpy.lifecycle.node.LifecycleNodeMixin": "derive from LifecycleNode",
     "rclpy.logging_service": "give the node enable_logger_service=True",
     "rclpy.parameter_service": "nodes serve their parameters themselves",
     "rclpy.time_source": "nodes have ROS time, which is the time of the run",
     "rclpy.type_description_service": "read the definition in the recording of the run",
-    "rclpy.waitable": "there is no wait set of rcl; use a guard condition, a timer or a subscription",
+    **dict.fromkeys(
+        (
+            *("rclpy.clock.ClockHandle", "rclpy.clock.TimeJumpDictionary", "rclpy.context.ContextHandle"),
+            *("rclpy.destroyable", "rclpy.duration.DurationType", "rclpy.time.TimeHandle"),
+            *("rclpy.executors.TimeoutObject", "rclpy.task.FutureState"),
+            *("rclpy.signals.SignalHandlerGuardCondition", "rclpy.impl.rcutils_logger.CallerId"),
+            *("rclpy.impl.rcutils_logger.LoggingFilter", "rclpy.impl.rcutils_logger.Once"),
+            *("rclpy.impl.rcutils_logger.SkipFirst", "rclpy.impl.rcutils_logger.Throttle"),
+            "rclpy.impl.rcutils_logger.get_filters_from_kwargs",
+        ),
+        _NO_C,
+    ),
+    **dict.fromkeys(
+        ("rclpy.waitable", "rclpy.event_handler.EventHandler", "rclpy.event_handler.QoSEventHandler"),
+        _NO_WAIT_SET,
+    ),
 }
 """What is refused, and what to do instead."""
 

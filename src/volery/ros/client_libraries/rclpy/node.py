@@ -331,6 +331,8 @@ class Node(NodeParameters):
             "guard condition, a timer or a subscription"
         )
 
+    remove_waitable = add_waitable
+
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
         """Create a rate of *frequency* Hz."""
         if frequency <= 0:

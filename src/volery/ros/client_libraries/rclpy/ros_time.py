@@ -141,6 +141,51 @@ class Time:
         return cls(nanoseconds=nanoseconds(msg), clock_type=clock_type)
 
 
+class ClockChange(IntEnum):
+    """How the source of a clock has changed."""
+
+    ROS_TIME_NO_CHANGE = 1
+    ROS_TIME_ACTIVATED = 2
+    ROS_TIME_DEACTIVATED = 3
+    SYSTEM_TIME_NO_CHANGE = 4
+
+
+class JumpThreshold:
+    """Jumps that a callback is for: the least ones forwards and backwards, and changes of the source."""
+
+    def __init__(
+        self, *, min_forward: Duration | None, min_backward: Duration | None, on_clock_change: bool = True
+    ) -> None:
+        if min_forward is not None and min_forward.nanoseconds <= 0:
+            raise ValueError("min_forward must be a positive non-zero duration")
+        if min_backward is not None and min_backward.nanoseconds >= 0:
+            raise ValueError("min_backward must be a negative non-zero duration")
+        if min_forward is None and min_backward is None and not on_clock_change:
+            raise ValueError("At least one threshold must be set")
+        self.min_forward, self.min_backward = min_forward, min_backward
+        self.on_clock_change = on_clock_change
+
+
+class TimeJump:
+    """A jump of a clock: its kind and its length."""
+
+    def __init__(self, clock_change: ClockChange, delta: Duration) -> None:
+        self.clock_change, self.delta = clock_change, delta
+
+
+class JumpHandle:
+    """A callback for jumps. The clock of a run never jumps, so it is never called."""
+
+    def unregister(self) -> None:
+        """Do nothing: the callback is never called."""
+
+    def __enter__(self) -> JumpHandle:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.unregister()
+
+
 class Clock:
     """A clock that shows the time of the graph."""
 
@@ -157,6 +202,14 @@ class Clock:
     def now(self) -> Time:
         """Return the current time. An interaction point."""
         return Time(nanoseconds=self.contexts.now(), clock_type=self.clock_type)
+
+    def create_jump_callback(
+        self, threshold: JumpThreshold, *, pre_callback: Any = None, post_callback: Any = None
+    ) -> JumpHandle:
+        """Return a handle for callbacks that are never called: the clock of a run does not jump."""
+        if pre_callback is None and post_callback is None:
+            raise ValueError("One of pre_callback or post_callback must be callable")
+        return JumpHandle()
 
     def sleep_until(self, until: Time, context: Context | None = None) -> bool:
         """Block until a time; return False if the context was shut down meanwhile."""
@@ -201,3 +254,7 @@ class Rate:
 
     def destroy(self) -> None:
         """Do nothing: a rate holds no resources."""
+
+
+JUMPS = {kind.__name__: kind for kind in (ClockChange, JumpHandle, JumpThreshold, TimeJump)}
+"""Part of ``rclpy.clock``."""

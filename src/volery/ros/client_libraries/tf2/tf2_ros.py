@@ -17,7 +17,7 @@ from volery.base.frames import Quaternion, multiply
 from volery.base.time import Ns, S, from_seconds, to_seconds
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal, current_task
-from volery.ros.client_libraries.rclpy.executors import ReentrantCallbackGroup
+from volery.ros.client_libraries.rclpy.executors import Future, ReentrantCallbackGroup
 from volery.ros.client_libraries.rclpy.qos import DurabilityPolicy, QoSProfile
 from volery.ros.client_libraries.tf2.transform_tree import (
     RigidTransform,
@@ -164,6 +164,7 @@ class Buffer:
         self._tree = TransformTree(10 * S if cache_time is None else as_ns(cache_time), ros2=node is not None)
         self._changed = Signal(self.kernel, "tf2_ros.Buffer (a transform)")
         self._said: set[tuple[str, str]] = set()
+        self._asked: list[tuple[Future, Callable[[], None]]] = []
 
     def follow_ros2(self) -> None:
         """Follow ROS 2 where its rules differ: it is filled by a node of rclpy."""
@@ -176,6 +177,8 @@ class Buffer:
         problem = self._tree.add(child, header.frame_id, as_ns(header.stamp), rigid, static=static)
         if not problem:
             self._changed.notify()
+            for _, look in list(self._asked):
+                look()
             return
         kind = problem.partition(" ")[0]
         if (kind, child) not in self._said:
@@ -273,6 +276,48 @@ class Buffer:
         made.header.stamp.sec, made.header.stamp.nanosec = divmod(found, S)
         write_transform(made.transform, rigid)
         return adopt(made, RCLPY if self._tree.ros2 else ROSPY)
+
+    def _future(self, can: Callable[[], bool]) -> Future:
+        """Return a future that is done, with True, when *can* holds after a transform has come."""
+        future = Future()
+
+        def look() -> None:
+            if not future.done() and can():
+                future.set_result(True)
+
+        look()
+        if not future.done():
+            self._asked = [(one, again) for one, again in self._asked if not one.done()]
+            self._asked.append((future, look))
+        return future
+
+    def wait_for_transform_async(self, target_frame: str, source_frame: str, time: Any) -> Future:
+        """Return a future that is done when a transform is available."""
+        return self._future(lambda: bool(self.can_transform(target_frame, source_frame, time)))
+
+    def wait_for_transform_full_async(
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str
+    ) -> Future:
+        """Return a future that is done when a transform between two times is available."""
+        return self._future(
+            lambda: bool(
+                self.can_transform(fixed_frame, source_frame, source_time)
+                and self.can_transform(target_frame, fixed_frame, target_time)
+            )
+        )
+
+    async def lookup_transform_async(self, target_frame: str, source_frame: str, time: Any) -> Any:
+        """Wait for a transform in a coroutine; see ``lookup_transform``."""
+        await self.wait_for_transform_async(target_frame, source_frame, time)
+        return self.lookup_transform(target_frame, source_frame, time)
+
+    async def lookup_transform_full_async(
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str
+    ) -> Any:
+        """Wait for a transform between two times in a coroutine; see ``lookup_transform_full``."""
+        times = target_frame, target_time, source_frame, source_time, fixed_frame
+        await self.wait_for_transform_full_async(*times)
+        return self.lookup_transform_full(*times)
 
     def lookup_transform_full(
         self,
