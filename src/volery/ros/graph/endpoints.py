@@ -266,7 +266,8 @@ class EmbeddedSubscription:
         self._topic = topic
         self._callback = callback
         self._group = group
-        self._queue: deque[Any] = deque()
+        self._queue: deque[tuple[Any, str]] = deque()
+        self.sender = ""  # node that sent the message whose callback runs
         self._run = self.run
         self._open = True
         self.want = node.want(SUBSCRIBED, topic.name, topic.type)
@@ -290,9 +291,9 @@ class EmbeddedSubscription:
         if len(queue) == self.qos.depth:
             queue.popleft()  # its turn in the group goes to the next oldest
             self.dropped += 1
-            queue.append(message)
+            queue.append((message, publisher))
         else:
-            queue.append(message)
+            queue.append((message, publisher))
             self._group.add(Work(now, self._run))
 
     def lose(self, sent: Ns, publisher: str, size: int) -> None:
@@ -303,7 +304,8 @@ class EmbeddedSubscription:
     def run(self) -> None:
         """Call back with the oldest message."""
         if self._queue:
-            self._callback(self._queue.popleft())
+            message, self.sender = self._queue.popleft()
+            self._callback(message)
 
     def latest_sender(self) -> tuple[str, bool]:
         """Return nothing: what publishers offer is known of the topic."""
@@ -404,6 +406,7 @@ class EmbeddedService:
         self._kind = kind
         self._handler, self._group = handler, group
         self._pending: list[Exchange] = []
+        self.caller = ""  # node that sent the request whose handler begins
         node.graph.services[name] = self
         node.graph.wants.served[name] = self.type
 
@@ -421,6 +424,7 @@ class EmbeddedService:
             return
         with self.node.kernel:
             self.node.consume_if_priced("serve")
+        self.caller = exchange.caller.name
         try:
             answer = self._handler(exchange.request)
             if not isinstance(answer, self._kind.response):

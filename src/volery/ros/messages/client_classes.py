@@ -315,6 +315,12 @@ class _RospyMessage:
 
     __slots__: tuple[str, ...] = ()
 
+    @property
+    def _connection_header(self) -> dict[str, Any] | None:
+        """Header of the connection that the message came over; None if it was made here."""
+        header_of = getattr(self, "connection_of", None)
+        return None if header_of is None else cast("dict[str, Any]", header_of())
+
     def __str__(self) -> str:
         return _yaml(self)
 

@@ -209,7 +209,8 @@ Copier = Callable[[Any], Any]
 class Message:
     """A ROS message; ``__msgtype__`` is its type's name, ``__match_args__`` the names of its fields."""
 
-    __slots__ = ()
+    __slots__ = ("connection_of",)
+    """Beside the fields: what makes the header of the connection that rospy's messages state."""
     __msgtype__: ClassVar[str] = ""
     __match_args__: ClassVar[tuple[str, ...]] = ()
     _copiers: ClassVar[tuple[tuple[int, Copier], ...]] = ()

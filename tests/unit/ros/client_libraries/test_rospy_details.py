@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from volery.base.time import S
+from volery.ros import messages
 from volery.trace.events import Text
 
 LATE = """
@@ -279,4 +280,46 @@ except IOError as error:
         (True, "/uav/setpoint_position/local"),
         2.5,
         True,
+    ]
+
+
+def test_headers_of_connections(stage: Any) -> None:
+    stage.modules |= messages.modules(library="rospy")
+    stage.component(
+        "talker",
+        """
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+rospy.init_node("talker")
+publisher = rospy.Publisher("chatter", String, queue_size=1, headers={"cookies": "oreo"})
+rospy.sleep(1)
+publisher.publish("hi")
+answer = rospy.ServiceProxy("tell", Trigger, headers={"tea": "green"})()
+out(answer._connection_header["callerid"])
+out(String()._connection_header)
+""",
+    )
+    stage.component(
+        "listener",
+        """
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+rospy.init_node("listener")
+def receive(one):
+    header = one._connection_header
+    out([header[key] for key in ("callerid", "cookies", "topic", "type", "md5sum")])
+rospy.Subscriber("chatter", String, receive)
+def answer(asked):
+    header = asked._connection_header
+    out([header[key] for key in ("callerid", "tea", "service", "type", "md5sum")])
+    return True, ""
+rospy.Service("tell", Trigger, answer)
+rospy.spin()
+""",
+    )
+    assert stage.run(5 * S) == [
+        ["/talker", "oreo", "/chatter", "std_msgs/String", "992ce8a1687cec8c8bd883ec73ca41d1"],
+        ["/talker", "green", "/tell", "std_srvs/Trigger", "937c9679a518e3a18d831e57125ea522"],
+        "/listener",
+        None,
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from typing import Any, ClassVar, cast
 
 from volery.base.errors import UsageError
@@ -130,6 +130,8 @@ class Publisher:
         self._count: int | None = 0 if getattr(data_class, "_has_header", False) else None
         self._publisher = session.node.advertise(name, self.type, qos)
         self.name = self.resolved_name = self._publisher.topic
+        if headers:
+            self.sessions.headers[session.node.name, self.name] = dict(headers)
         if subscriber_listener is not None:
             self._tell(subscriber_listener)
 
@@ -203,6 +205,7 @@ class Subscriber:
         self.callback = callback
         self._args = callback_args
         self._received: Callable[[Any], Any] | None = None
+        self._headers: dict[str, Callable[[], dict[str, Any]]] = {}
         topic = self.name = self.resolved_name = session.node.resolve(name)
         qos = _subscriber_qos(queue_size)
         self._subscription: AnySubscription | Subscription
@@ -222,10 +225,22 @@ class Subscriber:
             return
         if self._received is not None:
             self._received(message)
+            sender = getattr(self._subscription, "sender", "")
+            header_of = self._headers.get(sender)
+            if header_of is None:
+                header_of = self._headers[sender] = cache(partial(self._header, sender))
+            message.connection_of = header_of
         if self._args is None:
             self.callback(message)
         else:
             self.callback(message, self._args)
+
+    def _header(self, sender: str) -> dict[str, Any]:
+        """Return the header of the connection to a publisher, as ROS 1 has it."""
+        known = {} if not sender else {"callerid": sender}
+        of_type = {"type": self.data_class._type, "md5sum": self.data_class._md5sum}
+        rest = {"topic": self.name, "message_definition": self.data_class._full_text, "tcp_nodelay": "0"}
+        return {**known, **of_type, **rest, **self.sessions.headers.get((sender, self.name), {})}
 
     def get_num_connections(self) -> int:
         """Return the number of connected publishers."""
@@ -267,6 +282,13 @@ def _service_type(caller: str, service_class: Any) -> str:
     return str(name)
 
 
+def _service_header(node: str, service_class: Any) -> dict[str, Any]:
+    """Return what both sides of a service connection state of a node and the type."""
+    name = service_class._type
+    types = {"type": name, "request_type": f"{name}Request", "response_type": f"{name}Response"}
+    return {"callerid": node, "md5sum": getattr(service_class, "_md5sum", "*"), **types}
+
+
 class Service:
     """Handles requests, each in a thread of its own."""
 
@@ -293,6 +315,11 @@ class Service:
 
     def _handle(self, request: Any) -> Any:
         adopt(request, library_of(self.service_class._request_class))
+        caller = getattr(self._service, "caller", "")
+        added = self.sessions.headers.get((caller, self.resolved_name), {})
+        request.connection_of = cache(
+            lambda: {**_service_header(caller, self.service_class), "service": self.resolved_name, **added}
+        )
         return _to_response(self.service_class, self._handler(request))
 
     def spin(self) -> None:
@@ -336,6 +363,8 @@ class ServiceProxy:
         self.type = _service_type("ServiceProxy", service_class)
         self._client = self._session.node.client(name, self.type)
         self.resolved_name = self._client.name
+        if headers:
+            self.sessions.headers[self._session.node.name, self.resolved_name] = dict(headers)
 
     def __call__(self, *args: Any, **fields: Any) -> Any:
         """Call the service; see ``call``."""
@@ -348,11 +377,19 @@ class ServiceProxy:
         given = len(args) == 1 and not fields and isinstance(args[0], kind)
         try:
             request = args[0] if given else kind(*args, **fields)
-            return adopt(self._client.call(request), library_of(kind))
+            answer = adopt(self._client.call(request), library_of(kind))
+            answer.connection_of = cache(self._header)
+            return answer
         except ServiceError as error:
             raise ServiceException(f"service [{self.resolved_name}]: {error.what}") from error
         except (TypeError, AttributeError) as error:
             raise ServiceException(f"service [{self.resolved_name}]: bad request: {error}") from error
+
+    def _header(self) -> dict[str, Any]:
+        """Return the header of the connection to the server, as ROS 1 has it."""
+        services = self._session.graph.services()
+        server = next((one.server for one in services if one.name == self.resolved_name), "")
+        return _service_header(server, self.service_class)
 
     def wait_for_service(self, timeout: Any = None) -> None:
         """Block until the service is available."""

@@ -218,6 +218,8 @@ class Sessions(LaunchedComponents):
     """Sessions of all components of one run that use rospy."""
 
     _open: dict[str, Session] = field(default_factory=dict, init=False)
+    headers: dict[tuple[str, str], dict[str, Any]] = field(default_factory=dict, init=False)
+    """What files add to the headers of connections, by node and topic or service."""
 
     def join(self, name: str, anonymous: bool) -> None:
         """Execute ``init_node``; a second call of the same component changes nothing."""
