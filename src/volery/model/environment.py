@@ -51,6 +51,7 @@ from volery.model.reading import Reading
 from volery.model.text import Node, Path
 
 VEHICLE_KINDS = ("multirotor", "rover")
+VEHICLE_NAMES = ("mavros", "roscopter", "pprzros")
 SENSOR_SETS = ("consumer", "rtk", "sih")
 STARTS = ("warm", "cold")
 
@@ -363,6 +364,17 @@ class Vehicle:
     version: Annotated[
         str, TEXT, 'Version of that firmware, such as `"1.14"`; the newest that is simulated if not given.'
     ] = ""
+    names: Annotated[
+        str,
+        OneOf(VEHICLE_NAMES),
+        "Whose ROS names the node that serves it has, below `/<vehicle>`: `mavros`, `roscopter` (with "
+        "`send_rc`), or for Paparazzi `pprzros`; the first that fits if it is not given.",
+    ] = ""
+    transmitter: Annotated[
+        Mapping[str, int],
+        MapOf(Whole(least=0, most=3000), free=True),
+        "Where the pilot's transmitter rests: pulse widths in microseconds by channel, from 1.",
+    ] = field(default_factory=dict)
     processor: str | None = None
     where: Location | None = field(default=None, compare=False)
 

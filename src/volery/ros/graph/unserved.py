@@ -33,6 +33,7 @@ _ACTION_TYPES = ("ActionFeedback", "ActionGoal", "ActionResult", "/GoalID", "/Go
 _ACTION_OF_ROS2 = "/_action/"
 
 _DDS_NAMES = {"/fmu/": "PX4's DDS names", "/ap/": "ArduPilot's DDS names"}
+_WRITTEN = {"mavros": "MAVROS", "": "its SDK"}
 
 
 @dataclass(slots=True)
@@ -85,7 +86,7 @@ class Surroundings:
 
     Attributes:
         components: Components whose wants are reported: those of the model, not those of volery.
-        vehicles: Whose names (``MAVROS``) the node of a vehicle has, by vehicle.
+        vehicles: Whose names (``mavros``) the node of a vehicle has, by vehicle.
         without_node: Vehicles in no allocation, which no component commands through a port.
     """
 
@@ -144,7 +145,9 @@ def _near_miss(kind: str, name: str, type_name: str, wants: Wants, around: Surro
     """Return what is there instead and what to do, or an empty string."""
     for prefix, whose in _DDS_NAMES.items():
         if prefix in name and around.vehicles:
-            listed = [f"{vehicle} has {names}'s" for vehicle, names in around.vehicles.items()]
+            listed = [
+                f"{vehicle} has {_WRITTEN.get(names, names)}'s" for vehicle, names in around.vehicles.items()
+            ]
             return f"no vehicle offers {whose}; {', '.join(listed[:3])}"
     namespace = name.split("/")[1] if name.startswith("/") else ""
     if around.without_node and (namespace == "mavros" or namespace in around.without_node):

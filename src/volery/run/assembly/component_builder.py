@@ -42,7 +42,13 @@ from volery.run.assembly.component_ends import ComponentEnds
 from volery.run.assembly.computers import Platform, commanded_by, is_node
 from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.assembly.fences import fence_of
-from volery.run.assembly.vehicle_nodes import NAMES_OF, graph_access, node_name, serve_on_graph
+from volery.run.assembly.vehicle_nodes import (
+    ROSCOPTER_NAMES,
+    graph_access,
+    names_of,
+    node_name,
+    serve_on_graph,
+)
 from volery.run.ending import Ending, Landable
 from volery.trace.events import Unserved
 from volery.vehicles import Drone, Rover, Vehicle
@@ -407,16 +413,26 @@ class Builder:
         for vehicle in self._system.vehicles:
             if vehicle.name in commanded or vehicle.processor is not None:
                 graph_access(vehicle.autopilot, vehicle.name)  # raises before anything starts
+                codec = self._fleet.family(vehicle.name).codec
+                self._served[vehicle.name] = names_of(vehicle, codec, vehicle.name in commanded)
                 if vehicle.name not in commanded:
                     self._add_unattended(vehicle.name, INTERFACES[vehicle.kind])
-                codec = self._fleet.family(vehicle.name).codec
-                self._served[vehicle.name] = NAMES_OF[codec.name] if codec else "its SDK"
                 yield partial(self._serve, self._fleet, vehicle.name, vehicle.processor)
 
     def _add_unattended(self, name: str, interface: str) -> None:
-        opened = partial(self._open, name=name, interface=interface)
+        opened: Callable[[Node], Vehicle] = partial(self._open, name=name, interface=interface)
+        if self._served[name] == ROSCOPTER_NAMES:  # which have no service to land it
+            opened = partial(self._open_on_link, name=name, interface=interface)
         self._landable[name] = UnattendedVehicle(self._graph, name, opened)
         self._ending.vehicles = tuple(self._landable.values())
+
+    def _open_on_link(self, _: Node, name: str, interface: str) -> Drone | Rover:
+        assert self._fleet is not None, "vehicles are served in the process that simulates them"
+        open_driver = drivers.load(self._autopilot(name)).on_link
+        assert open_driver is not None, "MAVLink is spoken on links"
+        driver = open_driver(self._kernel, self._fleet.link(name), name, {})
+        kind = Drone if interface == "Drone" else Rover
+        return kind(self._kernel, name, driver)
 
     def _autopilot(self, vehicle: str) -> str:
         return next(one.autopilot for one in self._system.vehicles if one.name == vehicle)
@@ -426,7 +442,8 @@ class Builder:
         context = ExecutionContext(
             node_name(name), self._platform.processors[processor] if processor else None
         )
-        serve_on_graph(self._graph, fleet, name, graph_access(self._autopilot(name), name), context)
+        access = graph_access(self._autopilot(name), name)
+        serve_on_graph(self._graph, fleet, name, access, context, self._served[name])
 
 
 def python_program(system: System, model: InstanceModel, loader: Loader) -> Program:

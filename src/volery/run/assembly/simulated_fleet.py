@@ -82,6 +82,8 @@ class SimulatedFleet:
                 name=vehicle.name,
                 logging=logging,
             )
+            for channel, pulse in vehicle.transmitter.items():
+                self.move_transmitter(vehicle.name, kernel.now(), int(channel), pulse)
 
     @property
     def world(self) -> World:

@@ -26,14 +26,15 @@ from typing import TYPE_CHECKING
 from mypy_extensions import mypyc_attr
 
 from volery.base.elementary import exp, log
-from volery.base.errors import CapabilityError
+from volery.base.errors import CapabilityError, ModelError, choices
 from volery.base.frames import LocalFrame
 from volery.base.seeds import stream
 from volery.base.time import MS, Ns
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
-from volery.links.link import Link
+from volery.links.link import Codec, Link
 from volery.links.wire_faults import REORDER_DELAY, WireFaults
+from volery.model.environment import Vehicle
 from volery.ros.graph import EmbeddedGraph, RosGraph
 from volery.ros.graph.interface import NodeId, Route
 from volery.ros.messages import Message, cdr_size
@@ -123,20 +124,23 @@ def private_graph(kernel: Kernel, wire: GraphWire, *, as_bytes: bool) -> Embedde
     return EmbeddedGraph(kernel, route=wire.route, unrecorded=True, as_bytes=as_bytes, size_of=wire.size_of)
 
 
-Serve = Callable[[RosGraph, Link, str, ExecutionContext, LocalFrame], object]
-"""``serve(graph, link, vehicle, context, origin)``."""
+Serve = Callable[[RosGraph, Link, str, ExecutionContext, LocalFrame, str], object]
+"""``serve(graph, link, vehicle, context, origin, names)``."""
 
 
 def _mavros(
-    graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame
+    graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame, names: str
 ) -> object:
-    from volery.bridge import VehicleNodeOptions, serve_vehicle  # loads the definitions of all messages
+    from volery.bridge import ROSCOPTER, VehicleNodeOptions, serve_vehicle  # loads all messages
 
-    return serve_vehicle(graph, link, vehicle, context, VehicleNodeOptions(origin=origin))
+    options = VehicleNodeOptions(origin=origin)
+    if names == ROSCOPTER_NAMES:
+        options = VehicleNodeOptions(names=ROSCOPTER, control=True)
+    return serve_vehicle(graph, link, vehicle, context, options)
 
 
 def _pprzros(
-    graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame
+    graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame, names: str
 ) -> object:
     from volery.bridge import serve_pprzros
 
@@ -146,8 +150,9 @@ def _pprzros(
 NODES: Mapping[str, Serve] = {"MAVLink": _mavros, "pprzlink": _pprzros}
 """By the name of the codec."""
 
-NAMES_OF = {"MAVLink": "MAVROS", "pprzlink": "pprzros"}
-"""Whose names that node has."""
+ROSCOPTER_NAMES = "roscopter"
+NAMES_OF = {"MAVLink": ("mavros", ROSCOPTER_NAMES), "pprzlink": ("pprzros",)}
+"""Whose names that node can have; the first is the default."""
 
 SIMULATED_LINK_OPTIONS = {"texts": "unrecorded"}
 """Driver options for a simulated vehicle on a link: its autopilot records its status texts itself."""
@@ -181,15 +186,46 @@ def graph_access(autopilot: str, vehicle: str) -> GraphAccess:
     return GraphAccess(factory.on_graph, factory.namespace.format(name=vehicle))
 
 
+def names_of(vehicle: Vehicle, codec: Codec | None, commanded: bool) -> str:
+    """Return whose names the node of *vehicle* has, as a model states them; empty for a node of its own.
+
+    Raises:
+        ModelError: The names do not fit its protocol, or components command it, which takes the default.
+    """
+    valid = NAMES_OF[codec.name] if codec else ()
+    if vehicle.names and vehicle.names not in valid:
+        there = f"its node can have {choices(valid)}" if valid else "it is a node with names of its own"
+        what = f"{vehicle.name}: {vehicle.names}'s names do not fit {vehicle.autopilot}: {there}"
+        raise ModelError(what, where=vehicle.where)
+    if commanded and vehicle.names not in ("", *valid[:1]):
+        what = f"{vehicle.name}: components command it by {valid[0]}'s names; leave out 'names'"
+        raise ModelError(what, where=vehicle.where)
+    return vehicle.names or (valid[0] if valid else "")
+
+
 def serve_on_graph(
-    graph: RosGraph, fleet: SimulatedFleet, vehicle: str, access: GraphAccess, context: ExecutionContext
+    graph: RosGraph,
+    fleet: SimulatedFleet,
+    vehicle: str,
+    access: GraphAccess,
+    context: ExecutionContext,
+    names: str = "",
 ) -> None:
-    """Start the node that serves a simulated *vehicle*; its execution is charged to *context*."""
+    """Start the node that serves a simulated *vehicle*; its execution is charged to *context*.
+
+    Args:
+        graph: The graph.
+        fleet: The vehicles.
+        vehicle: Name of the vehicle.
+        access: Its namespace.
+        context: Context of the node.
+        names: Whose names the node has; empty for the first of ``NAMES_OF``.
+    """
     codec = fleet.family(vehicle).codec
     if codec is None:
         fleet.autopilots[vehicle].join(graph, access.namespace, context)
         return
-    NODES[codec.name](graph, fleet.link(vehicle), vehicle, context, fleet.frame)
+    NODES[codec.name](graph, fleet.link(vehicle), vehicle, context, fleet.frame, names)
 
 
 class PrivateGraph:

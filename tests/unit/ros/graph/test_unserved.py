@@ -82,7 +82,7 @@ def test_services_are_named_if_they_are_asked_for():
         ours.client("/mavros/land", TRIGGER).ready()
         ours.wait_for_service("/nav/plan", 0)
 
-    seen = found(body, {"drone_1": "MAVROS"})
+    seen = found(body, {"drone_1": "mavros"})
     assert {name: one.hint for name, one in seen.items()} == {
         "/mavros/land": "did you mean /drone_1/land?", "/nav/plan": "",
     }  # fmt: skip
@@ -105,6 +105,6 @@ def test_names_of_dds_and_vehicles_without_a_node():
         ours.subscribe("/fmu/out/vehicle_status", TEXT, ignore)
         ours.wait_for_service("/mavros/set_mode", 0)
 
-    seen = found(body, {"drone_1": "MAVROS"}, "rover")
+    seen = found(body, {"drone_1": "mavros"}, "rover")
     assert seen["/fmu/out/vehicle_status"].hint == "no vehicle offers PX4's DDS names; drone_1 has MAVROS's"
     assert seen["/mavros/set_mode"].hint == "rover is in no allocation, so it has no MAVROS node"

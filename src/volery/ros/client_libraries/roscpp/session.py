@@ -57,7 +57,7 @@ class Session:
             label, self.launch.namespace, remaps=self.launch.remaps, anonymous=anonymous and not launched
         )
         for key, value in self.launch.parameters.items():
-            node.set_parameter(f"~{key}", value)
+            node.set_parameter(key if key.startswith("/") else f"~{key}", value)
         self.opened = node
 
     @property

@@ -1,0 +1,71 @@
+"""Whose ROS names the node of a simulated vehicle has, and where the pilot's transmitter rests."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from volery.base.errors import ModelError
+from volery.run.result import Options
+from volery.run.simulate import simulate
+
+ARMS = """
+import rospy
+from roscopter.msg import RC
+from std_srvs.srv import Empty
+rospy.init_node("pilot")
+print("switch at %d" % rospy.wait_for_message("rc", RC).channel[5])
+sticks = rospy.Publisher("send_rc", RC, queue_size=1)
+rospy.ServiceProxy("arm", Empty)()
+for _ in range(30):
+    sticks.publish([1500, 1500, 1700, 1500, 0, 0, 0, 0])
+    rospy.sleep(0.1)
+"""
+
+
+@pytest.fixture
+def model(tmp_path):
+    """Return the folder of a model with one script and one vehicle."""
+
+    def write(names):
+        (tmp_path / "pilot.py").write_text(ARMS)
+        places = {"pad": {"east": "0 m", "north": "0 m"}}
+        vehicle = {
+            "kind": "multirotor",
+            "autopilot": "ardupilot",
+            "at": "pad",
+            "names": names,
+            "transmitter": {6: 1500},
+        }
+        text = {
+            "volery": 1,
+            "name": "names",
+            "components": {"Pilot": {"language": "rospy", "path": "pilot.py", "active": True}},
+            "application": {"pilot": {"is": "Pilot", "namespace": "/quad"}},
+            "platform": {"processors": {"pc": {"is": "intel-i5-3470", "frequency": "3000 MHz"}}},
+            "allocations": {"only": {"pilot": "pc", "quad": "pc"}},
+            "environment": {
+                "origin": {"latitude": 47.0, "longitude": 8.0, "amsl": "400 m"},
+                "places": places,
+                "vehicles": {"quad": vehicle},
+            },
+            "run": {"duration": "5 s"},
+        }
+        (tmp_path / "model.yaml").write_text(json.dumps(text))
+        return tmp_path
+
+    return write
+
+
+def test_a_vehicle_has_roscopter_s_names_with_send_rc_and_a_switch(model, tmp_path, capsys):
+    done = simulate(model("roscopter"), Options(out=tmp_path / "run"))
+    assert done.completed
+    assert done.record.unserved == []
+    assert done.arrays("quad")["z"].max() > 1.0
+    assert "switch at 1500" in capsys.readouterr().err
+
+
+def test_names_of_another_protocol_are_refused(model):
+    with pytest.raises(ModelError, match="its node can have mavros or roscopter"):
+        simulate(model("pprzros"))
