@@ -268,6 +268,8 @@ class Loader:
     def __post_init__(self) -> None:
         self._codes: dict[Path, CodeType] = {}
         self._interfaces: dict[Library, dict[str, ModuleType]] = {}
+        self.searched: set[tuple[str, Path]] = set()
+        """Interface packages that were searched for the files of a folder."""
         self.shared = Space(self, SHARED_MODULE_PREFIX)
 
     def interfaces(self, library: Library) -> dict[str, ModuleType]:
@@ -659,8 +661,10 @@ class _Import:
 
     def _define(self, package: str) -> bool:
         """Define the interfaces of a package if they are not known and are found; return whether they are."""
-        if package in self._loader.replacements or package in sys.stdlib_module_names:
+        searched = self._loader.searched
+        if (package, self._folder) in searched or package in sys.stdlib_module_names:
             return False
+        searched.add((package, self._folder))
         if not define_packages(self._file, [package], self._loader.workspace):
             return False
         self._loader.add_interfaces(package)

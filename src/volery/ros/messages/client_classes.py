@@ -329,7 +329,7 @@ class _RospyMessage:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, type(self)):
             return False
-        return all(getattr(self, one) == getattr(other, one) for one in type(self).__slots__)
+        return all(_alike(getattr(self, one), getattr(other, one)) for one in type(self).__slots__)
 
     __hash__: Any = None
 
@@ -349,9 +349,8 @@ class _RospyMessage:
     def serialize(self, buff: IO[bytes]) -> None:
         """Write the message's ROS 1 bytes to a file-like object."""
         data = to_ros1(cast("Message", self))
-        if cast("Any", self)._has_header:
-            data = struct.pack("<I", cast("Any", self).header.seq) + data[4:]
-        buff.write(data)
+        header = self._header()
+        buff.write(data if header is None else struct.pack("<I", header.seq) + data[4:])
 
     def deserialize(self, str: bytes) -> Any:  # noqa: A002 - rospy's name
         """Read the fields from ROS 1 bytes; return the message."""
@@ -359,9 +358,22 @@ class _RospyMessage:
         made = cls._adopt(from_ros1(cls.__msgtype__, str))
         for one in cls.__slots__:
             setattr(self, one, getattr(made, one))
-        if cls._has_header:
-            cast("Any", self).header.seq = struct.unpack("<I", str[:4])[0]
+        header = self._header()
+        if header is not None:
+            header.seq = struct.unpack("<I", str[:4])[0]
         return self
+
+    def _header(self) -> Any:
+        """Return the header that the encoding begins with, or None."""
+        message: Any = self
+        return message if isinstance(self, Header) else message.header if message._has_header else None
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Return whether two values are equal; a list and a tuple may be."""
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return list(one) == list(other)
+    return bool(one == other)
 
 
 def _yaml(value: Any, indent: str = "") -> str:
@@ -538,9 +550,7 @@ class Ros1Duration(_Ros1Stamp):
         return NotImplemented
 
     def __floordiv__(self, by: Any) -> Any:
-        if isinstance(by, int):
-            return self._of(self.to_nsec() // by)
-        if isinstance(by, float):
+        if isinstance(by, int | float):
             return type(self).from_sec(cast("Stamp", self).to_sec() // by)
         if isinstance(by, DurationValue):
             return self.to_nsec() // by.to_nsec()
@@ -716,6 +726,8 @@ def _rclpy_init(cls: Any, of_graph: Any, fields: list[Field]) -> Callable[..., N
         elif one.nested is not None:
             nested, count = message_of(one.nested.__msgtype__, RCLPY), one.length or 0
             default = partial(_several, nested, count)
+        elif one.length is not None and one.base not in (*_CODES, "string"):  # lists of bool and byte
+            default = partial(_several, bytes if one.base in BYTES else bool, one.length)
         if callable(default):
             made = writing.name(default)
             head.append(f"{one.name}=unset")
@@ -733,7 +745,7 @@ def _rclpy_init(cls: Any, of_graph: Any, fields: list[Field]) -> Callable[..., N
 
 
 def _several(cls: Any, count: int) -> list[Any]:
-    return [cls() for _ in range(count)]
+    return [b"\0" if cls is bytes else cls() for _ in range(count)]
 
 
 class _RclpyMessage:

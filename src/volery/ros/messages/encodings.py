@@ -43,7 +43,7 @@ def _has_lists(name: str) -> bool:
 
 def to_cdr(message: Message) -> bytes:
     """Encode a message; raise ``UsageError`` if a value does not fit its field."""
-    if _has_lists(message.__msgtype__):
+    if type(message) is not message.of_graph or _has_lists(message.__msgtype__):
         message = message.copy()
     return copied_to_cdr(message)
 

@@ -296,8 +296,8 @@ class Nothing(Message):
     def __init__(self, structure_needs_at_least_one_member: int = 0) -> None: ...
 
 
-_ROS2_DEFAULTS: dict[tuple[str, str], Any] = {("geometry_msgs/msg/Quaternion", "w"): 1.0}
-"""Defaults in the ROS 2 definitions; all others are zero, false or empty."""
+DEFAULTS: dict[tuple[str, str], Any] = {("geometry_msgs/msg/Quaternion", "w"): 1.0}
+"""Defaults that definitions of ROS 2 state, by type and field; all others are zero, false or empty."""
 
 
 class Field(NamedTuple):
@@ -384,8 +384,11 @@ def _default(owner: str, one: Field) -> Any:
 
 def default_value(owner: str, one: Field) -> Any:
     """Return a field's default, or what makes it."""
+    stated = DEFAULTS.get((owner, one.name))
     if one.length is None:
-        return one.nested or _ROS2_DEFAULTS.get((owner, one.name), _zero(one.base))
+        return one.nested or (_zero(one.base) if stated is None else stated)
+    if stated is not None:
+        return partial(cast("Copier", _copier(one)), stated)
     count = one.length
     if one.nested:
         nested = one.nested
@@ -416,7 +419,7 @@ def _copier(one: Field) -> Copier | None:
         return partial(_copy_list, partial(_copy_nested, one.nested), one.length)
     if one.base == "string":
         return partial(_copy_list, _string, one.length)
-    return partial(_copy_array, _dtype(one.base), one.length)
+    return partial(_copy_bytes if one.base in BYTES else _copy_array, _dtype(one.base), one.length)
 
 
 def _number_or_as_is(base: str, value: Any) -> Any:
@@ -448,6 +451,13 @@ def _copy_list(copier: Copier, count: int, values: Any) -> list[Any]:
     if count and len(copied) != count:
         raise ValueError(f"{len(copied)} values, but the field has {count}")
     return copied
+
+
+def _copy_bytes(dtype: np.dtype[Any], count: int, values: Any) -> Any:
+    """Copy a list of ``byte``: ``bytes`` of length 1 in rclpy, signed numbers in rospy."""
+    if isinstance(values, list | tuple) and values:
+        values = b"".join(values) if isinstance(values[0], bytes) else bytes(one & 255 for one in values)
+    return _copy_array(dtype, count, values)
 
 
 def _copy_array(dtype: np.dtype[Any], count: int, values: Any) -> Any:

@@ -115,26 +115,33 @@ def define_imported(file: Path, workspace: Workspace | None = None) -> list[str]
 
 
 def define_packages(file: Path, packages: Iterable[str], workspace: Workspace | None = None) -> list[str]:
-    """Define the interfaces of `packages`, used in `file`, unless they are known; return those found.
+    """Define the interfaces of `packages`, used in `file`, as far as they are not known; return those found.
 
-    They are searched beside the file and in `workspace`, by default what the environment names now.
+    They are searched beside the file and in `workspace`, by default what the environment names now. A package
+    that is known, as volery has a part of it, gets the types that are found there in addition.
 
     Raises ``ModelError`` at the interface's file if it is no definition. Packages that are not found are
     ignored.
     """
-    known = {name.partition("/")[0] for name in (*types(), *service_types(), *action_types())}
+    types_known = {*types(), *service_types(), *action_types()}
+    known = {name.partition("/")[0] for name in types_known}
     known -= _from_files.keys()  # another file may mean another package by the same name
     workspace = workspace or Workspace()
     texts: dict[str, str] = {}
     found: list[str] = []
-    wanted = [name for name in packages if name not in known]
+    wanted = list(packages)
     while wanted:
         package = wanted.pop(0)
         folder = _folder_of(package, file, workspace)
         if folder is None or package in found:
             continue
+        there = list(_texts(package, folder))
+        if package in known:
+            there = [one for one in there if one[0] not in types_known]
+            if not there:
+                continue
         found.append(package)
-        for name, text in _texts(package, folder):
+        for name, text in there:
             texts[name] = text
             wanted += [other for other in _FIELD.findall(text) if other not in (*known, *found)]
     try:
@@ -142,7 +149,7 @@ def define_packages(file: Path, packages: Iterable[str], workspace: Workspace | 
     except UsageError as error:
         raise ModelError(str(error), where=Location(str(file), 1)) from error
     _from_files.update(texts)
-    _from_files.update(dict.fromkeys(found, ""))
+    _from_files.update(dict.fromkeys((one for one in found if one not in known), ""))
     return found
 
 

@@ -8,9 +8,11 @@ types serve the comparison with rclpy's classes.
 
 from __future__ import annotations
 
+import ast
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
@@ -18,7 +20,16 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.ros.messages import lazy_rosbags as rosbags
-from volery.ros.messages.message import DurationValue, Field, Header, Message, Nothing, TimeValue, make_class
+from volery.ros.messages.message import (
+    DEFAULTS,
+    DurationValue,
+    Field,
+    Header,
+    Message,
+    Nothing,
+    TimeValue,
+    make_class,
+)
 
 _ID = "unique_identifier_msgs/UUID goal_id\n"
 _CONSTANT = re.compile(r"^([ \t]*\w+[ \t]+)([A-Za-z]\w*)(?=[ \t]*=)", re.MULTILINE)
@@ -106,10 +117,15 @@ def types_of(named: str) -> rosbags.Typestore:
     return rosbags.get_typestore(rosbags.Stores(f"ros2_{named}"))
 
 
+_SINCE_JAZZY = {("sensor_msgs/msg/NavSatStatus", "status"): -2}
+
+
 @cache
 def store() -> rosbags.Typestore:
     """Return the types of the distribution in use and of ``definitions/``. Private to this package."""
     known = types_of(distribution())
+    if distribution() not in ("humble", "iron"):
+        DEFAULTS.update(_SINCE_JAZZY)
     gone = {name: what for name, what in types_of("humble").fielddefs.items() if name not in known.fielddefs}
     if gone:
         known.register(gone)
@@ -210,6 +226,19 @@ def define_ros1_action(package: str, name: str) -> bool:
     return True
 
 
+_STATED = re.compile(r"^[ \t]*[\w/]+(?:<=\d+)?(?:\[[^]]*\])?[ \t]+([a-z]\w*)[ \t]+([^\s=#].*)$", re.MULTILINE)
+_LITERAL = re.compile(r"""\[[^]]*\]|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'|[^\s#]+""")
+
+
+def stated_defaults(text: str) -> Iterator[tuple[str, Any]]:
+    """Yield the fields of a definition of ROS 2 that state a default, with its value."""
+    for label, rest in _STATED.findall(text):
+        found = _LITERAL.match(rest)
+        literal = re.sub(r"\b(true|false)\b", lambda word: word[0].title(), found[0] if found else "")
+        with suppress(ValueError, SyntaxError):  # what is no value is a comment's or a string without quotes
+            yield label, ast.literal_eval(literal)
+
+
 def _register(into: rosbags.Typestore, texts: dict[str, str]) -> None:
     parsed = {}
     for name, text in texts.items():
@@ -217,6 +246,7 @@ def _register(into: rosbags.Typestore, texts: dict[str, str]) -> None:
             # a service's halves read as messages, so that unqualified types are looked for among them
             read_as = name.replace("/srv/", "/msg/").replace("/action/", "/msg/")
             [parsed[name]] = parse_messages(read_as, text).values()
+            DEFAULTS.update({(name, label): value for label, value in stated_defaults(text)})
         except rosbags.TypesysError as error:
             raise UsageError(f"{name}: not a ROS message definition: {error}") from error
     for name, (_, fields) in parsed.items():

@@ -75,13 +75,13 @@ publisher.publish(Point(5.0, 6.0, 7.0))
 for wrong in (("x",) * 4, (String(),)):
     try:
         publisher.publish(*wrong)
-    except rospy.ROSSerializationException as error:
+    except (rospy.ROSSerializationException, TypeError) as error:
         out(type(error).__name__)
 out((publisher.get_num_connections(), publisher.name))
 rospy.sleep(1)
 """,
     )
-    refused = ["ROSSerializationException"] * 2
+    refused = ["TypeError", "ROSSerializationException"]
     received = [(1.0, 2.0, 3.0), (4.0, 0.0, 0.0), (5.0, 6.0, 7.0)]
     assert stage.run() == [*refused, (1, "/a"), *received]
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 from array import array
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from volery.ros.messages import define, define_imported, types
 from volery.ros.messages.client_classes import RCLPY, ROSPY, Library, adopt, message_of, take_odd_values
 
 
@@ -142,3 +144,27 @@ def test_what_rclpy_classes_say_of_themselves() -> None:
         sum([stamp, stamp], stamp)
     with pytest.raises(TypeError):
         hash(stamp)
+
+
+def test_defaults_that_a_definition_states() -> None:
+    text = 'float32 gain 1.5 # of the loop\nbool on true\nstring<=10 name "a # b"\nint32[] list [1, 2]\nuint8 A=3'
+    define("values_test_msgs/msg/Gains", text)
+    made: Any = message_of("values_test_msgs/msg/Gains", RCLPY)()
+    assert (made.gain, made.on, made.name, made.list) == (1.5, True, "a # b", array("i", [1, 2]))
+    assert message_of("sensor_msgs/msg/NavSatStatus", RCLPY)().status == -2  # type: ignore[attr-defined]
+    assert message_of("sensor_msgs/msg/NavSatStatus", ROSPY)().status == 0  # type: ignore[attr-defined]
+
+
+def test_a_known_package_gets_the_other_types_of_the_workspace(tmp_path: Path) -> None:
+    folder = tmp_path / "roscopter"
+    (folder / "msg").mkdir(parents=True)
+    (folder / "package.xml").write_text("<package><name>roscopter</name></package>")
+    (folder / "msg" / "RC.msg").write_text("int32 other\n")  # the vehicle's node has another one
+    (folder / "msg" / "ValuesTest.msg").write_text("int32 latitude\n")
+    file = folder / "scripts" / "node.py"
+    file.parent.mkdir()
+    file.write_text("import roscopter.msg\n")
+    assert define_imported(file) == ["roscopter"]
+    assert "roscopter/msg/ValuesTest" in types()
+    assert message_of("roscopter/msg/RC").__match_args__ == ("channel",)
+    assert define_imported(file) == []

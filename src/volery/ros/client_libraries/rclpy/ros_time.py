@@ -13,8 +13,12 @@ from volery.ros.client_libraries.rclpy.context import (
     NotInitializedException,
     ROSInterruptException,
 )
-from volery.ros.messages import new
+from volery.ros.messages.client_classes import RCLPY, message_of
 from volery.ros.messages.message import nanoseconds
+from volery.ros.messages.store import distribution
+
+_TimeMessage: Any = message_of("builtin_interfaces/msg/Time", RCLPY)
+_DurationMessage: Any = message_of("builtin_interfaces/msg/Duration", RCLPY)
 
 
 class ClockType(IntEnum):
@@ -25,8 +29,16 @@ class ClockType(IntEnum):
     STEADY_TIME = 3
 
 
-def _total_ns(seconds: float, nanoseconds_: float) -> Ns:
-    return (from_seconds(seconds) if isinstance(seconds, float) else seconds * S) + int(nanoseconds_)
+_LARGEST: Ns = (1 << 63) - 1
+ADDS_DURATIONS = distribution() not in ("humble", "iron", "jazzy")
+"""Whether durations have arithmetic, as from Kilted on."""
+
+
+def _total_ns(seconds: float, nanoseconds_: float, what: str) -> Ns:
+    total = (from_seconds(seconds) if isinstance(seconds, float) else seconds * S) + int(nanoseconds_)
+    if not -_LARGEST - 1 <= total <= _LARGEST:
+        raise OverflowError(f"Total nanoseconds value is too large to store in C {what}.")
+    return total
 
 
 @total_ordering
@@ -34,13 +46,15 @@ class Duration:
     """A duration, which may be negative."""
 
     def __init__(self, *, seconds: float = 0, nanoseconds: float = 0) -> None:
-        self.nanoseconds: Ns = _total_ns(seconds, nanoseconds)
+        self.nanoseconds: Ns = _total_ns(seconds, nanoseconds, "duration")
 
     def __repr__(self) -> str:
         return f"Duration(nanoseconds={self.nanoseconds})"
 
-    def __hash__(self) -> int:
-        return hash(self.nanoseconds)
+    def __str__(self) -> str:
+        return f"{self.nanoseconds} nanoseconds"
+
+    __hash__: Any = None
 
     def __eq__(self, other: object) -> bool:
         return self.nanoseconds == other.nanoseconds if isinstance(other, Duration) else NotImplemented
@@ -49,24 +63,24 @@ class Duration:
         return self.nanoseconds < other.nanoseconds if isinstance(other, Duration) else NotImplemented
 
     def __add__(self, other: Any) -> Duration:
-        if not isinstance(other, Duration):
+        if not (isinstance(other, Duration) and ADDS_DURATIONS):
             return NotImplemented
         return Duration(nanoseconds=self.nanoseconds + other.nanoseconds)
 
     def __sub__(self, other: Any) -> Duration:
-        if not isinstance(other, Duration):
+        if not (isinstance(other, Duration) and ADDS_DURATIONS):
             return NotImplemented
         return Duration(nanoseconds=self.nanoseconds - other.nanoseconds)
 
     def __mul__(self, factor: float) -> Duration:
+        if not (isinstance(factor, int | float) and ADDS_DURATIONS):
+            return NotImplemented
         return Duration(nanoseconds=round(self.nanoseconds * factor))
-
-    __rmul__ = __mul__
 
     def to_msg(self) -> Any:
         """Return the duration as ``builtin_interfaces/msg/Duration``."""
         seconds, rest = divmod(self.nanoseconds, S)
-        return new("builtin_interfaces/msg/Duration", sec=seconds, nanosec=rest)
+        return _DurationMessage(sec=seconds, nanosec=rest)
 
     @classmethod
     def from_msg(cls, msg: Any) -> Duration:
@@ -84,7 +98,7 @@ class Time:
     def __init__(
         self, *, seconds: float = 0, nanoseconds: float = 0, clock_type: ClockType = ClockType.SYSTEM_TIME
     ) -> None:
-        self.nanoseconds: Ns = _total_ns(seconds, nanoseconds)
+        self.nanoseconds: Ns = _total_ns(seconds, nanoseconds, "time point")
         self.clock_type = ClockType(clock_type)
         if self.nanoseconds < 0:
             raise ValueError("Seconds value must not be negative")
@@ -92,8 +106,7 @@ class Time:
     def __repr__(self) -> str:
         return f"Time(nanoseconds={self.nanoseconds}, clock_type={self.clock_type.name})"
 
-    def __hash__(self) -> int:
-        return hash((self.nanoseconds, self.clock_type))
+    __hash__: Any = None
 
     def seconds_nanoseconds(self) -> tuple[int, int]:
         """Return seconds and remaining nanoseconds."""
@@ -133,7 +146,7 @@ class Time:
     def to_msg(self) -> Any:
         """Return the time as ``builtin_interfaces/msg/Time``."""
         seconds, rest = self.seconds_nanoseconds()
-        return new("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest)
+        return _TimeMessage(sec=seconds, nanosec=rest)
 
     @classmethod
     def from_msg(cls, msg: Any, clock_type: ClockType = ClockType.ROS_TIME) -> Time:

@@ -18,9 +18,11 @@ from volery.ros.client_libraries.rospy.session import (
 )
 from volery.ros.graph import BEST_AVAILABLE, LATCHED, QoS, ServiceError, Subscription, Work
 from volery.ros.graph.endpoints import EmbeddedPublisher
-from volery.ros.messages import Message, ros1_type, to_ros1
+from volery.ros.messages import Message, ros1_type, to_cdr, to_ros1
 from volery.ros.messages.client_classes import adopt, library_of, receiving
 
+WARNING = 4
+"""Severity as in syslog."""
 _TYPE_POLL: Ns = 100 * MS
 """Period at which an ``AnyMsg`` subscription looks for the type of its topic."""
 
@@ -156,17 +158,19 @@ class Publisher:
         """Publish a message, or one made of these fields; raise ``ROSException`` before ``init_node``."""
         if not self._session.initialised:
             raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
-        if len(args) == 1 and not fields and isinstance(args[0], Message):
-            message: Any = args[0]
-        else:
-            message = _message(self.data_class, args, fields)
+        kind = self.data_class
+        whole = len(args) == 1 and not fields and isinstance(args[0], kind.of_graph)
+        message: Any = args[0] if whole else kind(*args, **fields)
         if self._count is not None:
             self._count += 1
             message.header.seq = self._count
         try:
             self._publisher.publish(message)
         except UsageError as error:
-            raise ROSSerializationException(str(error)) from error
+            if self._publisher.subscribers() or not _misfits(message):
+                raise ROSSerializationException(str(error)) from error
+            text = f"{self.name}: not sent, which rospy tells only if the topic has a subscriber: {error}"
+            self._session.log(WARNING, text)
 
     def get_num_connections(self) -> int:
         """Return the number of connected subscribers."""
@@ -177,11 +181,13 @@ class Publisher:
         self._publisher.close()
 
 
-def _message(data_class: Any, args: tuple[Any, ...], fields: dict[str, Any]) -> Any:
+def _misfits(message: Message) -> bool:
+    """Return whether a message has a value that does not fit its field."""
     try:
-        return data_class(*args, **fields)
-    except (TypeError, AttributeError) as error:
-        raise ROSSerializationException(f"{data_class.__msgtype__}: {error}") from error
+        to_cdr(message)
+    except UsageError:
+        return True
+    return False
 
 
 class Subscriber:

@@ -1,0 +1,55 @@
+"""Expressions with messages, times and durations have the same values with our client libraries."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from volery.run.result import Options
+from volery.run.simulate import simulate
+
+from .conftest import HERE, LIMIT_S, python_of, surroundings
+
+pytestmark = pytest.mark.integration
+
+FILES = HERE / "ros_files" / "values"
+MODEL = """
+volery: 1
+name: values
+files_from: {folder}
+components: {{Values: {{language: {library}, path: {folder}/values.py, active: true}}}}
+application: {{values: {{is: Values, arguments: [{library}, {folder}/{library}.txt]}}}}
+platform: {{processors: {{pc: {{is: intel-i5-3470, frequency: 3000 MHz}}}}}}
+allocations: {{only: {{values: pc}}}}
+run: {{duration: 1 s}}
+"""
+
+
+def of_output(text: str) -> list[str]:
+    [line] = [one for one in text.splitlines() if one.startswith("VALUES ")]
+    return list(json.loads(line.removeprefix("VALUES ")))
+
+
+@pytest.mark.parametrize("library", ["rclpy", "rospy"])
+def test_the_same_values(library: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    python = python_of("jazzy") if library == "rclpy" else sys.executable
+    if library == "rospy":
+        pytest.importorskip("genpy")
+    program = [python, str(FILES / "values.py"), library, str(FILES / f"{library}.txt")]
+    done = subprocess.run(
+        program, env=surroundings(), capture_output=True, text=True, timeout=LIMIT_S, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    model = tmp_path / "model.yaml"
+    model.write_text(MODEL.format(folder=FILES, library=library), encoding="utf-8")
+    capfd.readouterr()
+    simulate(model, Options(out=tmp_path / "run"))
+    ours = of_output("".join(capfd.readouterr()))
+    expressions = [one for one in (FILES / f"{library}.txt").read_text(encoding="utf-8").splitlines() if one]
+    pairs = zip(expressions, of_output(done.stdout), ours, strict=True)
+    differ = [f"{one}\n  real {real}\n  ours {our}" for one, real, our in pairs if real != our]
+    assert not differ, "\n".join(differ)
