@@ -147,7 +147,7 @@ def test_what_rclpy_classes_say_of_themselves() -> None:
 
 
 def test_defaults_that_a_definition_states() -> None:
-    text = 'float32 gain 1.5 # of the loop\nbool on true\nstring<=10 name "a # b"\nint32[] list [1, 2]\nuint8 A=3'
+    text = 'float32 gain 1.5 # a gain\nbool on true\nstring<=10 name "a # b"\nint32[] list [1, 2]\nuint8 A=3'
     define("values_test_msgs/msg/Gains", text)
     made: Any = message_of("values_test_msgs/msg/Gains", RCLPY)()
     assert (made.gain, made.on, made.name, made.list) == (1.5, True, "a # b", array("i", [1, 2]))
