@@ -108,6 +108,23 @@ def test_queues_spinners_and_forms_of_callbacks(run_model):
     assert said[-1] == "tick"
 
 
+def test_frames_of_tf_and_tf2(run_model):
+    """The angles, the interpolated rotation and the inverse are those of tf2 0.7.6."""
+    outcome = run_model(QUEUES.replace("queues.cpp", "frames.cpp"), "frames.cpp")
+    assert outcome.run.completed, outcome.run.record.outcome
+    known = "There is base, camera or world"
+    assert [one.text for one in outcome.of(Text) if one.source == "queues"] == [
+        "between 2.500000 0.000000 2.000000 yaw 0.250000",
+        "camera 9.621610 0.783327 2.000000 yaw 2.470796",
+        "point 1.000000 1.000000 base",
+        "angles 0.220277 0.036965 0.294047",
+        "slerp 0.585608 1.297457",
+        "back -2.000000 1.000000 -3.000000",
+        f'lookup: "nowhere" passed to lookupTransform argument source_frame does not exist. {known}',
+        "extrapolation 0",
+    ]
+
+
 def test_it_compiles_without_boost(tmp_path):
     headers = roscpp.generate_headers(_includes("pose_keeper.cpp"), FILES / "pose_keeper.cpp")
     for name, text in headers.items():

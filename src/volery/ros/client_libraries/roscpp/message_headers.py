@@ -13,6 +13,7 @@ from volery.ros.messages.store import ROS1_SPELLING
 
 INCLUDE = Path(__file__).parent / "include"
 _HEADER = re.compile(r"^(\w+)/(\w+)\.h$")
+_INCLUDED = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 _BASES = {
     "bool": "std::uint8_t", "byte": "std::int8_t", "char": "std::uint8_t", "octet": "std::uint8_t",
     "int8": "std::int8_t", "uint8": "std::uint8_t", "int16": "std::int16_t", "uint16": "std::uint16_t",
@@ -36,6 +37,7 @@ def generate_headers(includes: Sequence[str], path: Path, present: Collection[st
     Raises:
         ModelError: The file of an interface is not a valid definition.
     """
+    includes = _with_ours(includes)
     named = [found for name in includes if (found := _HEADER.match(name))]
     messages.define_packages(path, dict.fromkeys(found[1] for found in named))
     packages = {name.partition("/")[0] for name in (*messages.types(), *messages.service_types())}
@@ -50,6 +52,19 @@ def generate_headers(includes: Sequence[str], path: Path, present: Collection[st
         if remedy is not None:
             texts[name] = f'#error "volery: <{name}> is not offered: {remedy}"\n'
     return texts
+
+
+def _with_ours(includes: Sequence[str]) -> list[str]:
+    """Return *includes* and, of the headers offered here, what they include in turn."""
+    found = dict.fromkeys(includes)
+    waiting = list(includes)
+    while waiting:
+        ours = INCLUDE / waiting.pop()
+        if ours.is_file():
+            further = [name for name in _INCLUDED.findall(ours.read_text()) if name not in found]
+            found.update(dict.fromkeys(further))
+            waiting += further
+    return list(found)
 
 
 _OWN_PROCESS = "it needs threads or a process of its own; write it in Python, or leave this node out"

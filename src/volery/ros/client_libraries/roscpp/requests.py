@@ -10,6 +10,7 @@ from volery.base.time import Ns
 from volery.kernel.waiting import Rate, sleep
 from volery.ros.client_libraries.abi_codec import CppFiber, Reader, RequestHandler, Writer
 from volery.ros.client_libraries.roscpp.session import RefusedRequestError, Session
+from volery.ros.client_libraries.roscpp.transforms import TRANSFORMS
 from volery.ros.graph import BEST_AVAILABLE, LATCHED, Client, Group, QoS, ServiceError, Timer
 from volery.ros.graph.endpoints import Connection, EmbeddedPublisher
 from volery.ros.graph.work import Work
@@ -335,7 +336,7 @@ def request_handlers(session: Session) -> dict[str, RequestHandler]:
         return lambda fiber, arguments: _encoded(handle(session, fiber, arguments))
 
     handlers = {name: simple(one) for name, one in {**_PROCESS, **_NAMES, **_TIME, **_PARAMETERS}.items()}
-    handlers.update({name: simple(one) for name, one in SIMPLE.items()})
+    handlers.update({name: simple(one) for name, one in {**SIMPLE, **TRANSFORMS}.items()})
     handlers.update({name: with_fiber(one) for name, one in WITH_FIBER.items()})
     return {f"ros.{name}": handler for name, handler in handlers.items()}
 

@@ -1,0 +1,84 @@
+"""Handlers of the requests of ``tf2_ros`` and ``tf`` in C++, over the tree that tf2 for Python keeps, too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+from volery.base.time import Ns
+from volery.ros.client_libraries.abi_codec import Reader, Writer
+from volery.ros.client_libraries.roscpp.session import Session
+from volery.ros.client_libraries.tf2.tf2_ros import TF, TF_STATIC, Buffer
+from volery.ros.client_libraries.tf2.transform_tree import TransformException
+from volery.ros.graph import AS_OFFERED
+from volery.ros.messages import from_cdr, to_cdr
+
+
+class _Nanoseconds(NamedTuple):
+    """A time or duration as ``Buffer`` takes it."""
+
+    nanoseconds: Ns
+
+
+def _create(session: Session, arguments: Reader) -> int:
+    kind: Any = type("Buffer", (Buffer,), {"kernel": session.kernel})
+    return session.keep(kind(_Nanoseconds(arguments.integer())))
+
+
+def _buffer(session: Session, arguments: Reader) -> Buffer:
+    return session.find(arguments.integer(), Buffer)
+
+
+def _listen(session: Session, arguments: Reader) -> None:
+    """Fill a buffer in a task of its own, as the listener's thread does."""
+    buffer, node = _buffer(session, arguments), session.node
+    group = node.group()
+
+    def on_transforms(static: bool, message: Any) -> None:
+        for transform in message.transforms:
+            buffer.set_transform(transform, static=static)
+
+    for topic in (TF, TF_STATIC):
+        on_message = partial(on_transforms, topic == TF_STATIC)
+        node.subscribe(topic, "tf2_msgs/msg/TFMessage", on_message, AS_OFFERED, group)
+    session.spawn(group.spin, "tf2_ros::TransformListener")
+
+
+def _set(session: Session, arguments: Reader) -> bool:
+    buffer = _buffer(session, arguments)
+    transform = from_cdr("geometry_msgs/msg/TransformStamped", arguments.raw())
+    buffer.set_transform(transform, static=arguments.flag())
+    return True
+
+
+def _question(arguments: Reader) -> tuple[str, str, _Nanoseconds, _Nanoseconds]:
+    """Read target, source, time and time-out."""
+    target, source = arguments.text(), arguments.text()
+    return target, source, _Nanoseconds(arguments.integer()), _Nanoseconds(arguments.integer())
+
+
+def _can(session: Session, arguments: Reader) -> str:
+    """Return why there is no transform, or ``""``."""
+    possible, reason = _buffer(session, arguments).can_transform(*_question(arguments), True)
+    return "" if possible else reason or "a name of a frame is not valid"
+
+
+def _look_up(session: Session, arguments: Reader) -> bytes:
+    try:
+        found = _buffer(session, arguments).lookup_transform(*_question(arguments))
+    except TransformException as error:
+        return Writer().flag(False).text(type(error).__name__).text(str(error)).done()
+    return Writer().flag(True).done() + to_cdr(found)
+
+
+TRANSFORMS: dict[str, Callable[[Session, Reader], Any]] = {
+    "tf_buffer": _create,
+    "tf_listen": _listen,
+    "tf_set": _set,
+    "tf_can": _can,
+    "tf_look_up": _look_up,
+    "tf_clear": lambda session, arguments: _buffer(session, arguments).clear(),
+    "tf_frames": lambda session, arguments: _buffer(session, arguments).all_frames_as_string(),
+}
+"""Handlers by the name of the request."""
