@@ -49,6 +49,15 @@ REFERENCE = ROOT / "docs" / "reference"
 CONFORMANCE = ROOT / "tests" / "conformance"
 MARKS = {"passed": "✓", "failed": "✗", "declared missing": "–", "not possible here": "·"}
 MADE = "<!-- made by scripts/generate_docs.py; do not edit -->\n\n"
+_LIBRARIES = {
+    "rclpy": "rclpy 7.1.6 (ROS 2 Jazzy)",
+    "rospy": "rospy 1.15.15 (ROS 1 Noetic)",
+    "actionlib": "actionlib 1.14.0 (ROS 1 Noetic)",
+    "message_filters": "message_filters 1.15.15 (ROS 1 Noetic)",
+    "tf": "tf 1.13.2 (ROS 1 Noetic)",
+    "tf2_ros": "tf2_ros 0.7.6 (ROS 1 Noetic)",
+}
+"""Client libraries whose names are listed, with their titles."""
 
 
 def observables() -> str:
@@ -505,7 +514,7 @@ def pages() -> dict[Path, str]:
         "conformance.md": MADE + conformance(),
         "faults.md": MADE + faults(),
         "model.md": MADE + model(),
-        "ros-surface.md": MADE + ros_surface({"rclpy": "rclpy 7.1.6 (ROS 2 Jazzy)"}),
+        "ros-surface.md": MADE + ros_surface(_LIBRARIES),
         "rules.md": MADE + rules(),
         "versions.md": MADE + versions(),
         "model.schema.json": json.dumps(schema(), indent=2, ensure_ascii=False) + "\n",

@@ -859,6 +859,9 @@ def _made(user: _UsesRospy, kind: type) -> Any:
     return type(kind.__name__, (kind,), {"rospy": user.rospy})
 
 
+for _states in (CommState, TerminalState, SimpleGoalState, GoalStatus):
+    _states.to_string = classmethod(get_name_of_constant)  # type: ignore[union-attr]  # as actionlib adds it
+
 _PLAIN = (
     ActionException, ClientGoalHandle, CommState, GoalID, GoalStatus, GoalStatusArray, ServerGoalHandle,
     SimpleGoalState, TerminalState,

@@ -65,12 +65,14 @@ client.send_goal(FibonacciGoal(3), done, lambda: out("active"), lambda got: out(
 out(client.get_state() == GoalStatus.PENDING)
 out(client.wait_for_result())
 out((client.get_state(), client.get_goal_status_text(), rospy.get_time()))
+out((actionlib.GoalStatus.to_string(client.get_state()), actionlib.CommState.to_string(6)))
 out(client.send_goal_and_wait(FibonacciGoal(20), rospy.Duration(1.2)))
 out((client.wait_for_result(rospy.Duration(0.1)), list(client.get_result().sequence)))
 """,
     )
     found = stage.run(20 * S)
     assert found[:9] == [True, True, "active", 3, 4, 5, (3, [0, 1, 1, 2, 3]), True, (3, "all", 1.51)]
+    assert found.pop(9) == ("SUCCEEDED", "PREEMPTING")
     assert found[9:] == [GoalStatus.PREEMPTED, (True, [0, 1, 1, 2, 3])]
 
 

@@ -228,10 +228,20 @@ def modules(
     }
     found = {f"rospy.{part}": library_module(f"rospy.{part}", inside) for part, inside in parts.items()}
     names.pop("is_initialized")  # rospy has it in core alone
-    rospy = library_module("rospy", {**names, **{part: found[f"rospy.{part}"] for part in parts}})
+    inside = {**names, **{part: found[f"rospy.{part}"] for part in parts}}
+    rospy = library_module("rospy", inside, REFUSED)
     return {**messages.modules(library=ROSPY), "rospy": rospy, **found, **rosgraph_modules(master, names)}
 
 
+_NO_ADDRESSES = "nodes of a simulated graph have no addresses"
+REFUSED = {
+    "rospy.get_node_uri": _NO_ADDRESSES,
+    "rospy.parse_rosrpc_uri": _NO_ADDRESSES,
+    "rospy.get_ros_root": "rospkg.RosPack finds packages",
+    "rospy.impl": "its content is rospy's own; there are no connections",
+    "rospy.logout": "the log is the topic /rosout",
+}
+"""Names that are not there on purpose, and what to do instead."""
 _LOGS = tuple(f"log{name}{ending}" for name in _FUNCTIONS if name != "error" for ending in _ENDINGS)
 _NAMES_OF_NODE = ("get_caller_id", "get_name", "get_namespace", "remap_name", "resolve_name")
 _NAMES_OF_ROSPY = {one: NAMES[one] for one in ("canonicalize_name", "global_name", "scoped_name")}

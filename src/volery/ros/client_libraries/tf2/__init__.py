@@ -55,6 +55,7 @@ def modules(kernel: Kernel, rospy: ModuleType, executors: ModuleType) -> dict[st
         **EXCEPTIONS,
         **{kind.__name__: kind for kind in _PLAIN},
         "Buffer": buffer,
+        "BufferCore": buffer,
         **{kind.__name__: type(kind.__name__, (kind,), members) for kind in _CLASSES},
     }
     inside = {part: {name: names[name] for name in listed} for part, listed in _SUBMODULES.items()}

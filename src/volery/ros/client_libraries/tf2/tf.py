@@ -95,6 +95,16 @@ class Transformer:
         if not can:
             raise TransformException(why)
 
+    def canTransformFull(  # noqa: N802 - tf's name
+        self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str
+    ) -> Any:
+        """Return whether the transform between two times is available."""
+        target, source, fixed = map(_without_slash, (target_frame, source_frame, fixed_frame))
+        return self._buffer.can_transform_full(target, target_time, source, source_time, fixed)
+
+    def setUsingDedicatedThread(self, value: bool) -> None:  # noqa: N802 - tf's name
+        """Do nothing: waits never keep others from running."""
+
     def frameExists(self, frame_id: str) -> bool:  # noqa: N802 - tf's name
         """Return whether a frame is known."""
         return _without_slash(frame_id) in self._buffer.all_frames_as_list()
