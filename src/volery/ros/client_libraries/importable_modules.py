@@ -13,6 +13,7 @@ from volery.ros.client_libraries import (
     message_filters,
     rclpy,
     ros1_tools,
+    ros2_tools,
     rospy,
     tf2,
 )
@@ -45,6 +46,7 @@ def importable_modules(
         **tf2.modules(graph.kernel, found["rospy"], found["rclpy.executors"]),
         **actionlib.modules(found["rospy"]),
         **ros1_tools.modules(found["rospy"]),
+        **ros2_tools.modules(),
         **mavros_package.modules(found["rospy"]),
         **message_filters.modules(found["rospy"], found["rclpy.time"]),
         **{name: _unavailable_module(name, instead) for name, instead in _UNAVAILABLE.items()},

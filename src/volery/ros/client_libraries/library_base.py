@@ -179,6 +179,14 @@ def caller(depth: int) -> Caller:
     return Caller(Path(frame.f_code.co_filename).name, frame.f_code.co_name, frame.f_lineno)
 
 
+def file_of_user() -> Path:
+    """Return the file of the first caller outside the client libraries."""
+    frame = sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").startswith("volery.ros."):
+        frame = frame.f_back
+    return Path(frame.f_code.co_filename)
+
+
 class Rosout:
     """Publishes the log lines of a node as messages of one type.
 

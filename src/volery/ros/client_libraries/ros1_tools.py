@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import struct
-import sys
 import unittest
 from collections import namedtuple
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from math import isnan
-from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
 from volery.base.errors import did_you_mean
-from volery.ros.client_libraries.library_base import library_module
+from volery.ros.client_libraries.library_base import file_of_user, library_module
 from volery.ros.messages import Workspace
 from volery.ros.messages.client_classes import ROSPY, message_of
 
@@ -27,14 +25,6 @@ class ResourceNotFound(Exception):  # noqa: N818 - rospkg's name
     def __init__(self, name: str, ros_paths: Sequence[str] = ()) -> None:
         super().__init__(name)
         self.ros_paths = list(ros_paths)
-
-
-def _file_of_user() -> Path:
-    """Return the file of the first caller outside this module."""
-    frame = sys._getframe(1)
-    while frame.f_back is not None and frame.f_code.co_filename == __file__:
-        frame = frame.f_back
-    return Path(frame.f_code.co_filename)
 
 
 class RosPack:
@@ -52,11 +42,11 @@ class RosPack:
 
     def list(self) -> list[str]:
         """Return the names of all packages."""
-        return sorted(self.workspace.names(_file_of_user()))
+        return sorted(self.workspace.names(file_of_user()))
 
     def get_path(self, name: str) -> str:
         """Return the folder of a package; raise ``ResourceNotFound`` if there is none."""
-        file = _file_of_user()
+        file = file_of_user()
         found = self.workspace.find(name, file)
         if found is None:
             near = did_you_mean(name, self.workspace.names(file))
