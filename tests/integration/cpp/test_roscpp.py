@@ -110,10 +110,15 @@ def test_queues_spinners_and_forms_of_callbacks(run_model):
 
 def test_frames_of_tf_and_tf2(run_model):
     """The angles, the interpolated rotation and the inverse are those of tf2 0.7.6."""
-    outcome = run_model(QUEUES.replace("queues.cpp", "frames.cpp"), "frames.cpp")
+    model = QUEUES.replace("queues.cpp", "frames.cpp").replace(
+        "is: Queues", "is: Queues, arguments: [one, _rate:=7, two words]"
+    )
+    outcome = run_model(model, "frames.cpp")
     assert outcome.run.completed, outcome.run.record.outcome
     known = "There is base, camera or world"
     assert [one.text for one in outcome.of(Text) if one.source == "queues"] == [
+        "argument one, rate 7",
+        "argument two words, rate 7",
         "between 2.500000 0.000000 2.000000 yaw 0.250000",
         "camera 9.621610 0.783327 2.000000 yaw 2.470796",
         "point 1.000000 1.000000 base",

@@ -223,6 +223,7 @@ class CppProgram:
         compiled: The component, compiled for this instance.
         client_library: Request handlers of a client library, added to those of every component.
         on_exit: Called when ``main`` has returned, as the end of a process is noticed by others.
+        arguments: Command-line arguments of ``main``, after the name of the program.
     """
 
     def __init__(
@@ -232,12 +233,14 @@ class CppProgram:
         compiled: CompiledComponent,
         client_library: RequestHandlers | None = None,
         on_exit: Callable[[], None] | None = None,
+        arguments: Sequence[str] = (),
     ) -> None:
         self._kernel = kernel
         self._name = name
         self._compiled = compiled
         self._client_library = client_library or {}
         self._on_exit = on_exit
+        self._arguments = arguments
         self._meter: tuple[StepMeter, ToSteps] | None = None
         self._on_load: Callable[[LoadedLibrary], None] = lambda library: None
 
@@ -300,7 +303,10 @@ class CppProgram:
         """See ``Program``."""
         assert isinstance(thing, CppObject)
         try:
-            returned = thing.fibers.call(RUN, Writer().text(self._name).done())
+            given = Writer().integer(1 + len(self._arguments))
+            for argument in (self._name, *self._arguments):
+                given.text(argument)
+            returned = thing.fibers.call(RUN, given.done())
             status = Reader(returned).integer() if returned else 0  # run() of a class returns nothing
         except ProcessExit as exited:
             status = exited.status

@@ -340,10 +340,15 @@ class CppPrograms:
             launch = self._launches.get(model.name, Launch())
             session = roscpp.Session(self._graph, model.name, launch, self._nodes)
             made = CppProgram(
-                self._kernel, model.name, compiled, roscpp.request_handlers(session), session.end
+                self._kernel,
+                model.name,
+                compiled,
+                roscpp.request_handlers(session),
+                session.end,
+                model.arguments,
             )
         else:
-            made = CppProgram(self._kernel, model.name, compiled)
+            made = CppProgram(self._kernel, model.name, compiled, arguments=model.arguments)
         if counting is not None:
             made.count(self.meters[model.name], counting.to_steps())
         if tracing is not None and self._traces is not None:

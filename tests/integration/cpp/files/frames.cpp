@@ -13,6 +13,9 @@
 int main(int argc, char** argv) {
     ros::init(argc, argv, "frames");
     ros::NodeHandle node;
+    int rate = 0;
+    ros::param::get("~rate", rate);
+    for (int index = 1; index < argc; ++index) ROS_INFO("argument %s, rate %d", argv[index], rate);
     tf2_ros::Buffer buffer;
     tf2_ros::TransformListener listener(buffer);
     tf::TransformListener old_listener;

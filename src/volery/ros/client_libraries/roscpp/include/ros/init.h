@@ -19,8 +19,14 @@ inline void init(const M_string&, const std::string& name, std::uint32_t options
     bool const anonymous = (options & init_options::AnonymousName) != 0;
     volery::request("ros.init", volery::Writer().put(name).put(anonymous));
 }
-inline void init(int&, char**, const std::string& name, std::uint32_t options = 0) {
+// Arguments for ROS (``a:=b``) are removed from the others; the launch settings contain them already.
+inline void init(int& count, char** arguments, const std::string& name, std::uint32_t options = 0) {
     init(M_string(), name, options);
+    int kept = 0;
+    for (int index = 0; index < count; ++index)
+        if (std::string(arguments[index]).find(":=") == std::string::npos) arguments[kept++] = arguments[index];
+    if (kept < count) arguments[kept] = nullptr;
+    count = kept;
 }
 
 inline bool isInitialized() { return volery::request("ros.initialized").flag(); }
