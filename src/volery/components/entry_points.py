@@ -1,11 +1,13 @@
-"""Entry points of Python packages: which function of a file ROS calls when it starts the package's program.
+"""Programs of packages: the file that ROS executes, and the function of it that ROS calls.
 
-They are read from ``setup.py``, ``setup.cfg`` or ``pyproject.toml``, without executing anything.
+Entry points of Python packages are read from ``setup.py``, ``setup.cfg`` or ``pyproject.toml``, or where they
+are installed, without executing anything.
 """
 
 from __future__ import annotations
 
 import ast
+import os
 import re
 import tomllib
 from collections.abc import Iterator
@@ -14,7 +16,9 @@ from configparser import Error as ConfigError
 from pathlib import Path
 from typing import NamedTuple
 
+from volery.base.errors import UsageError, choices, did_you_mean
 from volery.components.loader import SourceFile
+from volery.ros.messages.workspace import Package, Workspace
 
 _LEVELS = 3
 """Number of folders above a file's own in which its package may begin."""
@@ -128,3 +132,83 @@ def _of_pyproject(folder: Path) -> list[str]:
         return []
     scripts = read.get("project", {}).get("scripts", {})
     return [f"{name} = {target}" for name, target in scripts.items()]
+
+
+class Executable(NamedTuple):
+    """A program of a package: its file, and the function of an entry point or ""."""
+
+    file: Path
+    function: str
+
+
+def find_executable(workspace: Workspace, package: str, name: str, near: Path) -> Executable:
+    """Return the Python program *name* of a package, as ``rosrun`` and ``ros2 run`` find it.
+
+    Args:
+        workspace: The packages that there are.
+        package: Name of the package.
+        name: Name of the program: an entry point, an installed file, or a file in the package's folder.
+        near: File that names it, from which the package is searched.
+
+    Raises:
+        UsageError: There is no such package or no such program.
+    """
+    found = workspace.find(package, near)
+    if found is None:
+        hint = did_you_mean(package, workspace.names(near))
+        raise UsageError(
+            f"no package {package!r}{hint} beside the model or in ROS_PACKAGE_PATH or AMENT_PREFIX_PATH; "
+            "source its workspace"
+        )
+    points = [*entry_points(found.folder), *_installed_entry_points(found)]
+    for point in points:
+        if point.name == name:
+            file = _module_of(point, found)
+            if file is not None:
+                return Executable(file, point.function)
+    files = _files(found)
+    for candidate in (name, f"{name}.py"):
+        if candidate in files:
+            return Executable(files[candidate], "")
+    known = sorted({*(one.name for one in points), *files})
+    raise UsageError(f"package {package} has no executable {name!r}; there is {choices(known)}")
+
+
+def _installed_entry_points(package: Package) -> list[EntryPoint]:
+    if package.prefix is None:
+        return []
+    found = []
+    for root in package.python_roots():
+        for folder in sorted(root.glob(f"{package.name}-*info")):
+            read = ConfigParser(interpolation=None, delimiters=("=",))
+            read.optionxform = str  # type: ignore[assignment,method-assign]  # names keep their case
+            read.read(folder / "entry_points.txt", encoding="utf-8")
+            if read.has_section("console_scripts"):
+                texts = [f"{name} = {target}" for name, target in read.items("console_scripts")]
+                found += [EntryPoint(*one.groups()) for one in map(_SPECIFICATION.match, texts) if one]
+    return found
+
+
+def _module_of(point: EntryPoint, package: Package) -> Path | None:
+    """Return the file of an entry point's module, also where parts of its name are unknown."""
+    pattern = point.module.replace(".", "/")
+    found = (file for root in package.python_roots() for file in sorted(root.glob(f"{pattern}.py")))
+    return next(found, None)
+
+
+def _files(package: Package) -> dict[str, Path]:
+    """Return the Python programs in a package by file name: what can be executed, or ends in ``.py``."""
+    folder = package.folder if package.prefix is None else package.prefix / "lib" / package.name
+    found: dict[str, Path] = {}
+    for path in sorted(folder.rglob("*"), key=lambda one: (len(one.parts), one)):
+        if path.name in ("setup.py", "__init__.py") or not path.is_file():
+            continue
+        if path.suffix == ".py" or (not path.suffix and os.access(path, os.X_OK) and _is_python(path)):
+            found.setdefault(path.name, path)
+    return found
+
+
+def _is_python(path: Path) -> bool:
+    with path.open("rb") as file:
+        first = file.readline(200)
+    return first.startswith(b"#!") and b"python" in first

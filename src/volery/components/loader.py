@@ -508,8 +508,8 @@ class ScriptSpace(Space):
         )
         self._uses_ros: dict[str, bool] = {}
 
-    def run(self, function: str = "") -> None:
-        """Execute the script as ``__main__``, then call *function* of it, if one is named.
+    def run(self, function: str = "", as_main: bool = True) -> None:
+        """Execute the script, as ``__main__`` or as a module, then call *function* of it, if one is named.
 
         At the end its threads are awaited, but for daemons, and its final functions are called, as by Python.
 
@@ -517,7 +517,7 @@ class ScriptSpace(Space):
             SystemExit: The script has ended with a status; also that which *function* returns.
         """
         module = self.module(f"{self._prefix}__main__", self._script)
-        module.__name__ = "__main__"
+        module.__name__ = "__main__" if as_main else self._script.stem
         self._process.sys.modules["__main__"] = module
         try:
             exec(self.loader.compile(self._source, module), module.__dict__)

@@ -148,6 +148,7 @@ class ScriptProgram:
         function: Function that is called after the file has been executed, as an entry point of its package
             does; empty for a file that calls what it defines by itself.
         library: Client library that it is written for.
+        as_main: Whether the file is executed as ``__main__``; not, where the model names the function.
     """
 
     def __init__(
@@ -157,8 +158,11 @@ class ScriptProgram:
         arguments: Sequence[str] = (),
         function: str = "",
         library: Library = "",
+        *,
+        as_main: bool = True,
     ) -> None:
         self._loader, self._library = loader, library
+        self._as_main = as_main
         self._source = source
         self._arguments = arguments
         self._function = function
@@ -195,7 +199,7 @@ class ScriptProgram:
         instance = component_of(caller("a script")[1])
         assert instance is not None, "a script runs in the flow of control of its component"
         space = ScriptSpace(self._loader, instance, self._source, self._arguments, self._library)
-        space.run(self._function)
+        space.run(self._function, self._as_main)
 
 
 def load_program(
@@ -230,7 +234,7 @@ def load_program(
         if function and not source.defines(function):
             raise ModelError(f"no function {function!r}, which 'main' names", where=Location(str(path), 1))
         called = function or ("" if source.is_script() else entry_function(source))
-        return ScriptProgram(loader, source, arguments, called, library)
+        return ScriptProgram(loader, source, arguments, called, library, as_main=not function)
     _require_class(source, class_name)
     module = loader.load(source, name, library)
     cls = getattr(module, class_name, None)

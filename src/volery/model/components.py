@@ -472,6 +472,12 @@ class Component:
     stated_class: Annotated[
         str, Key("class"), TEXT, "Class in the file; by default, the name of the component in camel case."
     ] = ""
+    package: Annotated[
+        str, TEXT, "ROS package of its program, in place of `path`: beside the model, or sourced."
+    ] = ""
+    executable: Annotated[
+        str, TEXT, "Python program of the `package`, as `ros2 run` and `rosrun` name it."
+    ] = ""
     main: Annotated[
         str,
         TEXT,

@@ -17,7 +17,7 @@ from volery.model.system import System
 from volery.model.system_loader import load
 from volery.requirements.verdicts import Observers
 from volery.ros.graph.embedded_graph import record_all, record_none
-from volery.run.assembly.component_builder import Builder, BuiltComponents
+from volery.run.assembly.component_builder import Builder, BuiltComponents, with_executables
 from volery.run.assembly.computers import Platform, PowerFeed
 from volery.run.assembly.cpp import compile_all, has_cpp
 from volery.run.assembly.fault_effects import Affected, FleetLinks, inject, with_faulty_links
@@ -87,6 +87,7 @@ def simulate(
         system = model
     else:
         system = load(model, vocabulary(), scenario, allocation, overrides)
+    system = with_executables(system)
     if has_cpp(system) and not options.graph:
         return _supervised(system, options)
     return _simulated(system, options)

@@ -12,7 +12,7 @@ import pytest
 
 from volery.base.errors import ComponentError, ModelError, UsageError
 from volery.base.time import S
-from volery.components.entry_points import EntryPoint, entry_points
+from volery.components.entry_points import EntryPoint, entry_points, find_executable
 from volery.components.instance import Allocation, Instance
 from volery.components.loader import Host, Loader, parse
 from volery.components.programs import load_program, script_or_class, start
@@ -264,6 +264,45 @@ def test_a_file_with_a_class_and_an_entry_point_is_a_script(bench):
     assert script_or_class(script, "Node") == "Node"
     bench.write("node.py", "class Node: pass\ndef main(): pass\n")
     assert script_or_class(script, "Node") == ""
+
+
+def test_a_function_that_the_model_names_is_called_once_and_not_as_main(bench):
+    script = bench.write("node.py", f"{MAIN}if __name__ == '__main__':\n    main()\n")
+    assert bench.run(script, function="main") == ["node"]
+
+
+@pytest.mark.parametrize(
+    ("files", "name", "expected"),
+    [
+        ({"setup.py": SETUP % "'talk = mine.node:go'", "mine/node.py": ""}, "talk", ("mine/node.py", "go")),
+        ({"scripts/talk": "#!/usr/bin/env python3\n"}, "talk", ("scripts/talk", "")),
+        ({"nodes/talk.py": ""}, "talk.py", ("nodes/talk.py", "")),
+        ({"nodes/talk.py": ""}, "talk", ("nodes/talk.py", "")),
+    ],
+    ids=["entry point", "script", "by file name", "without suffix"],
+)
+def test_a_program_is_found_by_package_and_name(bench, files, name, expected):
+    bench.package("src/mine")
+    for file, text in files.items():
+        bench.write(f"src/mine/{file}", text).chmod(0o755)
+    found = find_executable(Workspace(bench.folder), "mine", name, bench.folder / "model.yaml")
+    assert (str(found.file.relative_to(bench.folder / "src/mine")), found.function) == expected
+
+
+def test_a_program_is_found_where_it_is_installed(bench, monkeypatch):
+    bench.package("install/share/mine")
+    lib = "install/lib/python3.12/site-packages"
+    bench.write(f"{lib}/mine-0.1.egg-info/entry_points.txt", "[console_scripts]\nTalk = mine.node:go\n")
+    bench.write(f"{lib}/mine/node.py")
+    bench.write("install/lib/mine/hear", "#!/usr/bin/python3\n").chmod(0o755)
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(bench.folder / "install"))
+    near = bench.folder / "elsewhere/model.yaml"
+    assert find_executable(Workspace(), "mine", "Talk", near) == (bench.folder / lib / "mine/node.py", "go")
+    assert find_executable(Workspace(), "mine", "hear", near).file == bench.folder / "install/lib/mine/hear"
+    with pytest.raises(UsageError, match="package mine has no executable 'talk'; there is Talk or hear"):
+        find_executable(Workspace(), "mine", "talk", near)
+    with pytest.raises(UsageError, match=r"no package 'mien' \(did you mean 'mine'\?\) beside the model"):
+        find_executable(Workspace(), "mien", "talk", near)
 
 
 def test_functions_of_counted_scripts_are_counted(bench):

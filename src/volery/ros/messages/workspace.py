@@ -63,9 +63,14 @@ def module_file(folder: Path, name: str) -> Path | None:
 
 
 class Workspace:
-    """The packages that the files of one run can use; folders are searched once."""
+    """The packages that the files of one run can use; folders are searched once.
 
-    def __init__(self) -> None:
+    Args:
+        below: A folder whose packages are found, too, before those that the environment names.
+    """
+
+    def __init__(self, below: Path | None = None) -> None:
+        self._below = below
         self._beside: dict[Path, dict[str, Package]] = {}
 
     def package_of(self, file: Path) -> Package | None:
@@ -125,7 +130,9 @@ class Workspace:
     @cached_property
     def _sourced(self) -> dict[str, Package]:
         found: dict[str, Package] = {}
-        for one in (*_packages(entries("ROS_PACKAGE_PATH")), *_installed(entries("AMENT_PREFIX_PATH"))):
+        below = [] if self._below is None else [self._below]
+        sources = [*below, *entries("ROS_PACKAGE_PATH")]
+        for one in (*_packages(sources), *_installed(entries("AMENT_PREFIX_PATH"))):
             found.setdefault(one.name, one)
         return found
 

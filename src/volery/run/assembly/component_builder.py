@@ -8,7 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from volery.base.errors import ModelError, UsageError
 from volery.base.position import Position
+from volery.components.entry_points import find_executable
 from volery.components.instance import Instance
 from volery.components.loader import Loader
 from volery.components.polling import Polling
@@ -26,7 +28,7 @@ from volery.cost import StepCounter, library_table
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.model.components import VEHICLE_INTERFACES, Signature
+from volery.model.components import VEHICLE_INTERFACES, Component, Signature
 from volery.model.instances import Connection, TargetKind
 from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
@@ -444,6 +446,35 @@ class Builder:
         )
         access = graph_access(self._autopilot(name), name)
         serve_on_graph(self._graph, fleet, name, access, context, self._served[name])
+
+
+def with_executables(system: System) -> System:
+    """Return the system with the files of components that the model names by package and executable.
+
+    Raises:
+        ModelError: There is no such package or program.
+    """
+    workspace = Workspace(system.folder)
+    found: dict[str, Component] = {}
+    for component in (one.component for one in system.instances):
+        if not (component.package or component.executable) or component.path:
+            continue
+        if not (component.package and component.executable):
+            what = "'package' and 'executable' belong together"
+            raise ModelError(what, f"components.{component.name}", component.where)
+        try:
+            file, function = find_executable(
+                workspace, component.package, component.executable, system.folder / "model.yaml"
+            )
+        except UsageError as error:
+            raise ModelError(str(error), f"components.{component.name}.package", component.where) from error
+        found[component.name] = replace(component, path=str(file), main=component.main or function)
+    if not found:
+        return system
+    instances = (
+        replace(one, component=found.get(one.component.name, one.component)) for one in system.instances
+    )
+    return replace(system, instances=tuple(instances))
 
 
 def python_program(system: System, model: InstanceModel, loader: Loader) -> Program:

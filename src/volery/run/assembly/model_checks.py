@@ -26,7 +26,12 @@ from volery.requirements.observables import OBSERVABLES
 from volery.ros.client_libraries.importable_modules import importable_modules
 from volery.ros.graph import EmbeddedGraph
 from volery.ros.messages import define_imported
-from volery.run.assembly.component_builder import PYTHON_ROS, provided_operations, python_program
+from volery.run.assembly.component_builder import (
+    PYTHON_ROS,
+    provided_operations,
+    python_program,
+    with_executables,
+)
 from volery.run.assembly.cpp import compile_all, describe_component, is_cpp
 from volery.run.ending import Ending
 from volery.simulation.autopilots.autopilot import firmwares
@@ -69,6 +74,10 @@ def check_components(system: System, languages: Iterable[str]) -> None:
 
 
 def _faults(system: System, languages: frozenset[str]) -> Iterator[ModelError]:
+    try:
+        system = with_executables(system)
+    except ModelError as error:
+        yield error
     kernel = VirtualKernel()
     farewell = Ending(kernel).farewell
     modules = importable_modules(EmbeddedGraph(kernel), {}, {}, farewell)

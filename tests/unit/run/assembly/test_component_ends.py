@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from volery.base.errors import ModelError
 from volery.run.result import Options
 from volery.run.simulate import simulate
 from volery.trace.events import Failure, Operation, Text
@@ -199,3 +200,14 @@ def test_a_component_of_which_every_callback_fails_has_failed(runs):
 def test_one_callback_that_succeeds_is_enough(runs):
     sometimes = HEARS.replace("CONDITION", "if message.data.startswith('2'): return")
     assert runs(hears=sometimes, listener=LISTENER)[0].completed
+
+
+def test_a_model_may_name_a_package_and_an_executable(runs, tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "package.xml").write_text("<package><name>mine</name></package>")
+    (tmp_path / "mine" / "talk").write_text("#!/usr/bin/env python3\nprint('said')\n")
+    (tmp_path / "mine" / "talk").chmod(0o755)
+    done, lines, _ = runs({"talker": {"path": "", "package": "mine", "executable": "talk"}}, talker="")
+    assert (done.completed, lines) == (True, ["said"])
+    with pytest.raises(ModelError, match="package mine has no executable 'tlak'; there is talk"):
+        runs({"talker": {"path": "", "package": "mine", "executable": "tlak"}}, talker="")
