@@ -125,7 +125,13 @@ def mavros_interface(context: InterfaceContext) -> NodeInterface:
     )
 
 
-MAVROS = NamingScheme("mavros", mavros_interface, MAVROS_STREAMS, home=True)
+_SENSORS = (
+    *("altitude", "battery", "global_position/", "imu/", "local_position/"),
+    *("setpoint_raw/target_", "statustext/"),
+)
+"""Topics for which MAVROS 2.9 uses rclcpp's ``SensorDataQoS``."""
+
+MAVROS = NamingScheme("mavros", mavros_interface, MAVROS_STREAMS, home=True, sensors=_SENSORS)
 
 
 CHANNELS = 8

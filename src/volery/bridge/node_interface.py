@@ -99,12 +99,14 @@ class NamingScheme:
         make_interface: Returns the interface of a node.
         streams: Rates in Hz of the telemetry streams that the interface needs, by MAV_DATA_STREAM.
         home: Whether the interface needs the home position and the landed state.
+        sensors: Beginnings of the topics that have the QoS of sensors in ROS 2.
     """
 
     node: str
     make_interface: Callable[[InterfaceContext], NodeInterface]
     streams: Mapping[int, int]
     home: bool
+    sensors: tuple[str, ...] = ()
 
 
 def stamped(at: Ns, frame_id: str = "") -> Any:

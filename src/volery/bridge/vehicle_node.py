@@ -37,7 +37,7 @@ from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.links.frame import Frame
 from volery.links.link import Link
 from volery.links.pprzlink_codec import FROM_ROS, PPRZROS_TYPE, TO_ROS, to_frame, to_message
-from volery.ros.graph import INVALID_VALUES, Node, Publisher, RosGraph, Work
+from volery.ros.graph import DEFAULT, INVALID_VALUES, SENSOR_DATA, Node, Publisher, RosGraph, Work
 from volery.trace.events import Text
 
 ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4
@@ -63,6 +63,7 @@ class VehicleNodeOptions:
         control: Whether roscopter's ``send_rc`` is offered.
         origin: Origin of the frame ``map``; None is the autopilot's own origin.
         parameter_services: Whether parameters are offered by the services of ROS 2, as MAVROS 2 does.
+        best_effort: Whether sensors are published best effort, as MAVROS 2 does.
     """
 
     names: NamingScheme = MAVROS
@@ -76,6 +77,7 @@ class VehicleNodeOptions:
     control: bool = False
     origin: LocalFrame | None = None
     parameter_services: bool = False
+    best_effort: bool = False
 
 
 class VehicleNode:
@@ -166,6 +168,8 @@ class VehicleNode:
 
     def _advertise(self, node: Node, interface: NodeInterface) -> None:
         def advertise(name: str, kind: str, qos: Any) -> None:
+            if qos == DEFAULT and self.options.best_effort and name.startswith(self.options.names.sensors):
+                qos = SENSOR_DATA
             self._publishers[name] = node.advertise(name, kind, qos)
 
         self._on_demand = {topic.name for topic in interface.topics if topic.on_demand}

@@ -64,6 +64,24 @@ def topic_named(graph: GraphContext, name: str, message_type: str, node: NodeCon
     return found
 
 
+_POLICIES = {
+    "reliable": "RELIABILITY",
+    "transient": "DURABILITY",
+    "deadline": "DEADLINE",
+    "liveliness": "LIVELINESS",
+}
+"""Words of ``incompatible`` and the name of the policy."""
+_NO_SUBSCRIPTION = (
+    "New subscription discovered on topic '{topic}', requesting incompatible QoS. No messages will be sent "
+    "to it. Last incompatible policy: {policy}"
+)
+_NO_PUBLISHER = (
+    "New publisher discovered on topic '{topic}', offering incompatible QoS. No messages will be received "
+    "from it. Last incompatible policy: {policy}"
+)
+"""What rclpy logs."""
+
+
 def incompatible(offered: QoS, requested: QoS) -> str:
     """Return why a publisher's QoS does not match a subscription's, by the rules of DDS; empty if it does."""
     if requested.reliability == RELIABLE and offered.reliability == BEST_EFFORT:
@@ -128,8 +146,10 @@ class EmbeddedPublisher:
         graph, node, other = self.node.graph, self.node, subscription.node
         why = incompatible(self.qos, subscription.qos)
         if why:
-            text = f"{self.topic}: {other.name} does not hear {node.name}: {why}"
-            graph.record(Text(node.kernel.now(), node.name, WARNING, text))
+            policy = next(name for word, name in _POLICIES.items() if word in why)
+            for side, words in ((node, _NO_SUBSCRIPTION), (other, _NO_PUBLISHER)):
+                text = f"{side.name}: {words.format(topic=self.topic, policy=policy)} ({why})"
+                graph.record(Text(node.kernel.now(), side.context.component, WARNING, text))
             self._want.reason = f"{other.name} does not receive it: {why}"
             subscription.want.reason = f"nothing comes from {node.name}: {why}"
             return

@@ -46,6 +46,7 @@ from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.assembly.fences import fence_of
 from volery.run.assembly.vehicle_nodes import (
     ROSCOPTER_NAMES,
+    NodeNames,
     graph_access,
     names_of,
     node_name,
@@ -445,7 +446,8 @@ class Builder:
             node_name(name), self._platform.processors[processor] if processor else None
         )
         access = graph_access(self._autopilot(name), name)
-        serve_on_graph(self._graph, fleet, name, access, context, self._served[name])
+        ros2 = any(model.component.language == "rclpy" for model in self._models)
+        serve_on_graph(self._graph, fleet, name, access, context, NodeNames(self._served[name], ros2))
 
 
 def with_executables(system: System) -> System:

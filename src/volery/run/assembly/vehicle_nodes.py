@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from random import Random
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from mypy_extensions import mypyc_attr
 
@@ -124,23 +124,32 @@ def private_graph(kernel: Kernel, wire: GraphWire, *, as_bytes: bool) -> Embedde
     return EmbeddedGraph(kernel, route=wire.route, unrecorded=True, as_bytes=as_bytes, size_of=wire.size_of)
 
 
-Serve = Callable[[RosGraph, Link, str, ExecutionContext, LocalFrame, str], object]
+class NodeNames(NamedTuple):
+    """Whose names a vehicle's node has, ``mavros`` by default, and whether as in ROS 2."""
+
+    whose: str = ""
+    ros2: bool = False
+
+
+_DEFAULT_NAMES = NodeNames()
+
+Serve = Callable[[RosGraph, Link, str, ExecutionContext, LocalFrame, NodeNames], object]
 """``serve(graph, link, vehicle, context, origin, names)``."""
 
 
 def _mavros(
-    graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame, names: str
+    graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame, names: NodeNames
 ) -> object:
     from volery.bridge import ROSCOPTER, VehicleNodeOptions, serve_vehicle  # loads all messages
 
-    options = VehicleNodeOptions(origin=origin)
-    if names == ROSCOPTER_NAMES:
+    options = VehicleNodeOptions(origin=origin, best_effort=names.ros2)
+    if names.whose == ROSCOPTER_NAMES:
         options = VehicleNodeOptions(names=ROSCOPTER, control=True)
     return serve_vehicle(graph, link, vehicle, context, options)
 
 
 def _pprzros(
-    graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame, names: str
+    graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame, names: NodeNames
 ) -> object:
     from volery.bridge import serve_pprzros
 
@@ -209,7 +218,7 @@ def serve_on_graph(
     vehicle: str,
     access: GraphAccess,
     context: ExecutionContext,
-    names: str = "",
+    names: NodeNames = _DEFAULT_NAMES,
 ) -> None:
     """Start the node that serves a simulated *vehicle*; its execution is charged to *context*.
 
@@ -219,7 +228,7 @@ def serve_on_graph(
         vehicle: Name of the vehicle.
         access: Its namespace.
         context: Context of the node.
-        names: Whose names the node has; empty for the first of ``NAMES_OF``.
+        names: Whose names the node has.
     """
     codec = fleet.family(vehicle).codec
     if codec is None:

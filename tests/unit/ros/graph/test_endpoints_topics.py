@@ -172,9 +172,11 @@ def test_incompatible_qos_is_not_connected_but_reported(
     rig: Any, offered: QoS, wanted: QoS, why: str
 ) -> None:
     assert late(rig, offered, wanted) == []
-    [warning] = rig.of(Text)
-    assert "/chat" in warning.text
-    assert why in warning.text
+    to_publisher, to_subscriber = (event.text for event in rig.of(Text))
+    assert "New subscription discovered on topic '/chat', requesting incompatible QoS." in to_publisher
+    assert "New publisher discovered on topic '/chat', offering incompatible QoS." in to_subscriber
+    assert why in to_publisher
+    assert why in to_subscriber
 
 
 def test_a_ros_1_subscriber_takes_best_effort(rig: Any) -> None:

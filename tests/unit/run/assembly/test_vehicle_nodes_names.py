@@ -23,13 +23,29 @@ for _ in range(30):
     rospy.sleep(0.1)
 """
 
+WATCHES = """
+import rclpy
+from collections import Counter
+from rclpy.qos import qos_profile_sensor_data
+from geometry_msgs.msg import PoseStamped
+from mavros_msgs.msg import State
+rclpy.init()
+node = rclpy.create_node("pilot")
+received = Counter()
+for name, kind in (("local_position/pose", PoseStamped), ("state", State)):
+    for qos in (10, qos_profile_sensor_data):
+        node.create_subscription(kind, name, lambda _, key=(name, qos == 10): received.update([key]), qos)
+node.create_timer(4.0, lambda: print(sorted(received)))
+rclpy.spin(node)
+"""
+
 
 @pytest.fixture
 def model(tmp_path):
     """Return the folder of a model with one script and one vehicle."""
 
-    def write(names):
-        (tmp_path / "pilot.py").write_text(ARMS)
+    def write(names, script=ARMS, language="rospy"):
+        (tmp_path / "pilot.py").write_text(script)
         places = {"pad": {"east": "0 m", "north": "0 m"}}
         vehicle = {
             "kind": "multirotor",
@@ -41,7 +57,7 @@ def model(tmp_path):
         text = {
             "volery": 1,
             "name": "names",
-            "components": {"Pilot": {"language": "rospy", "path": "pilot.py", "active": True}},
+            "components": {"Pilot": {"language": language, "path": "pilot.py", "active": True}},
             "application": {"pilot": {"is": "Pilot", "namespace": "/quad"}},
             "platform": {"processors": {"pc": {"is": "intel-i5-3470", "frequency": "3000 MHz"}}},
             "allocations": {"only": {"pilot": "pc", "quad": "pc"}},
@@ -69,3 +85,9 @@ def test_a_vehicle_has_roscopter_s_names_with_send_rc_and_a_switch(model, tmp_pa
 def test_names_of_another_protocol_are_refused(model):
     with pytest.raises(ModelError, match="its node can have mavros or roscopter"):
         simulate(model("pprzros"))
+
+
+def test_sensors_are_best_effort_for_rclpy_as_mavros_2_s_are(model, capsys):
+    assert simulate(model("mavros", WATCHES, "rclpy")).completed
+    said = capsys.readouterr().err
+    assert "[('local_position/pose', False), ('state', False), ('state', True)]" in said
