@@ -435,11 +435,14 @@ class EmbeddedGraph:
     def topics(self) -> list[TopicState]:
         """Return the topics that have a publisher or a subscription, by name."""
         states = []
-        for name, topic in sorted(self._graph.topics.items()):
+        listed = (
+            one for _, first in sorted(self._graph.topics.items()) for one in (first, *first.others.values())
+        )
+        for topic in listed:
             publishers = tuple(one.node.name for one in topic.publishers)
             subscribers = tuple(one.node.name for one in topic.subscriptions)
             if publishers or subscribers:
-                states.append(TopicState(name, topic.type, publishers, subscribers))
+                states.append(TopicState(topic.name, topic.type, publishers, subscribers))
         return states
 
     def offered(self, topic: str) -> tuple[QoS, ...]:

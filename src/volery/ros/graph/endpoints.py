@@ -46,21 +46,25 @@ WARNING = 4
 
 
 def topic_named(graph: GraphContext, name: str, message_type: str, node: NodeContext) -> Topic:
-    """Return the topic `name`, created if necessary.
+    """Return the topic `name` of a type, created if necessary.
 
-    Raises:
-        UsageError: the topic carries another type.
+    As on real ROS, nodes of different types share a name and do not hear each other; a warning says so once.
     """
     full = message_class(message_type).__msgtype__
     found = graph.topics.get(name)
     if found is None:
         found = graph.topics[name] = Topic(name, full)
     elif found.type != full:
-        users = [publisher.node.name for publisher in found.publishers]
-        users += [subscription.node.name for subscription in found.subscriptions]
-        raise UsageError(
-            f"node {node.name}: topic {name} carries {found.type} (of {', '.join(users)}), not {full}"
-        )
+        other = found.others.get(full)
+        if other is None:
+            other = found.others[full] = Topic(name, full)
+            users = [one.node.name for one in found.publishers] + [
+                one.node.name for one in found.subscriptions
+            ]
+            of = ", ".join(dict.fromkeys(users)) or "no node any more"
+            text = f"{name} carries {found.type} (of {of}), not {full}: these nodes do not hear each other"
+            graph.record(Text(node.kernel.now(), node.name, WARNING, text))
+        return other
     return found
 
 

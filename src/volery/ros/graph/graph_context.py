@@ -68,14 +68,15 @@ class ServiceEnd(Protocol):
 
 
 class Topic:
-    """A name at which publishers and subscriptions of one type meet."""
+    """A name at which publishers and subscriptions of one type meet; ``others`` has its other types."""
 
-    __slots__ = ("name", "publishers", "subscriptions", "type")
+    __slots__ = ("name", "others", "publishers", "subscriptions", "type")
 
     def __init__(self, name: str, kind: str) -> None:
         self.name, self.type = name, kind
         self.publishers: list[PublisherEnd] = []
         self.subscriptions: list[SubscriptionEnd] = []
+        self.others: dict[str, Topic] = {}
 
 
 class Parameters:
