@@ -90,6 +90,11 @@ class CommandServices:
         """Handle ``set_mode``. The command is not acknowledged; ``state`` shows its effect."""
         response = service("mavros_msgs/srv/SetMode").response
         base, custom = request.base_mode, 0
+        if request.custom_mode and not self._link.known:
+            self._warn(
+                "set_mode: no heartbeat of an autopilot yet, which tells its modes; wait for connected"
+            )
+            return response(False)
         if request.custom_mode:
             number = mode_number(self._link.autopilot, request.custom_mode)
             if number is None:

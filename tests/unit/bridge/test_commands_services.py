@@ -100,6 +100,12 @@ def test_an_unknown_mode_is_not_sent(rig: Any) -> None:
     assert any("did you mean 'GUIDED'" in event.text for event in rig.of_texts())
 
 
+def test_before_the_first_heartbeat_no_mode_is_known(rig: Any) -> None:
+    assert not rig.call("set_mode", "mavros_msgs/SetMode", custom_mode="OFFBOARD").mode_sent
+    assert rig.asked("SET_MODE") == []
+    assert any("no heartbeat of an autopilot yet" in event.text for event in rig.of_texts())
+
+
 def test_command_int_and_stream_rate_are_sent_and_not_waited_for(rig: Any) -> None:
     rig.connect()
     fields = {"frame": 6, "command": 192, "x": 470000000, "y": -80000000, "z": 20.0, "param1": -1.0}

@@ -14,6 +14,7 @@ from volery.ros.client_libraries import (
     rclpy,
     ros1_tools,
     ros2_tools,
+    rosbag_module,
     rospy,
     tf2,
 )
@@ -47,6 +48,7 @@ def importable_modules(
         **actionlib.modules(found["rospy"]),
         **ros1_tools.modules(found["rospy"]),
         **ros2_tools.modules(),
+        **rosbag_module.modules(found["rospy"]),
         **mavros_package.modules(found["rospy"]),
         **message_filters.modules(found["rospy"], found["rclpy.time"]),
         **{name: _unavailable_module(name, instead) for name, instead in _UNAVAILABLE.items()},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from volery.base.time import S
@@ -322,4 +323,38 @@ rospy.spin()
         ["/talker", "green", "/tell", "std_srvs/Trigger", "937c9679a518e3a18d831e57125ea522"],
         "/listener",
         None,
+    ]
+
+
+def test_a_bag_is_written_and_read(stage: Any, tmp_path: Path) -> None:
+    stage.component(
+        "node",
+        f"""
+import rosbag
+from geometry_msgs.msg import Point
+from std_msgs.msg import String
+rospy.init_node("node")
+with rosbag.Bag("{tmp_path}/a.bag", "w") as bag:
+    bag.write("/chatter", String("one"), rospy.Time(1, 500000000))
+    bag.write("/point", Point(1.0, 2.0, 3.0), rospy.Time(2))
+    rospy.sleep(3)
+    bag.write("/chatter", String("two"))
+bag = rosbag.Bag("{tmp_path}/a.bag")
+for topic, message, at in bag.read_messages(topics=["/chatter"], start_time=rospy.Time(1)):
+    out((topic, message.data, at.to_sec()))
+out((bag.get_message_count(), bag.get_start_time(), bag.get_end_time()))
+info = bag.get_type_and_topic_info()
+out((info.msg_types["std_msgs/String"], info.topics["/point"].message_count))
+try:
+    rosbag.Bag("{tmp_path}/none.bag")
+except rosbag.ROSBagException as error:
+    out("none.bag" in str(error))
+""",
+    )
+    assert stage.run(5 * S) == [
+        ("/chatter", "one", 1.5),
+        ("/chatter", "two", 3.0),
+        (3, 1.5, 3.0),
+        ("992ce8a1687cec8c8bd883ec73ca41d1", 1),
+        True,
     ]
