@@ -44,7 +44,7 @@ def importable_modules(
     return {
         **found,
         **messages.modules(),
-        **tf2.modules(graph.kernel, found["rospy"], found["rclpy.executors"]),
+        **tf2.modules(graph, found["rospy"], found["rclpy.executors"]),
         **actionlib.modules(found["rospy"]),
         **ros1_tools.modules(found["rospy"]),
         **ros2_tools.modules(),

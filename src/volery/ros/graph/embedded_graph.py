@@ -48,7 +48,7 @@ from volery.ros.graph.interface import (
     full_node_name,
     no_route,
 )
-from volery.ros.graph.unserved import SERVICE, Surroundings, unserved
+from volery.ros.graph.unserved import SERVICE, TRANSFORM, Surroundings, unserved
 from volery.ros.graph.work import Work
 from volery.ros.messages import Message, cdr_size, new
 from volery.trace.events import Unserved
@@ -464,6 +464,16 @@ class EmbeddedGraph:
         """Return the services that have a server, by name."""
         served = sorted(self._graph.services.items())
         return [ServiceState(name, one.type, one.node.name) for name, one in served]
+
+    def looked_up(self, transform: str, problem: str) -> None:
+        """Note a look-up of a transform by the current component; *problem* is empty if it was there."""
+        task = self.kernel.current()
+        if task is not None:
+            who = task.context.component
+            want = self._graph.wants.of(TRANSFORM, transform, "", (who, f"/{who}"), self.kernel.now())
+            want.met = want.met or not problem
+            want.count += 1
+            want.reason = problem
 
     def unserved(self, around: Surroundings) -> list[Unserved]:
         """Return what components have offered or asked for until now, and no node took or served."""

@@ -42,7 +42,7 @@ class Want:
 
     Attributes:
         kind: One of the kinds above.
-        name: Absolute name; of a transform, ``<target> from <source>``.
+        name: Absolute name; of a transform, ``transform from <source> to <target>``.
         type: Type of the topic or service.
         who: Component that uses it.
         node: Its node.
@@ -112,7 +112,7 @@ def unserved(wants: Wants, around: Surroundings, now: Ns) -> list[Unserved]:
             ", ".join(dict.fromkeys(want.node for want in same)),
             sum(want.count for want in same),
             min(want.since for want in same),
-            next((want.reason for want in same if want.reason), "")
+            next((want.reason for want in same if want.reason and _has_senders(want, wants)), "")
             or _near_miss(kind, name, same[0].type, wants, around),
         )
         for (kind, name), same in merged.items()
@@ -125,6 +125,13 @@ def _is_met(want: Want, wants: Wants) -> bool:
     if want.kind == SERVICE:
         return want.name in wants.served
     return want.met or (want.kind in (PUBLISHED, SUBSCRIBED) and want.name in NEED_NOBODY)
+
+
+def _has_senders(want: Want, wants: Wants) -> bool:
+    """Return whether there is anything that the reason of a want can be about."""
+    return want.kind != TRANSFORM or any(
+        kind == PUBLISHED and name in ("/tf", "/tf_static") for kind, name, _ in wants.entries
+    )
 
 
 def _action_of(want: Want) -> tuple[str, str] | None:
@@ -149,6 +156,8 @@ def _near_miss(kind: str, name: str, type_name: str, wants: Wants, around: Surro
                 f"{vehicle} has {_WRITTEN.get(names, names)}'s" for vehicle, names in around.vehicles.items()
             ]
             return f"no vehicle offers {whose}; {', '.join(listed[:3])}"
+    if kind == TRANSFORM:
+        return "no node publishes /tf"
     namespace = name.split("/")[1] if name.startswith("/") else ""
     if around.without_node and (namespace == "mavros" or namespace in around.without_node):
         vehicle = namespace if namespace in around.without_node else next(iter(around.without_node))

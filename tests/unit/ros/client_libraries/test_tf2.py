@@ -19,6 +19,7 @@ from volery.ros.client_libraries.tf2.transform_tree import (
     RigidTransform,
     TransformTree,
 )
+from volery.ros.graph.unserved import Surroundings
 from volery.trace.events import Text
 
 BROADCASTER = """
@@ -386,3 +387,20 @@ out(tfMessage(transforms=[made]).transforms[0].child_frame_id)
     assert logged == [
         "TF_REPEATED_DATA ignoring data with redundant timestamp for frame base at time 1.000000"
     ]
+
+
+def test_a_transform_that_is_never_there_is_named_at_the_end(stage):
+    stage.script(
+        "seeker",
+        """
+        import rospy, tf2_ros
+        rospy.init_node("seeker")
+        buffer = tf2_ros.Buffer()
+        for _ in range(3):
+            buffer.can_transform("map", "base", rospy.Time(0), rospy.Duration(0.1))
+        """,
+    )
+    stage.run()
+    (one,) = stage.graph.unserved(Surroundings(["seeker"]))
+    assert (one.kind, one.name, one.times) == ("transform", "transform from base to map", 3)
+    assert one.hint == "no node publishes /tf"

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
 
-from volery.kernel.api import Kernel
 from volery.ros.client_libraries.library_base import library_module
 from volery.ros.client_libraries.tf2 import tf
 from volery.ros.client_libraries.tf2.tf import TRANSFORMATIONS
@@ -26,6 +25,7 @@ from volery.ros.client_libraries.tf2.tf2_ros import (
     TypeException,
 )
 from volery.ros.client_libraries.tf2.transform_tree import EXCEPTIONS, TransformException
+from volery.ros.graph import RosGraph
 from volery.ros.messages import message_class
 
 __all__ = ["modules"]
@@ -41,16 +41,16 @@ _SUBMODULES = {
 }
 
 
-def modules(kernel: Kernel, rospy: ModuleType, executors: ModuleType) -> dict[str, ModuleType]:
+def modules(graph: RosGraph, rospy: ModuleType, executors: ModuleType) -> dict[str, ModuleType]:
     """Return the modules by name.
 
     Args:
-        kernel: Kernel of the run.
+        graph: Graph of the run.
         rospy: Module that is used where no node is given.
         executors: The module ``rclpy.executors``.
     """
     members = {"rospy": rospy, "executors": executors}
-    buffer = type("Buffer", (Buffer,), {"kernel": kernel, "time_class": rospy.Time})
+    buffer = type("Buffer", (Buffer,), {"graph": graph, "kernel": graph.kernel, "time_class": rospy.Time})
     names: dict[str, Any] = {
         **EXCEPTIONS,
         **{kind.__name__: kind for kind in _PLAIN},

@@ -27,6 +27,7 @@ from volery.ros.client_libraries.tf2.transform_tree import (
     rotated,
     write_transform,
 )
+from volery.ros.graph import EmbeddedGraph, RosGraph
 from volery.ros.messages import message_class, new
 from volery.ros.messages.client_classes import RCLPY, ROSPY, adopt, library_of
 from volery.ros.messages.message import nanoseconds
@@ -157,6 +158,7 @@ def as_ns(value: Any) -> Ns:
 class Buffer:
     """The transforms of the last *cache_time* (10 s by default)."""
 
+    graph: ClassVar[RosGraph]
     kernel: ClassVar[Kernel]
     time_class: ClassVar[Any]
 
@@ -254,6 +256,8 @@ class Buffer:
         with self.kernel:
             if not can() and within > 0:
                 self._changed.wait_for(can, within, ends_activation=True)
+            if isinstance(self.graph, EmbeddedGraph):
+                self.graph.looked_up(f"transform from {source} to {target}", reasons[0])
         return reasons[0]
 
     def lookup_transform(self, target_frame: str, source_frame: str, time: Any, timeout: Any = 0) -> Any:
