@@ -102,6 +102,7 @@ class Instance:
         self.object: object | None = None  # until its constructor has returned
         self.scope: Scope | None = None
         self.on_failure: OnFailure = lambda name, error: None
+        self.on_thread_failure: OnFailure = lambda name, error: None
         self.threads: list[Joinable] = []  # those that the end of a script waits for
         self._unavailable = ""  # why there will never be an object
         self._read_steps = read_steps
@@ -191,6 +192,19 @@ class Instance:
         else:
             return True
         return False
+
+    def run_thread(self, body: Callable[[], object], name: str) -> None:
+        """Run a thread of component code: what it raises ends the thread alone, as in Python."""
+        try:
+            body()
+        except SystemExit:
+            pass
+        except VoleryError as error:
+            with self.kernel as kernel:
+                kernel.record(Failure(kernel.now(), self.name, str(error)))
+            self.on_thread_failure(self.name, error)
+        except Exception as error:
+            self.on_thread_failure(self.name, self.component_error(error, f"thread {name}"))
 
     def report_exit(self, status: int, end: SystemExit | None = None) -> None:
         """Record and report that the component has ended with an exit status that is not 0."""

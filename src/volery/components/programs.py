@@ -313,7 +313,7 @@ def start(
     instance.pricing.check(instance.name, instance.operations, active)
     register_kernel(instance.kernel)
     instance.scope = scope
-    instance.on_failure = failed
+    instance.on_failure = instance.on_thread_failure = failed
 
     def body() -> None:
         if not active and (task := instance.kernel.current()) is not None:

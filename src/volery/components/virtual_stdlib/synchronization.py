@@ -9,7 +9,6 @@ from __future__ import annotations
 import queue as real_queue
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
 from heapq import heappop, heappush
 from types import ModuleType, TracebackType
 from typing import Any, ClassVar
@@ -85,7 +84,7 @@ class Thread(KernelBound):
 
             def body() -> None:
                 try:
-                    instance.run_guarded(self._run_to_exit, f"thread {self.name}")
+                    instance.run_thread(self.run, str(self.name))
                 finally:
                     self._over = True
                     self._ended.notify()
@@ -93,10 +92,6 @@ class Thread(KernelBound):
             self._task = kernel.spawn(body, f"{instance.name}/{self.name}", instance.context, instance.scope)
             if not self.daemon:
                 instance.threads.append(self)
-
-    def _run_to_exit(self) -> None:
-        with suppress(SystemExit):  # it ends the thread alone
-            self.run()
 
     def run(self) -> None:
         """Call the target; a subclass may override this instead."""

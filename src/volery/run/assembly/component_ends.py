@@ -54,6 +54,8 @@ class ComponentEnds(Host):
         def begin() -> None:
             scope = self._ending.users.child(instance.name)
             start(instance, program, given, scope, partial(self._failed, policy, begin))
+            if policy.action != END_RUN:  # the others of its flows go on, as in Python
+                instance.on_thread_failure = self._ending.component_failed
 
         return begin
 

@@ -211,3 +211,11 @@ def test_a_model_may_name_a_package_and_an_executable(runs, tmp_path):
     assert (done.completed, lines) == (True, ["said"])
     with pytest.raises(ModelError, match="package mine has no executable 'tlak'; there is talk"):
         runs({"talker": {"path": "", "package": "mine", "executable": "tlak"}}, talker="")
+
+
+def test_what_a_thread_raises_ends_the_thread_alone_but_the_run_has_failed(runs):
+    thread = "import threading\nthreading.Thread(target=lambda: 1 / 0).start()\n"
+    done, lines, _ = runs(speaker=SPEAKER.replace("rospy.sleep", f"{thread}rospy.sleep"), listener=LISTENER)
+    assert done.record.outcome.status == "failed"
+    assert "ZeroDivisionError" in done.record.outcome.reason
+    assert "speaker leaves at 1.0" in lines
