@@ -390,3 +390,42 @@ out(n.get_clock().now().nanoseconds // 10**9)
 executor.spin_until_future_complete(task)
 """
     assert said(stage, text) == [1, 2.0]
+
+
+def test_a_log_call_keeps_its_severity_and_its_filters(stage: Stage) -> None:
+    text = """
+from rclpy.duration import Duration
+log = n.get_logger()
+def attempt(call, *args, **options):
+    try:
+        out(call(*args, **options))
+    except (TypeError, ValueError) as error:
+        out(str(error))
+for call in (log.info, log.error):
+    try:
+        call("a")
+    except ValueError as error:
+        out(str(error))
+for options in ({}, {"once": True}):
+    try:
+        log.info("b", **options)
+    except ValueError as error:
+        out(str(error))
+attempt(log.warning, 5)
+attempt(lambda: log.info("c", twice=True))
+out([log.info("d", once=True) for _ in range(3)])
+out([log.info("e", skip_first=True) for _ in range(3)])
+said = []
+for _ in range(4):
+    said.append(log.info(f"f {_}", throttle_duration_sec=1.0))
+    n.get_clock().sleep_for(Duration(seconds=0.6))
+out(said)
+"""
+    found = said(stage, text)
+    assert found[:3] == [
+        "Logger severity cannot be changed between calls.",
+        "Requested logging filters cannot be changed between calls.",
+        "a log line is a str, not 5; use str() or an f-string",
+    ]
+    assert "'twice' is not one of the recognized logging options" in str(found[3])
+    assert found[4:] == [[True, False, False], [False, True, True], [True, False, True, False]]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
@@ -352,16 +353,43 @@ _SYSLOG = {
 }
 
 
+_FILTERS = ("throttle_duration_sec", "throttle_time_source_type", "skip_first", "once")
+
+
+@dataclass
+class _Place:
+    """A call of a logger in a file."""
+
+    level: LoggingSeverity
+    filters: tuple[str, ...]
+    seen: bool = False
+    logged: bool = False
+    latest: Ns | None = None
+
+    def allows(self, now: Callable[[], Ns], options: dict[str, Any]) -> bool:
+        """Return whether the filters let a line pass now."""
+        seen, self.seen = self.seen, True
+        if (options.get("once") and self.logged) or (options.get("skip_first") and not seen):
+            return False
+        period = options.get("throttle_duration_sec")
+        if period is not None:
+            at = now()
+            if self.latest is not None and at - self.latest < from_seconds(period):
+                return False
+            self.latest = at
+        self.logged = True
+        return True
+
+
 class Logger:
-    """Logger of node.get_logger() *throttle_duration_sec*, *once*, *skip_first* apply per text."""
+    """Logger of node.get_logger(). What it remembers of a call belongs to the call's place in the file."""
 
     contexts: ClassVar[Contexts]
 
     def __init__(self, name: str, rosout: Rosout | None = None) -> None:
         self.name = name
         self._rosout = rosout
-        self._last: dict[str, Ns] = {}
-        self._seen: set[str] = set()
+        self._places: dict[tuple[Any, ...], _Place] = {}
 
     def get_child(self, name: str) -> Logger:
         """Return a logger below this one."""
@@ -387,35 +415,38 @@ class Logger:
         return self._log(message, LoggingSeverity(severity), caller(1), options)
 
     def _log(self, message: Any, level: LoggingSeverity, where: Caller, options: dict[str, Any]) -> bool:
-        text = str(message)
-        if level < self.get_effective_level() or self._suppressed(text, options):
+        unknown = sorted(options.keys() - _FILTERS)
+        if unknown:
+            text = f"parameter {unknown[0]!r} is not one of the recognized logging options {list(_FILTERS)}"
+            raise TypeError(text)
+        if level < self.get_effective_level() or not self._place(level, options).allows(
+            self.contexts.now, options
+        ):
             return False
-        self.contexts.current().log(_SYSLOG[level], text)
+        if not isinstance(message, str):
+            raise TypeError(f"a log line is a str, not {message!r}; use str() or an f-string")
+        self.contexts.current().log(_SYSLOG[level], message)
         if self._rosout is not None:
-            self._rosout.publish(partial(self._fill, level, text, where))
+            self._rosout.publish(partial(self._fill, level, message, where))
         return True
+
+    def _place(self, level: LoggingSeverity, options: dict[str, Any]) -> _Place:
+        """Return what is remembered of a call's place; ``ValueError`` if it was called otherwise before."""
+        frame = sys._getframe(3)
+        code = frame.f_code
+        key = (code.co_filename, code.co_name, frame.f_lineno, frame.f_lasti)
+        filters = tuple(sorted(name for name in options if options[name]))
+        known = self._places.setdefault(key, _Place(level, filters))
+        if known.level != level:
+            raise ValueError("Logger severity cannot be changed between calls.")
+        if known.filters != filters:
+            raise ValueError("Requested logging filters cannot be changed between calls.")
+        return known
 
     def _fill(self, level: int, text: str, where: Caller, message: Any) -> None:
         message.stamp.sec, message.stamp.nanosec = divmod(self.contexts.now(), S)
         message.level, message.name, message.msg = int(level), self.name, text
         message.file, message.function, message.line = where
-
-    def _suppressed(self, text: str, options: dict[str, Any]) -> bool:
-        first = text not in self._seen
-        if options.get("once") and not first:
-            return True
-        if options.get("once") or options.get("skip_first"):
-            self._seen.add(text)
-        if options.get("skip_first") and first:
-            return True
-        period = options.get("throttle_duration_sec")
-        if period is None:
-            return False
-        now, last = self.contexts.now(), self._last.get(text)
-        if last is not None and now - last < from_seconds(period):
-            return True
-        self._last[text] = now
-        return False
 
     def debug(self, message: Any, **options: Any) -> bool:
         """Log a line for developers."""

@@ -55,10 +55,13 @@ class Parameter:
 
         def check(self, value: Any) -> bool:
             """Return whether *value* is of this type."""
-            return _type_of(value) == self or (isinstance(value, list) and not value and self >= 5)
+            if isinstance(value, bool) and self is Parameter.Type.INTEGER:
+                return True  # an int, as rclpy tests it
+            empty = isinstance(value, _SEQUENCES) and not len(value)
+            return _type_of(value) == self or (empty and self >= Parameter.Type.BYTE_ARRAY)
 
     def __init__(self, name: str, type_: Parameter.Type | None = None, value: Any = None) -> None:
-        value = list(value) if isinstance(value, (tuple, array, np.ndarray)) else value
+        value = value.tolist() if isinstance(value, np.ndarray) else value
         self.name, self.value = name, value
         self.type_ = Parameter.Type.from_parameter_value(value) if type_ is None else Parameter.Type(type_)
         if not self.type_.check(value):
@@ -79,7 +82,8 @@ class Parameter:
         """Return the value as ``rcl_interfaces/msg/ParameterValue``."""
         message = new("rcl_interfaces/msg/ParameterValue", type=int(self.type_))
         if self.type_:
-            setattr(message, f"{self.type_.name.lower()}_value", self.value)
+            value = list(self.value) if isinstance(self.value, _SEQUENCES) else self.value
+            setattr(message, f"{self.type_.name.lower()}_value", value)
         return message
 
     def to_parameter_msg(self) -> Any:
@@ -90,10 +94,13 @@ class Parameter:
         return f"Parameter({self.name!r}, {self.type_.name}, {self.value!r})"
 
 
+_SEQUENCES = (list, tuple, array)
+
+
 def _type_of(value: Any) -> int | None:
     kinds = ((type(None), 0), (bool, 1), (int, 2), (float, 3), (str, 4), (bytes, 5))
     single = next((number for kind, number in kinds if isinstance(value, kind)), None)
-    if single is not None or not isinstance(value, list):
+    if single is not None or not isinstance(value, _SEQUENCES):
         return single
     inner = {_type_of(item) for item in value}
     if len(inner) > 1:
@@ -435,9 +442,9 @@ class NodeParameters:
         """Return the type of the current value of a parameter."""
         return self._declared.get(name).type_
 
-    def get_parameter_types(self, names: Sequence[str]) -> list[Parameter.Type]:
-        """Return the types of the current values of parameters."""
-        return [self.get_parameter_type(name) for name in names]
+    def get_parameter_types(self, names: Sequence[str]) -> list[int]:
+        """Return the numbers of the types of the current values of parameters."""
+        return [int(self.get_parameter_type(name)) for name in names]
 
     def list_parameters(self, prefixes: Sequence[str], depth: int) -> Any:
         """Return a ``ListParametersResult`` of the names at most *depth* levels below a prefix (0: all)."""
