@@ -130,6 +130,19 @@ def test_frames_of_tf_and_tf2(run_model):
     ]
 
 
+def test_actions(run_model):
+    outcome = run_model(QUEUES.replace("queues.cpp", "actions.cpp"), "actions.cpp", "robot_msgs")
+    assert outcome.run.completed, outcome.run.record.outcome
+    said = [one.text for one in outcome.of(Text) if one.source == "queues"]
+    assert said[:-1] == [
+        *("server 1", "active", "at 1", "at 2", "at 3", "done SUCCEEDED 3", "in time 1", "in time 0"),
+        "PREEMPTED 6 as you wish",
+        "next SUCCEEDED",
+        "the execute callback has returned without an end of its goal, which is aborted",
+    ]
+    assert said[-1] == "without an end ABORTED"
+
+
 def test_it_compiles_without_boost(tmp_path):
     headers = roscpp.generate_headers(_includes("pose_keeper.cpp"), FILES / "pose_keeper.cpp")
     for name, text in headers.items():

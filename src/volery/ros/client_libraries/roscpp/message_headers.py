@@ -9,7 +9,7 @@ from pathlib import Path
 from volery.base.errors import UsageError
 from volery.ros import messages
 from volery.ros.messages.encodings import Constant, FieldLayout, Layout, ros1_layout
-from volery.ros.messages.store import ROS1_SPELLING
+from volery.ros.messages.store import ROS1_SPELLING, define_ros1_action
 
 INCLUDE = Path(__file__).parent / "include"
 _HEADER = re.compile(r"^(\w+)/(\w+)\.h$")
@@ -74,7 +74,8 @@ _NOT_OFFERED = {
     "tf2_ros": "include <tf2_ros/transform_listener.h>, <tf2_ros/transform_broadcaster.h>, "
     "<tf2_ros/static_transform_broadcaster.h> or <tf2_ros/buffer.h>",
     "tf2": "include <tf2/LinearMath/Quaternion.h>, <tf2/LinearMath/Transform.h> or <tf2/utils.h>",
-    "actionlib": "use the topics of the action, or write the component in Python (actionlib)",
+    "actionlib": "include <actionlib/client/simple_action_client.h> or "
+    "<actionlib/server/simple_action_server.h>",
     "message_filters": "keep the last message of each topic, or write the component in Python",
     "dynamic_reconfigure": "read the parameters with NodeHandle::param()",
     "image_transport": "publish and subscribe sensor_msgs::Image with a NodeHandle",
@@ -94,6 +95,7 @@ def _add(texts: dict[str, str], package: str, label: str) -> None:
     if f"{package}/{label}.h" in texts:
         return
     ours = ROS1_SPELLING.get(package, {}).get(label, label)
+    define_ros1_action(package, label)
     if f"{package}/srv/{ours}" in messages.service_types():
         _add_service(texts, package, label, ours)
         return

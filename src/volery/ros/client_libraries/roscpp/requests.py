@@ -280,11 +280,39 @@ def _spawn(session: Session, fiber: CppFiber, arguments: Reader) -> None:
     session.spawn(lambda: fiber.call_beside(number), label)
 
 
+class _Event:
+    """Wakes tasks that wait until another one has changed something."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._count = 0
+
+    def notify(self) -> None:
+        """Wake those who wait."""
+        self._count += 1
+        self._session.changed.notify()
+
+    def wait(self, seen: int, timeout: Ns) -> None:
+        """Block until more than *seen* notifications, the shutdown of the node, or the time-out."""
+        session = self._session
+        session.changed.wait_for(
+            lambda: self._count > seen or session.finished, _timeout(timeout), ends_activation=True
+        )
+
+
+def _wait_for_event(session: Session, arguments: Reader) -> None:
+    event = session.find(arguments.integer(), _Event)
+    event.wait(arguments.integer(), arguments.integer())
+
+
 SIMPLE: dict[str, Callable[[Session, Reader], Any]] = {
     "advertise": lambda session, arguments: session.keep(_Publisher(session, arguments)),
     "publish": _publish,
     "watch": _watch,
     "publish_to": _publish_to,
+    "event": lambda session, arguments: session.keep(_Event(session)),
+    "event_notify": lambda session, arguments: session.find(arguments.integer(), _Event).notify(),
+    "event_wait": _wait_for_event,
     "queue": lambda session, arguments: session.keep(session.node.group()),
     "queue_length": lambda session, arguments: len(session.group(arguments.integer())),
     "queue_clear": _queue_clear,

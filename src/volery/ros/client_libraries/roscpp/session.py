@@ -45,6 +45,7 @@ class Session:
 
     def __post_init__(self) -> None:
         self.kernel = self.graph.kernel
+        self.changed = Signal(self.kernel, f"{self.component} (an event of another task)")
         self._ended = Signal(self.kernel, f"{self.component} (ros::waitForShutdown)")
 
     def join(self, name: str, anonymous: bool) -> None:
@@ -79,6 +80,7 @@ class Session:
             if self.opened is not None:
                 self.opened.close()
             self._ended.notify()
+            self.changed.notify()
 
     def wait_for_end(self) -> None:
         """Block until the shutdown."""

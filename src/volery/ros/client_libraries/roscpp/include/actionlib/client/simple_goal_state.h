@@ -1,0 +1,2 @@
+#pragma once
+#include "actionlib/client/simple_action_client.h"
