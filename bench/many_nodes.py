@@ -1,7 +1,7 @@
 """CPU time of 100 rclpy nodes with 100 topics at 50 Hz: on the embedded graph, and on real rclpy beside it.
 
-Both run the same file, ``ros_nodes/ring.py``, in one process each; building the nodes is left out. Messages that
-a busy machine loses to real rclpy make its sum smaller, so the ratio is that for a message.
+Both run the same file, ``ros_nodes/ring.py``, in one process each; building the nodes is left out. Messages
+that a busy machine loses to real rclpy make its sum smaller, so the ratio is that for a message.
 Real rclpy is asked in the environment of ``--python`` (scripts/ros2-venv); the goal is a ratio of 0.5.
 
     python bench/many_nodes.py --python .venv/ros2-jazzy/bin/python [--seconds 5]
