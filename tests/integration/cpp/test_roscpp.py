@@ -103,8 +103,9 @@ def test_queues_spinners_and_forms_of_callbacks(run_model):
     assert sorted(said[1:8]) == sorted(FORMS), "two tasks spin"
     assert said[8:first] == ["disconnected", "nobody spins"]
     assert said[first:second] == ["own queue 7", "own queue 7"]
-    assert said[second : second + 3] == ["empty 1", "search 1 /level", "out of range"]
-    assert sorted(said[second + 3 : -1]) == sorted(FORMS)
+    expected = ["empty 1", "unlock", "thread 5 0", "search 1 /level", "out of range"]
+    assert said[second : second + 5] == expected
+    assert sorted(said[second + 5 : -1]) == sorted(FORMS)
     assert said[-1] == "tick"
 
 

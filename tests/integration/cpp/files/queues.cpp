@@ -1,4 +1,5 @@
 // Queues, spinners and the forms of callbacks of roscpp: one node that talks to itself.
+#include <boost/thread.hpp>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <std_msgs/Int32.h>
@@ -78,6 +79,17 @@ int main(int argc, char** argv) {
     ROS_INFO("nobody spins");
     queue.callAvailable(ros::WallDuration(1.0));
     ROS_INFO("empty %d", queue.isEmpty());
+
+    boost::mutex mutex;
+    boost::mutex::scoped_lock lock(mutex);
+    boost::thread thread([&](int number) {
+        boost::mutex::scoped_lock own(mutex);
+        ROS_INFO("thread %d %d", number, boost::this_thread::get_id() == boost::thread::id());
+    }, 5);
+    ros::Duration(0.1).sleep();
+    ROS_INFO("unlock");
+    lock.unlock();
+    thread.join();
 
     node.setParam("/level", 3);
     std::string found;

@@ -292,17 +292,19 @@ class _Event:
         self._count += 1
         self._session.changed.notify()
 
-    def wait(self, seen: int, timeout: Ns) -> None:
-        """Block until more than *seen* notifications, the shutdown of the node, or the time-out."""
+    def wait(self, seen: int, timeout: Ns, until_end: bool) -> None:
+        """Block until more than *seen* notifications, the time-out, or *until_end* the end of the node."""
         session = self._session
         session.changed.wait_for(
-            lambda: self._count > seen or session.finished, _timeout(timeout), ends_activation=True
+            lambda: self._count > seen or (until_end and session.finished),
+            _timeout(timeout),
+            ends_activation=True,
         )
 
 
 def _wait_for_event(session: Session, arguments: Reader) -> None:
     event = session.find(arguments.integer(), _Event)
-    event.wait(arguments.integer(), arguments.integer())
+    event.wait(arguments.integer(), arguments.integer(), arguments.flag())
 
 
 SIMPLE: dict[str, Callable[[Session, Reader], Any]] = {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "actionlib/event.h"
+#include "actionlib/action_types.h"
 
 namespace actionlib {
 

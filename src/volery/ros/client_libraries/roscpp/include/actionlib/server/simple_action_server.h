@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "actionlib/event.h"
+#include "actionlib/action_types.h"
 
 namespace actionlib {
 
