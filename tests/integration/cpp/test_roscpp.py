@@ -120,6 +120,7 @@ def test_frames_of_tf_and_tf2(run_model):
     assert [one.text for one in outcome.of(Text) if one.source == "queues"] == [
         "argument one, rate 7",
         "argument two words, rate 7",
+        "at first 0",
         "between 2.500000 0.000000 2.000000 yaw 0.250000",
         "camera 9.621610 0.783327 2.000000 yaw 2.470796",
         "point 1.000000 1.000000 base",

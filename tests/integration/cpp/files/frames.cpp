@@ -31,6 +31,7 @@ int main(int argc, char** argv) {
     camera.transform.rotation = tf2::toMsg(quarter);
     fixed.sendTransform(camera);
 
+    ROS_INFO("at first %d", buffer.canTransform("world", "base", ros::Time(0)));
     ros::Time const start = ros::Time::now();
     for (int step = 0; step < 10; ++step) {
         tf::Transform moved;

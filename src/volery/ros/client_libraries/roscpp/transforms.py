@@ -22,7 +22,7 @@ class _Nanoseconds(NamedTuple):
 
 
 def _create(session: Session, arguments: Reader) -> int:
-    kind: Any = type("Buffer", (Buffer,), {"kernel": session.kernel})
+    kind: Any = type("Buffer", (Buffer,), {"graph": session.graph, "kernel": session.kernel})
     return session.keep(kind(_Nanoseconds(arguments.integer())))
 
 
