@@ -21,13 +21,13 @@ def _supervised(work: Any, show: Any = None) -> tuple[Any, list[tuple[str, str]]
     def salvage(error: VoleryError, blamed: str) -> Any:
         mourned.append((blamed, str(error)))
 
-    return run_supervised(work, show, Supervision(build_framework(), {}, 5.0), salvage), mourned
+    return run_supervised(work, show, None, Supervision(build_framework(), {}, 5.0), salvage), mourned
 
 
 def test_the_result_of_the_run_is_returned():
     shown: list[Any] = []
 
-    def work(show: Any) -> Any:
+    def work(show: Any, tell: Any) -> Any:
         show("half of it")
         return {"pid": os.getpid()}
 
@@ -39,7 +39,7 @@ def test_the_result_of_the_run_is_returned():
 
 @pytest.mark.parametrize("error", [UsageError("no such thing"), LinkSilent("no reply")])
 def test_an_error_of_the_run_is_raised(error):
-    def work(show: Any) -> Any:
+    def work(show: Any, tell: Any) -> Any:
         raise error
 
     with pytest.raises(type(error), match=str(error)):
@@ -55,7 +55,7 @@ def test_an_error_of_the_run_is_raised(error):
     ],
 )
 def test_a_process_that_dies_is_reported(end, said):
-    _, mourned = _supervised(lambda show: end())
+    _, mourned = _supervised(lambda show, tell: end())
     [(blamed, error)] = mourned
     assert blamed == "run"
     assert said in error
@@ -69,7 +69,7 @@ def _wait_for_ever() -> None:
 def test_ctrl_c_is_passed_on():
     parent = os.getpid()
 
-    def work(show: Any) -> Any:
+    def work(show: Any, tell: Any) -> Any:
         try:
             os.kill(parent, signal.SIGINT)
             _wait_for_ever()
@@ -89,4 +89,4 @@ def test_ctrl_c_during_the_fork_is_passed_on():
 
     os.register_at_fork(after_in_parent=interrupt)
     with pytest.raises(KeyboardInterrupt):
-        _supervised(lambda show: _wait_for_ever())
+        _supervised(lambda show, tell: _wait_for_ever())

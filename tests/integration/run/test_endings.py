@@ -20,7 +20,7 @@ pytestmark = pytest.mark.integration
 LAND = "        self._drone.land()\n"
 HOVER = "        volery.sleep(1500)\n"
 RAISE = "        raise ValueError('the camera fell off')\n"
-FREEZE = "        while True:\n            pass\n"
+FREEZE = "        for _ in iter(int, 1):  # time passes in a loop of while\n            pass\n"
 
 
 def record(folder):
