@@ -35,7 +35,7 @@ def graph_on(kernel: VirtualKernel, priced: bool, recorded: bool) -> EmbeddedGra
     return EmbeddedGraph(kernel, tariffs, records=lambda topic: recorded)
 
 
-def publishing(count: int, priced: bool, recorded: bool) -> float:
+def publishing(count: int, priced: bool, recorded: bool, kind: str = POSE, **fields: Any) -> float:
     """Microseconds from publish to the end of the callback, one subscriber."""
     kernel = VirtualKernel()
     graph = graph_on(kernel, priced, recorded)
@@ -44,9 +44,9 @@ def publishing(count: int, priced: bool, recorded: bool) -> float:
 
     def both() -> None:
         node = graph.node("both")
-        node.subscribe("pose", POSE, lambda message: None)
-        publisher = node.advertise("pose", POSE)
-        message = messages.new(POSE)
+        node.subscribe("topic", kind, lambda message: None)
+        publisher = node.advertise("topic", kind)
+        message = messages.new(kind, **fields)
         start = process_time()
         for _ in range(count):
             publisher.publish(message)
@@ -102,6 +102,14 @@ def main() -> None:
     what: dict[str, Callable[[], float]] = {
         "encode to CDR alone": lambda: encoding(count),
         "publish to callback": lambda: publishing(count, priced=False, recorded=False),
+        "publish to callback, Twist": lambda: publishing(count, False, False, "geometry_msgs/msg/Twist"),
+        "publish to callback, Odometry": lambda: publishing(count, False, False, "nav_msgs/msg/Odometry"),
+        "publish to callback, LaserScan of 720": lambda: publishing(
+            count, False, False, "sensor_msgs/msg/LaserScan", ranges=[0.5] * 720
+        ),
+        "publish to callback, Image of 640 x 480": lambda: publishing(
+            count // 20, False, False, "sensor_msgs/msg/Image", data=bytes(640 * 480 * 3)
+        ),
         "publish to callback, content recorded": lambda: publishing(count, priced=False, recorded=True),
         "publish to callback, recorded and executed on a processor": lambda: publishing(count, True, True),
     }

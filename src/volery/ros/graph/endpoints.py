@@ -38,7 +38,7 @@ from volery.ros.graph.interface import (
 from volery.ros.graph.unserved import PUBLISHED, SERVICE, SUBSCRIBED
 from volery.ros.graph.work import Work
 from volery.ros.messages import cdr_size, message_class, service
-from volery.ros.messages.encodings import copied_to_cdr
+from volery.ros.messages.encodings import copied_to_cdr, encoded_size
 from volery.trace.events import NONE, Call, Message, Published, Text
 
 WARNING = 4
@@ -240,11 +240,12 @@ class EmbeddedPublisher:
         else:
             content = message.converted() if fresh else message.copy()
         size = 0
-        if self._recorded or (self._checked and not fresh):
+        if self._recorded:
             data = copied_to_cdr(content)
             size = len(data)
-            if self._recorded:
-                node.kernel.record(Published(sent, self.topic, self.type, node.name, data))
+            node.kernel.record(Published(sent, self.topic, self.type, node.name, data))
+        elif self._checked and not fresh:
+            size = encoded_size(content)
         elif self._checked or self._sized:
             size = node.graph.size_of(content)
         self._due = sent + self._spacing

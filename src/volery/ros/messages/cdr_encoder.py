@@ -34,9 +34,14 @@ def encode(message: Any) -> bytes:
     Raises:
         AttributeError, OverflowError, TypeError, struct.error: a value does not fit its field.
     """
-    encoded = bytearray(CDR_HEADER)
-    appender(message.__msgtype__)(message, encoded)
-    return bytes(encoded)
+    return bytes(encoded(message))
+
+
+def encoded(message: Any) -> bytearray:
+    """Return the CDR bytes as ``encode`` does, without the copy that makes them immutable."""
+    out = bytearray(CDR_HEADER)
+    appender(message.__msgtype__)(message, out)
+    return out
 
 
 @cache
@@ -134,4 +139,4 @@ class _Writing:
             width = struct.calcsize(f"<{code}")
             if width > 1:
                 self.lines.append(f"if len({values}): out += bytes((4 - len(out)) % {width})")
-            self.lines.append(f"out += {values}.tobytes()")
+            self.lines.append(f"out += {values}.data")

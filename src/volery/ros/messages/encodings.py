@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
 from volery.ros.messages import lazy_rosbags as rosbags
-from volery.ros.messages.cdr_encoder import CDR_HEADER, FORMATS, encode
+from volery.ros.messages.cdr_encoder import CDR_HEADER, FORMATS, encode, encoded
 from volery.ros.messages.conversion import FILLER, HEADER, Conversion
 from volery.ros.messages.message import Message
 from volery.ros.messages.store import ROS1_SPELLING, message_class, message_name, service, service_name, store
@@ -50,8 +50,17 @@ def to_cdr(message: Message) -> bytes:
 
 def copied_to_cdr(message: Message) -> bytes:
     """Encode a message that ``Message.copy`` has returned, without preparing it again."""
+    return bytes(_checked(message))
+
+
+def encoded_size(message: Message) -> int:
+    """Return the number of bytes of ``copied_to_cdr``; a value that does not fit raises as there."""
+    return len(_checked(message))
+
+
+def _checked(message: Message) -> bytearray:
     try:
-        return encode(message)
+        return encoded(message)
     except (struct.error, OverflowError, TypeError, ValueError, AttributeError) as error:
         raise UsageError(f"{message.__msgtype__}: {_culprit(message)}: {error}") from error
 

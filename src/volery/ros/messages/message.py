@@ -9,6 +9,7 @@ also ROS 1's spelling (``stamp.secs``, ``stamp.to_sec()``).
 from __future__ import annotations
 
 import struct
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import field, make_dataclass
 from functools import partial
@@ -77,7 +78,7 @@ def generated_copy(cls: Any, fields: list[Any], law: Law = PLAIN) -> Copy:
 
 def generated_conversion(cls: Any, fields: list[Any]) -> Copy:
     """Return the method ``converted`` of a message class."""
-    names: dict[str, Any] = {"array": np.ndarray}
+    names: dict[str, Any] = {"ndarray": np.ndarray}
     tests = _conversions(fields, "self", names)
     if tests is None:
         return generated_copy(cls, fields)
@@ -197,7 +198,7 @@ def _conversions(fields: list[Any], of: str, names: dict[str, Any]) -> list[str]
             number = len(names)
             names[f"type_{number}"], names[f"copier_{number}"] = _dtype(one.base), _copier(one)
             shape = f"{value}.shape != ({one.length},)" if one.length else f"{value}.ndim != 1"
-            wrong = f"type({value}) is not array or {value}.dtype is not type_{number} or {shape}"
+            wrong = f"type({value}) is not ndarray or {value}.dtype is not type_{number} or {shape}"
             lines += [f"if {wrong}:", f"    {value} = copier_{number}({value})"]
     return lines
 
@@ -461,14 +462,14 @@ def _copy_bytes(dtype: np.dtype[Any], count: int, values: Any) -> Any:
 
 
 def _copy_array(dtype: np.dtype[Any], count: int, values: Any) -> Any:
-    if isinstance(values, Received):
+    kind = values.__class__
+    if kind is list or kind is tuple:
+        if dtype.char != "?":  # an array refuses fractions as whole numbers
+            values = array(dtype.char, values)
+    elif kind is Received:
         values = values.array
-    elif isinstance(values, bytes | bytearray):
+    elif kind is bytes or kind is bytearray:
         values = np.frombuffer(values, np.uint8)
-    elif dtype.kind in "iu" and isinstance(values, list | tuple):
-        given = np.array(values)
-        if given.dtype.kind == "f" and given.size:
-            raise TypeError("not whole numbers")
     copied = np.array(values, dtype)
     if copied.ndim != 1 or (count and copied.shape[0] != count):
         wanted = count or "one row of"

@@ -22,7 +22,7 @@ from volery.ros.client_libraries.rclpy.ros_time import Clock
 from volery.ros.graph import CallFailedError, EmbeddedGraph, RosGraph, ServiceError, Work
 from volery.ros.graph import Node as GraphNode
 from volery.ros.messages import Message, from_cdr, to_cdr
-from volery.ros.messages.client_classes import Odd, adopt, library_of, receiving, take_odd_values
+from volery.ros.messages.client_classes import Odd, adopt, library_of, odd_values, receiving, take_odd_values
 
 
 class EntityNode(Protocol):
@@ -102,8 +102,9 @@ class Publisher:
         if not isinstance(msg, self.msg_type.of_graph):
             raise TypeError(f"Expected {self.msg_type}, got {type(msg)}")
         self._made.publish(msg)
-        for one in take_odd_values(msg):
-            self._warn(one)
+        if odd_values:
+            for one in take_odd_values(msg):
+                self._warn(one)
 
     def _warn(self, odd: Odd) -> None:
         """Log once a source line and field that rclpy sends another value than it is given."""
