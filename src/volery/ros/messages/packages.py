@@ -109,6 +109,28 @@ _FIELD = re.compile(r"^\s*(\w+)/(?:msg/)?\w+(?:\[[^]]*\])?\s+\w", re.MULTILINE)
 _NAME = re.compile(r"<name>\s*([\w-]+)\s*</name>")
 
 
+_FIELD_TYPE = re.compile(r"^\s*(\w+)(?:/(?:msg/)?(\w+))?(?:<=\d+)?(?:\[[^]]*\])?\s+\w", re.MULTILINE)
+
+
+def _definable(texts: dict[str, str]) -> dict[str, str]:
+    """Return the types without those that lack a type of another package, or have a wstring.
+
+    One such type, which nobody may use, must not make its whole package unusable.
+    """
+    known = set(types())
+    while True:
+        there = known | texts.keys()
+        lacking = {
+            name
+            for name, text in texts.items()
+            for package, kind in _FIELD_TYPE.findall(text)
+            if package == "wstring" or (kind and f"{package}/msg/{kind}" not in there)
+        }
+        if not lacking:
+            return texts
+        texts = {name: text for name, text in texts.items() if name not in lacking}
+
+
 def define_imported(file: Path, workspace: Workspace | None = None) -> list[str]:
     """Define the interfaces that a Python file imports; see ``define_packages``."""
     return define_packages(file, _imported(file), workspace)
@@ -144,6 +166,7 @@ def define_packages(file: Path, packages: Iterable[str], workspace: Workspace | 
         for name, text in there:
             texts[name] = text
             wanted += [other for other in _FIELD.findall(text) if other not in (*known, *found)]
+    texts = _definable(texts)
     try:
         define_all({name: text for name, text in texts.items() if _from_files.get(name) != text})
     except UsageError as error:
