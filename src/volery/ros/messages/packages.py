@@ -51,6 +51,8 @@ class _Definitions(ModuleType):
         if wanted not in self._known and self._kind == "msg" and define_ros1_action(self._package, wanted):
             self._known.append(wanted)
         if wanted not in self._known:
+            if why := _undefined.get(f"{self._package}/{self._kind}/{wanted}"):
+                raise AttributeError(f"{self.__name__}.{name} cannot be used: {why}")
             hint = did_you_mean(name, self._known)
             raise AttributeError(f"{self.__name__} has no {name!r}{hint}; it has {choices(self._known)}")
         full = f"{self._package}/{self._kind}/{wanted}"
@@ -121,14 +123,19 @@ def _definable(texts: dict[str, str]) -> dict[str, str]:
     while True:
         there = known | texts.keys()
         lacking = {
-            name
+            name: "wstring is not supported" if package == "wstring" else f"there is no {package}/{kind}"
             for name, text in texts.items()
             for package, kind in _FIELD_TYPE.findall(text)
             if package == "wstring" or (kind and f"{package}/msg/{kind}" not in there)
         }
         if not lacking:
             return texts
+        _undefined.update(lacking)
         texts = {name: text for name, text in texts.items() if name not in lacking}
+
+
+_undefined: dict[str, str] = {}
+"""Types of files that could not be defined, and why."""
 
 
 def define_imported(file: Path, workspace: Workspace | None = None) -> list[str]:

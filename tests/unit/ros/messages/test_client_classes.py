@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from volery.ros.messages import define, define_imported, types
+from volery.ros.messages import define, define_imported, modules, types
 from volery.ros.messages.client_classes import RCLPY, ROSPY, Library, adopt, message_of, take_odd_values
 
 
@@ -168,3 +168,20 @@ def test_a_known_package_gets_the_other_types_of_the_workspace(tmp_path: Path) -
     assert "roscopter/msg/ValuesTest" in types()
     assert message_of("roscopter/msg/RC").__match_args__ == ("channel",)
     assert define_imported(file) == []
+
+
+def test_a_type_that_cannot_be_defined_leaves_its_package_usable(tmp_path: Path) -> None:
+    folder = tmp_path / "partly_msgs" / "msg"
+    folder.mkdir(parents=True)
+    (folder / "Plain.msg").write_text("float64 height\n")
+    (folder / "Wide.msg").write_text("wstring text\n")
+    (folder / "Far.msg").write_text("nowhere_msgs/Thing thing\n")
+    (folder / "Farther.msg").write_text("partly_msgs/Far far\n")
+    file = tmp_path / "node.py"
+    file.write_text("from partly_msgs.msg import Plain\n")
+    assert define_imported(file) == ["partly_msgs"]
+    partly: Any = modules("partly_msgs")["partly_msgs.msg"]
+    assert partly.Plain(height=2.0).height == 2.0
+    for name, why in (("Wide", "wstring"), ("Far", "nowhere_msgs/Thing"), ("Farther", "partly_msgs/Far")):
+        with pytest.raises(AttributeError, match=why):
+            getattr(partly, name)
