@@ -339,7 +339,8 @@ def message_name(name: str) -> str:
     if name in store().fielddefs:
         return name
     full = _full(name, "msg")
-    if full not in store().fielddefs:
+    package, _, label = full.rpartition("/msg/")
+    if full not in store().fielddefs and not define_ros1_action(package, label):
         raise _unknown("message", full, types())
     return full
 

@@ -240,7 +240,7 @@ class Builder:
         check_code(replace(self._system, instances=self._models))
         steps = StepCounter(libraries=library_table()) if fidelity == "code" else None
         workspace = Workspace()
-        for model in self._models:
+        for model in self._system.instances:  # the trace has the messages of other processes, too
             if model.component.path and model.component.language in PYTHON_ROS:
                 define_imported(self._system.file_of(model.component), workspace)
         launches = self._launches()

@@ -8,7 +8,7 @@ import pytest
 
 from volery.base.time import S
 from volery.ros.client_libraries.actionlib import CommState, GoalStatus, steps
-from volery.ros.messages import message_class, ros1_type
+from volery.ros.messages import message_class, message_name, ros1_type
 from volery.ros.messages.store import define_ros1_action
 from volery.trace.events import Failure
 
@@ -168,6 +168,7 @@ out(len(statuses[-1].status_list))
 
 
 def test_messages_are_those_that_ros1_makes_of_an_action() -> None:
+    assert message_name("example_interfaces/FibonacciResult") == "example_interfaces/msg/FibonacciResult"
     assert define_ros1_action("example_interfaces", "FibonacciActionGoal")
     assert not define_ros1_action("example_interfaces", "FibonacciGoals")
     goal = message_class("example_interfaces/msg/FibonacciActionGoal")
