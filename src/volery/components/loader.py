@@ -29,7 +29,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from volery.base.errors import ComponentError, Location, ModelError, VoleryError, did_you_mean
+from volery.base.errors import ComponentError, Location, ModelError, did_you_mean
 from volery.components.instance import COMPONENT_MARK, Instance, describe
 from volery.components.polling import Polling, empty_turns
 from volery.components.virtual_stdlib.process_modules import ProcessModules
@@ -293,7 +293,7 @@ class Loader:
         module = self.shared.module(f"{USER_MODULE_PREFIX}{name}.{source.path.stem}", source.path, library)
         try:
             self.execute(source, module)
-        except VoleryError:
+        except (ModelError, ComponentError):
             raise
         except Exception as error:
             raise ComponentError(name, f"{module.__file__} cannot be loaded: {describe(error)}") from error
