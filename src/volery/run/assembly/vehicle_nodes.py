@@ -206,7 +206,7 @@ def names_of(vehicle: Vehicle, codec: Codec | None, commanded: bool) -> str:
         there = f"its node can have {choices(valid)}" if valid else "it is a node with names of its own"
         what = f"{vehicle.name}: {vehicle.names}'s names do not fit {vehicle.autopilot}: {there}"
         raise ModelError(what, where=vehicle.where)
-    if commanded and vehicle.names not in ("", *valid[:1]):
+    if commanded and vehicle.names and vehicle.names != valid[0]:
         what = f"{vehicle.name}: components command it by {valid[0]}'s names; leave out 'names'"
         raise ModelError(what, where=vehicle.where)
     return vehicle.names or (valid[0] if valid else "")
