@@ -117,7 +117,7 @@ _FIELD_TYPE = re.compile(r"^\s*(\w+)(?:/(?:msg/)?(\w+))?(?:<=\d+)?(?:\[[^]]*\])?
 def _definable(texts: dict[str, str]) -> dict[str, str]:
     """Return the types without those that lack a type of another package, or have a wstring.
 
-    One such type, which nobody may use, must not make its whole package unusable.
+    One such type, which no file may use, must not make its whole package unusable.
     """
     known = set(types())
     while True:
