@@ -125,13 +125,20 @@ def _definable(texts: dict[str, str]) -> dict[str, str]:
         lacking = {
             name: "wstring is not supported" if package == "wstring" else f"there is no {package}/{kind}"
             for name, text in texts.items()
-            for package, kind in _FIELD_TYPE.findall(text)
+            for package, kind in _field_types(name.partition("/")[0], text)
             if package == "wstring" or (kind and f"{package}/msg/{kind}" not in there)
         }
         if not lacking:
             return texts
         _undefined.update(lacking)
         texts = {name: text for name, text in texts.items() if name not in lacking}
+
+
+def _field_types(own: str, text: str) -> Iterator[tuple[str, str]]:
+    """Yield package and name of each field's type; a basic type's own name and nothing."""
+    for first, second in _FIELD_TYPE.findall(text):
+        of_own = not second and first[0].isupper() and first != "Header"
+        yield (own, first) if of_own else (first, second)
 
 
 _undefined: dict[str, str] = {}

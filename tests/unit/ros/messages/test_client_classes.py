@@ -176,7 +176,7 @@ def test_a_type_that_cannot_be_defined_leaves_its_package_usable(tmp_path: Path)
     (folder / "Plain.msg").write_text("float64 height\n")
     (folder / "Wide.msg").write_text("wstring text\n")
     (folder / "Far.msg").write_text("nowhere_msgs/Thing thing\n")
-    (folder / "Farther.msg").write_text("partly_msgs/Far far\n")
+    (folder / "Farther.msg").write_text("Header header\nuint8 BAD=1\nFar[] far\n")
     file = tmp_path / "node.py"
     file.write_text("from partly_msgs.msg import Plain\n")
     assert define_imported(file) == ["partly_msgs"]
