@@ -92,7 +92,7 @@ class CommandServices:
         base, custom = request.base_mode, 0
         if request.custom_mode and not self._link.known:
             self._warn(
-                "set_mode: no heartbeat of an autopilot yet, which tells its modes; wait for connected"
+                "set_mode: no heartbeat of an autopilot yet, so its modes are unknown; wait for connected"
             )
             return response(False)
         if request.custom_mode:

@@ -169,7 +169,7 @@ class Publisher:
         except UsageError as error:
             if self._publisher.subscribers() or not _misfits(message):
                 raise ROSSerializationException(str(error)) from error
-            text = f"{self.name}: not sent, which rospy tells only if the topic has a subscriber: {error}"
+            text = f"{self.name}: not sent (rospy raises this only when the topic has a subscriber): {error}"
             self._session.log(WARNING, text)
 
     def get_num_connections(self) -> int:

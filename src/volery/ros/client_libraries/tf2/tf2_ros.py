@@ -147,6 +147,13 @@ STAMPED = {
 """Content of ``tf2_geometry_msgs``."""
 
 
+def _conversion_of(stamped: Any, new_type: Any) -> Any:
+    """Return what changes the frame of a stamped object; raise ``TypeException`` if nothing does."""
+    if new_type is not None:
+        raise TypeException(f"Buffer.transform: nothing converts to {new_type!r} on the embedded graph")
+    return TransformRegistration().get(type(stamped))
+
+
 def as_ns(value: Any) -> Ns:
     """Return a time or duration of rospy or rclpy, a message of either, or seconds, in ns."""
     if isinstance(value, (int, float)):
@@ -344,13 +351,9 @@ class Buffer:
         self, object_stamped: Any, target_frame: str, timeout: Any = 0, new_type: Any = None
     ) -> Any:
         """Return a stamped point, vector or pose in another frame."""
-        if new_type is not None:
-            raise TypeException(f"Buffer.transform: nothing converts to {new_type!r} on the embedded graph")
-        change = TransformRegistration().get(type(object_stamped))
-        header = object_stamped.header
-        return change(
-            object_stamped, self.lookup_transform(target_frame, header.frame_id, header.stamp, timeout)
-        )
+        change, header = _conversion_of(object_stamped, new_type), object_stamped.header
+        found = self.lookup_transform(target_frame, header.frame_id, header.stamp, timeout)
+        return change(object_stamped, found)
 
     def transform_full(
         self,
@@ -362,16 +365,11 @@ class Buffer:
         new_type: Any = None,
     ) -> Any:
         """Return a stamped object in another frame at another time, via a fixed frame."""
-        if new_type is not None:
-            raise TypeException(f"Buffer.transform: nothing converts to {new_type!r} on the embedded graph")
-        change = TransformRegistration().get(type(object_stamped))
-        header = object_stamped.header
-        return change(
-            object_stamped,
-            self.lookup_transform_full(
-                target_frame, target_time, header.frame_id, header.stamp, fixed_frame, timeout
-            ),
+        change, header = _conversion_of(object_stamped, new_type), object_stamped.header
+        found = self.lookup_transform_full(
+            target_frame, target_time, header.frame_id, header.stamp, fixed_frame, timeout
         )
+        return change(object_stamped, found)
 
     def can_transform_full(  # noqa: PLR0917 - tf2's
         self,

@@ -1,7 +1,7 @@
 """A tree of coordinate frames whose transforms change over time, with tf2's lookups and exceptions.
 
 A rigid transform is a rotation quaternion (w, x, y, z) and a translation in metres, from child to parent. The
-rules are those that Debian's tf2 0.7.6 shows when it is asked; ROS 2's differ where a parameter says so.
+rules were observed in Debian's tf2 0.7.6. Parameters select ROS 2's where they differ.
 """
 
 from __future__ import annotations
