@@ -26,7 +26,7 @@ def ros_names(system: System) -> Iterator[Finding]:
     for instance in system.instances:
         if instance.component.language in ROS_LANGUAGES:
             yield from _names_of(instance)
-            full = join_names(instance.namespace, instance.name.replace("-", "_"))
+            full = join_names(instance.namespace, instance.node_name or instance.name.replace("-", "_"))
             if full in nodes:
                 what = f"it is the node {full} in ROS, and so is {nodes[full]}"
                 yield Finding(rules.NODE_CLASH, what, instance_path(instance), instance.where)
@@ -53,7 +53,7 @@ def _names_of(instance: Instance) -> Iterator[Finding]:
 def full_topic(instance: Instance, name: str) -> str:
     """Return the full name of a topic that *instance* calls *name*, after its remapping."""
     known = {old: new for old, new in instance.remap.items() if _ROS_NAME.match(old) and _ROS_NAME.match(new)}
-    node = join_names(instance.namespace, instance.name)
+    node = join_names(instance.namespace, instance.node_name or instance.name)
     full = absolute_name(name, instance.namespace, node)
     return absolute_remaps(known, instance.namespace, node).get(full, full)
 

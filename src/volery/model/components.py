@@ -371,7 +371,7 @@ class _RequiredPort(Syntax):
         return {"type": "string"}
 
 
-INSTANCE_KEYS = ("is", "component", "parameters", "arguments", "active", "namespace", "remap")
+INSTANCE_KEYS = ("is", "component", "parameters", "arguments", "active", "namespace", "node_name", "remap")
 """Keys of an instance. Every other key of an instance is a required port."""
 
 

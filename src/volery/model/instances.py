@@ -271,6 +271,12 @@ class Instance:
     processor: str | None = None
     memory_space: str | None = None
     namespace: Annotated[str, TEXT, "Its ROS namespace."] = "/"
+    node_name: Annotated[
+        str,
+        TEXT,
+        "Name of its ROS node, as `name` of a launch file. By default the file's own, or the instance's "
+        "where several instances run one file in one namespace.",
+    ] = ""
     remap: Annotated[
         Mapping[str, str], MapOf(TEXT, free=True), "Names of ROS topics and services, and their replacements."
     ] = field(default_factory=dict)

@@ -85,7 +85,7 @@ def graph_of_model(system: System) -> GraphSnapshot:
     subscribers: dict[str, list[str]] = {}
     types: dict[str, str] = {}
     for one in system.instances:
-        node, component = full_node_name(one.name, one.namespace), one.component
+        node, component = full_node_name(one.node_name or one.name, one.namespace), one.component
         remaps = absolute_remaps(one.remap, one.namespace, node)
         for stated, found in ((component.publishes, publishers), (component.subscribes, subscribers)):
             for name, topic in stated.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from ast import literal_eval
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -14,7 +15,12 @@ from volery.base.errors import UsageError, did_you_mean
 from volery.kernel.task import ExecutionContext, Scope
 from volery.kernel.waiting import current_task
 from volery.ros.graph import EmbeddedGraph, Node, Publisher, QoS, RosGraph
+from volery.ros.graph.interface import NameTakenError, full_node_name, join_names
 from volery.ros.messages import message_class
+from volery.trace.events import Text
+
+WARNING = 4
+"""Severity as in syslog."""
 
 # -- components and their launch settings
 
@@ -27,12 +33,15 @@ class Launch(NamedTuple):
     parameters: Mapping[str, Any] = {}
     arguments: tuple[str, ...] = ()
     """The whole command line: the path of the program, and all arguments, those for ROS among them."""
+    node_name: str = ""
+    """Name of the node in place of the one that the file gives it; empty for the file's own."""
 
     def given(self, arguments: Sequence[str], ros: int) -> Launch:
         """Return these settings with a command line on top, as rospy or rclpy reads it.
 
-        Those of ROS 1 have a ``:=``: ``a:=b``, ``_parameter:=1``, ``__ns:=/n``. Those of ROS 2 follow
-        ``--ros-args`` up to ``--``: ``-r a:=b``, ``-r __ns:=/n``, ``-p parameter:=1``.
+        Those of ROS 1 have a ``:=``: ``a:=b``, ``_parameter:=1``, ``__ns:=/n``, ``__name:=n``. Those of
+        ROS 2 follow ``--ros-args`` up to ``--``: ``-r a:=b``, ``-r __ns:=/n``, ``-r __node:=n``,
+        ``-p parameter:=1``.
         """
         made = self
         for key, value in _ros_2_arguments(arguments) if ros == 2 else _ros_1_arguments(arguments):
@@ -41,7 +50,9 @@ class Launch(NamedTuple):
                 made = made._replace(parameters={**made.parameters, parameter: _scalar(value)})
             elif key == "__ns":
                 made = made._replace(namespace=value)
-            elif not key.startswith("__"):  # the name is the component's, and logging the run's
+            elif key == "__name":
+                made = made._replace(node_name=value)
+            elif not key.startswith("__"):  # logging is the run's
                 made = made._replace(remaps={**made.remaps, key: value})
         return made._replace(arguments=tuple(arguments))
 
@@ -125,6 +136,60 @@ class LaunchedComponents:
     def node_of(self, component: str) -> Node | None:
         """Return the existing node of *component*, or None."""
         return None if self.nodes is None else self.nodes.get(component)
+
+
+def node_label(name: str) -> str:
+    """Return the name of a component or of a file's node in the characters that ROS takes."""
+    return re.sub(r"\W", "_", name)
+
+
+def node_of_file(
+    graph: RosGraph,
+    component: str,
+    own: str,
+    launch: Launch | None,
+    given: Node | None = None,
+    *,
+    namespace: str = "",
+    first: bool = True,
+    anonymous: bool = False,
+) -> Node:
+    """Return the node that a file creates: *given* if it bears that name, or a new one.
+
+    Its name is the one that the model gives it, or the file's own. Where another node has the file's own, the
+    name of the component takes its place, and a warning says so.
+
+    Args:
+        graph: Its graph.
+        component: The component that runs the file.
+        own: The name that the file gives the node.
+        launch: Launch settings, None for a file that runs without a model.
+        given: A node of the component that exists.
+        namespace: Namespace in place of the launch settings'.
+        first: It is the first node of the component, which the model's name is for.
+        anonymous: The file asks for a name that no other node has; one of the model needs no number.
+    """
+    settings = launch or Launch()
+    where = namespace or settings.namespace
+    stated = settings.node_name if first else ""
+    name = node_label(stated or own)
+
+    def join(name: str, anonymous: bool = False) -> Node:
+        if given is not None and given.name == full_node_name(name, where):
+            return given
+        return graph.node(name, where, remaps=settings.remaps, anonymous=anonymous)
+
+    try:
+        return join(name, anonymous and not stated)
+    except NameTakenError:
+        other = node_label(component if first else f"{component}_{own}")
+        if launch is None or stated or other == name:
+            raise
+        made = join(other)
+        taken = join_names(where, name)
+        what = f"another node is named {taken}, so this one is {made.name}; state a `node_name`"
+        graph.kernel.record(Text(graph.kernel.now(), component, WARNING, what))
+        return made
 
 
 # -- module objects

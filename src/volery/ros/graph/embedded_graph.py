@@ -34,6 +34,7 @@ from volery.ros.graph.interface import (
     Callback,
     Group,
     Handler,
+    NameTakenError,
     Node,
     Publisher,
     QoS,
@@ -412,7 +413,7 @@ class EmbeddedGraph:
             made = EmbeddedNode(self._graph, name, namespace, remaps or {}, context)
             other = self._nodes.get(made.name)
             if other is not None:
-                raise UsageError(
+                raise NameTakenError(
                     f"a node named {made.name} is there already (of component {other.context.component}); "
                     f"give this one of component {made.context.component} another name or namespace"
                 )

@@ -442,6 +442,10 @@ def check_name(name: str, what: str = "name") -> None:
         )
 
 
+class NameTakenError(UsageError):
+    """A node of that name is on the graph already."""
+
+
 def full_node_name(name: str, namespace: str) -> str:
     """Return the full name of a node; ``UsageError`` if its name or its namespace is not valid."""
     if not _NODE.match(name) or "__" in name:

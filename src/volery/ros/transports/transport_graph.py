@@ -25,6 +25,7 @@ from volery.ros.graph.interface import (
     CLOCK,
     CLOCK_PERIOD,
     CLOCK_TYPE,
+    NameTakenError,
     QoS,
     RosGraph,
     ServiceState,
@@ -162,7 +163,7 @@ class TransportGraph:
         context = context or (task.context if task is not None else ExecutionContext(name))
         made = TransportNode(self._graph, name, namespace, remaps or {}, context)
         if made.name in self._nodes:
-            raise UsageError(
+            raise NameTakenError(
                 f"a node named {made.name} is there already, in this process; choose another name"
             )
         join = partial(self._library.join, name, namespace, partial(self._lost, made))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -34,7 +35,7 @@ from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
 from volery.model.system_loader import check_code
 from volery.ros.client_libraries.importable_modules import importable_modules
-from volery.ros.client_libraries.library_base import Launch
+from volery.ros.client_libraries.library_base import Launch, node_label
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
 from volery.ros.graph.embedded_graph import record_all
 from volery.ros.graph.graph_context import Records
@@ -268,14 +269,28 @@ class Builder:
         return self._graph.unserved(Surroundings(self._instances, served, without))
 
     def _launches(self) -> dict[str, Launch]:
-        return {
-            model.name: Launch(model.namespace, model.remap, dict(model.parameters)).given(
-                (str(self._system.file_of(model.component)), *model.arguments),
-                ros=2 if "rcl" in model.component.language else 1,
-            )
-            for model in self._models
-            if is_node(model)
-        }
+        """Return the launch settings of the nodes of this process.
+
+        A node that nothing names has its file's name. It has the instance's where several instances run one
+        file in one namespace, and where it exists before the file runs, to command vehicles.
+        """
+        launches = {one.name: self._launch(one) for one in self._system.instances if is_node(one)}
+        alike = Counter((launch.arguments[0], launch.namespace) for launch in launches.values())
+        found = {}
+        for model in self._models:
+            launch = launches.get(model.name)
+            if launch is not None:
+                several = alike[launch.arguments[0], launch.namespace] > 1
+                kept = model.name if several or commanded_by(model) else ""
+                found[model.name] = launch._replace(node_name=launch.node_name or kept)
+        return found
+
+    def _launch(self, model: InstanceModel) -> Launch:
+        stated = Launch(model.namespace, model.remap, dict(model.parameters), node_name=model.node_name)
+        return stated.given(
+            (str(self._system.file_of(model.component)), *model.arguments),
+            ros=2 if "rcl" in model.component.language else 1,
+        )
 
     def _instance(self, model: InstanceModel, steps: StepCounter | None) -> Instance:
         return Instance(
@@ -381,7 +396,8 @@ class Builder:
         """Join the graph and return the vehicles that the instance commands, by port."""
         node = self._nodes.get(model.name)
         if node is None:
-            node = self._graph.node(model.name, model.namespace, remaps=model.remap)
+            label = node_label(model.node_name or model.name)
+            node = self._graph.node(label, model.namespace, remaps=model.remap)
             self._nodes[model.name] = node
         found: dict[str, Any] = {}
         for connection in commands:

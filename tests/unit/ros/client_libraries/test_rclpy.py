@@ -70,12 +70,14 @@ def test_a_talker_and_a_listener(stage: Stage) -> None:
     assert {event.topic for event in stage.of(Published)} == {"/chatter"}
 
 
-def test_the_component_names_the_node(stage: Stage) -> None:
+def test_the_file_names_the_node_unless_the_model_does(stage: Stage) -> None:
     stage.launched["camera"] = stage_launch(namespace="/drone_1", remaps={"chatter": "words"})
-    stage.script("camera", TALKER)
+    stage.launched["other"] = stage_launch(node_name="by_model")
+    for name in stage.launched:
+        stage.script(name, TALKER)
     stage.run(S)
-    assert "/drone_1/camera" in stage.graph.node_names()
-    assert stage.graph.topics()[0].name == "/drone_1/words"
+    assert stage.graph.node_names() == ["/by_model", "/drone_1/talker_of_the_file"]
+    assert stage.graph.topics()[1].name == "/drone_1/words"
 
 
 def stage_launch(**given: Any) -> Any:

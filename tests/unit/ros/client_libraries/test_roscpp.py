@@ -126,7 +126,7 @@ def test_callbacks_run_on_the_stack_of_the_spinning_fiber(stage):
 
     _run(stage, body)
     assert code.called == [(7, word)] * 3
-    assert stage.priced.count(("/node", "spin_once")) == 1
+    assert stage.priced.count(("/other", "spin_once")) == 1
 
 
 def test_nothing_before_init(stage):
@@ -140,12 +140,12 @@ def test_names_and_parameters(stage):
 
     def body() -> None:
         code.ask("init", Writer().text("other").flag(False))
-        assert code.ask("name").text() == "/robot/node"
+        assert code.ask("name").text() == "/robot/other"
         private = code.ask("node_handle", Writer().text("").text("~")).text()
-        assert private == "/robot/node"
+        assert private == "/robot/other"
         assert code.ask("node_handle", Writer().text("").text("arm")).text() == "/robot/arm"
         assert code.ask("resolve", Writer().text("/robot").text("scan")).text() == "/laser"
-        found = code.ask("param_get", Writer().text("/robot/node/rate"))
+        found = code.ask("param_get", Writer().text("/robot/other/rate"))
         assert found.flag()
         assert requests.read_parameter(found) == 5
         assert not code.ask("param_get", Writer().text("/nothing")).flag()

@@ -271,7 +271,7 @@ out(rospy.get_param_names())
         ("auto", True, False),
         True,
         True,
-        ["/drone_1/n/gains/p", "/drone_1/n/height"],
+        ["/drone_1/whatever/gains/p", "/drone_1/whatever/height"],
     ]
 
 
@@ -305,7 +305,17 @@ def test_arguments_of_ros_2_are_between_its_marks() -> None:
     assert made.arguments == tuple(line.split())
 
 
-def test_a_launched_component_names_its_node(stage: Any) -> None:
+def test_a_file_names_its_node_unless_the_model_or_the_command_line_does(stage: Any) -> None:
+    stage.launched["own"] = Launch()
+    stage.launched["stated"] = Launch(node_name="by_model")
+    stage.launched["remapped"] = Launch().given(("f", "__name:=by_argument"), ros=1)
+    stage.launched["remapped_2"] = Launch().given(["f", "--ros-args", "-r", "__node:=by_remap"], ros=2)
+    for name in stage.launched:
+        stage.component(name, 'rospy.init_node("talker", anonymous=True)\nout(rospy.get_name())')
+    assert stage.run() == ["/talker_1", "/by_model", "/by_argument", "/by_remap"]
+
+
+def test_the_second_node_of_one_name_has_that_of_its_component(stage: Any) -> None:
     for name in ("left", "right"):
         stage.launched[name] = Launch("/fleet", remaps={"cmd": f"{name}/cmd"})
         stage.component(
@@ -317,11 +327,16 @@ out((rospy.get_name(), rospy.get_namespace(), rospy.get_caller_id(), rospy.resol
 """,
         )
     assert stage.run() == [
-        (f"/fleet/{name}", "/fleet/", f"/fleet/{name}", f"/fleet/{name}/cmd") for name in ("left", "right")
+        (f"/fleet/{node}", "/fleet/", f"/fleet/{node}", f"/fleet/{name}/cmd")
+        for name, node in (("left", "controller"), ("right", "right"))
+    ]
+    assert [text.text for text in stage.of(Text)] == [
+        "another node is named /fleet/controller, so this one is /fleet/right; state a `node_name`"
     ]
 
 
 def test_a_node_that_is_there_already_is_taken_over(stage: Any) -> None:
+    stage.launched["n"] = Launch(node_name="made_before")
     stage.nodes["n"] = stage.graph.node("made_before", context=ExecutionContext("n"))
     stage.component("n", 'rospy.init_node("n")\nout(rospy.get_name())')
     assert stage.run() == ["/made_before"]

@@ -27,6 +27,7 @@ from volery.ros.client_libraries.library_base import (
     Rosout,
     caller,
     ignore_end,
+    node_of_file,
 )
 from volery.ros.graph import Node, RosGraph
 from volery.trace.events import Text
@@ -179,7 +180,8 @@ def private_name(parameter: str) -> str:
 class Context:
     """State of one component. ``rclpy.init()`` starts it, ``rclpy.shutdown()`` ends it; it can be restarted.
 
-    As in a launch file, the name of the component names its first node; further nodes keep their own names.
+    A ``node_name`` of the model, as a launch file's ``name``, names its first node; further nodes keep
+    their own names.
     """
 
     def __init__(self, graph: RosGraph, component: str, launch: Launch | None, node: Node | None) -> None:
@@ -273,10 +275,10 @@ class Context:
         launch = self._launch or Launch()
         where = namespace if namespace is not None and launch.namespace == "/" else launch.namespace
         where = where if where.startswith("/") else f"/{where}"
-        made = self._given if first else None
-        if made is None:
-            label = re.sub(r"\W", "_", self._component) if first else name
-            made = self._graph.node(label, where, remaps=launch.remaps)
+        given = self._given if first else None
+        made = node_of_file(
+            self._graph, self._component, name, self._launch, given, namespace=where, first=first
+        )
         if first:
             for key, value in launch.parameters.items():
                 made.set_parameter(private_name(key), value)

@@ -52,7 +52,7 @@ _SERVICES = ("enable_rosout", "start_parameter_services", "enable_logger_service
 
 
 class Node(NodeParameters):
-    """A node. As in a launch file, the name of the component names its first node."""
+    """A node. A ``node_name`` of the model, as a launch file's ``name``, names the component's first."""
 
     contexts: ClassVar[Contexts]
     loggers: ClassVar[type[Logger]]

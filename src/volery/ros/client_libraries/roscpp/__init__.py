@@ -4,7 +4,8 @@
 headers of messages; ``request_handlers`` executes the requests of the code on the graph. Where Boost is not
 installed, the part of it that roscpp's interface needs is in ``fallback/``.
 
-As in a launch file, the name of the component names the node, whatever name ``ros::init`` gets.
+The node has the name that ``ros::init`` gets, unless the model states a ``node_name``, as a launch file's
+``name``.
 
 Intended differences from the real library: what is not offered does not compile; threads of spinners are
 tasks of the run, which change at requests only; wall time is the time of the run; connecting takes no time;

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
@@ -12,7 +11,7 @@ from volery.base.time import Ns
 from volery.kernel.task import Task
 from volery.kernel.waiting import Signal, current_task, read_clock
 from volery.ros.client_libraries.abi_codec import CppFiber
-from volery.ros.client_libraries.library_base import Launch
+from volery.ros.client_libraries.library_base import Launch, node_of_file
 from volery.ros.graph import Group, Node, RosGraph, ServiceError
 from volery.trace.events import Failure
 
@@ -52,11 +51,8 @@ class Session:
         """Execute ``ros::init``; a second call changes nothing."""
         if self.opened is not None:
             return
-        launched = self.component != ""
-        label = re.sub(r"\W", "_", self.component if launched else name)
-        node = self.nodes.get(self.component) or self.graph.node(
-            label, self.launch.namespace, remaps=self.launch.remaps, anonymous=anonymous and not launched
-        )
+        given = self.nodes.get(self.component)
+        node = node_of_file(self.graph, self.component, name, self.launch, given, anonymous=anonymous)
         for key, value in self.launch.parameters.items():
             node.set_parameter(key if key.startswith("/") else f"~{key}", value)
         self.opened = node

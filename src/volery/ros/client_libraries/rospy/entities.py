@@ -9,6 +9,7 @@ from typing import Any, ClassVar, cast
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
 from volery.kernel.waiting import Signal
+from volery.ros.client_libraries.library_base import WARNING
 from volery.ros.client_libraries.rospy.session import (
     ROSException,
     ROSSerializationException,
@@ -21,8 +22,6 @@ from volery.ros.graph.endpoints import EmbeddedPublisher
 from volery.ros.messages import Message, ros1_type, to_cdr, to_ros1
 from volery.ros.messages.client_classes import adopt, library_of, receiving
 
-WARNING = 4
-"""Severity as in syslog."""
 _TYPE_POLL: Ns = 100 * MS
 """Period at which an ``AnyMsg`` subscription looks for the type of its topic."""
 

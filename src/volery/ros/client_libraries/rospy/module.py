@@ -200,7 +200,7 @@ def modules(
 
     Args:
         graph: The graph of the run.
-        launched: Launch settings by component; the name of a launched component names its node.
+        launched: Launch settings by component.
         nodes: Existing nodes by component, which ``init_node`` uses.
         at_end: Registers shutdown hooks for the end of the run.
     """

@@ -6,7 +6,6 @@ exceptions stand here too.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -17,7 +16,7 @@ from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Kernel
 from volery.kernel.task import Scope
 from volery.kernel.waiting import Signal, current_task, poll, read_clock
-from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComponents, Rosout
+from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComponents, Rosout, node_of_file
 from volery.ros.graph import LATCHED, Group, Node, RosGraph, Work
 from volery.ros.messages.client_classes import ROSPY, message_of
 from volery.ros.messages.message import nanoseconds
@@ -229,14 +228,9 @@ class Sessions(LaunchedComponents):
     def _open_session(self, name: str, anonymous: bool) -> Session:
         component = self.component
         task = current_task(self.kernel)
-        launch = self.launch_of(component)
-        label = re.sub(r"\W", "_", name if launch is None else component)
-        anonymous = anonymous and launch is None
-        launch = launch or Launch()
-        node = self.node_of(component) or self.graph.node(
-            label, launch.namespace, remaps=launch.remaps, anonymous=anonymous
-        )
-        for key, value in launch.parameters.items():
+        launch, given = self.launch_of(component), self.node_of(component)
+        node = node_of_file(self.graph, component, name, launch, given, anonymous=anonymous)
+        for key, value in (launch or Launch()).parameters.items():
             node.set_parameter(key if key.startswith("/") else f"~{key}", value)
         ended = Signal(self.kernel, f"{component} (rospy.spin)")
         rosout = Rosout(self.graph, node, "rosgraph_msgs/msg/Log", LATCHED)

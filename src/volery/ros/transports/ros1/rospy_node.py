@@ -21,6 +21,7 @@ from volery.ros.graph.embedded_graph import record_all
 from volery.ros.graph.graph_context import Records
 from volery.ros.graph.interface import (
     TRANSIENT_LOCAL,
+    NameTakenError,
     QoS,
     ServiceState,
     TopicState,
@@ -217,7 +218,7 @@ class Ros1Node:
         """Raise if the name is taken: a second node of a name would make the master end the first."""
         other = self.master.find("lookupNode", self.name)
         if other is not None and is_alive(other):
-            raise UsageError(
+            raise NameTakenError(
                 f"a node named {self.name} is there already (at {other}); "
                 f"choose another name or namespace for this one"
             )

@@ -16,7 +16,14 @@ from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.ros.graph.embedded_graph import record_all
 from volery.ros.graph.graph_context import Records
-from volery.ros.graph.interface import QoS, ServiceState, TopicState, full_node_name, join_names
+from volery.ros.graph.interface import (
+    NameTakenError,
+    QoS,
+    ServiceState,
+    TopicState,
+    full_node_name,
+    join_names,
+)
 from volery.ros.messages import ServiceType
 from volery.ros.transports.client_library import POLL_S, OnMessage, OnRequest
 from volery.ros.transports.ros2.rclpy_endpoints import (
@@ -192,7 +199,7 @@ class Ros2Library:
         """Create a node; raise ``UsageError`` if its name is taken."""
         full = full_node_name(name, namespace)
         if self._is_taken(full):
-            raise UsageError(
+            raise NameTakenError(
                 f"a node named {full} is there already; choose another name or namespace for this one"
             )
         return Ros2Node(self, name, namespace)
