@@ -65,6 +65,9 @@ _DEFINITIONS = (
     *(ast.Try, ast.Pass),
 )
 """Statements of a file that does nothing when it is executed. ``try`` is for imports."""
+_SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+_STARTS = ("init", "init_node")
+"""Functions of rclpy and rospy that a process calls once, at its start."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,12 @@ class SourceFile:
             isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == function
             for node in self.tree.body
         )
+
+    def starts_node(self) -> bool:
+        """Return whether the top level itself starts a ROS node: ``rclpy.init()``, ``rospy.init_node(…)``."""
+        acting = (node for node in self.tree.body if not isinstance(node, _SCOPES))
+        calls = (call for node in acting for call in ast.walk(node) if isinstance(call, ast.Call))
+        return any(ast.unparse(call.func).rpartition(".")[2] in _STARTS for call in calls)
 
     def only_defines(self, function: str) -> bool:
         """Return whether the file defines a function, and its top level calls nothing for its effect."""
@@ -645,7 +654,7 @@ class _Import:
                 return real
             found = self._last_found(name)
         if fromlist:
-            self._submodules(found, name, fromlist)
+            self._submodules(found, name, fromlist, required=globals_ is not None)
             return found
         return self._top_of(name, found)
 
@@ -719,14 +728,19 @@ class _Import:
             instead = str(error).partition(";")[2]
         return f"{name} is not there on the embedded graph{hint};{instead or ' see docs/ros.md'}"
 
-    def _submodules(self, package: ModuleType, name: str, wanted: tuple[str, ...]) -> None:
-        """Load the modules of ``from package import module`` before the names are looked up."""
+    def _submodules(self, package: ModuleType, name: str, wanted: tuple[str, ...], *, required: bool) -> None:
+        """Load the modules of ``from package import module`` before the names are looked up.
+
+        A missing name is an error of the statement only: ``__import__(name, fromlist=…)`` looks up none.
+        """
         for attribute in wanted:
             if attribute == "*" or attribute in vars(package):
                 continue
             module = self._find(f"{name}.{attribute}")
             if module is not None:
                 setattr(package, attribute, module)
+                continue
+            if not required:
                 continue
             try:
                 getattr(package, attribute)

@@ -7,6 +7,7 @@ control, so a constructor may block, call ROS and take time.
 
 from __future__ import annotations
 
+import ast
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -248,11 +249,13 @@ def load_program(
 def script_or_class(path: Path, class_name: str, where: Location | None = None) -> str:
     """Return the class name of a file that is written for ROS, or "" if it is a script.
 
-    A script has an ``if __name__ == "__main__":``, a ``main`` or an entry point, or does not contain the
-    class. Errors as of ``load_program``.
+    A script has an ``if __name__ == "__main__":``, a ``main`` or an entry point, starts its node at top
+    level, or does not contain the class (a component may be called ``Node``, as what its file imports).
+    Errors as of ``load_program``.
     """
     source = parse(path, where)
-    if source.is_script() or source.defines(ENTRY) or class_name not in source.class_names():
+    defined = any(isinstance(node, ast.ClassDef) and node.name == class_name for node in source.tree.body)
+    if source.is_script() or source.defines(ENTRY) or source.starts_node() or not defined:
         return ""
     return "" if entry_function(source) else class_name
 

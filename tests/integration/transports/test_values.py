@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from rigs.requirements import lacking
+from volery.ros.messages import definition
 from volery.ros.transports.ros1 import available
 from volery.run.result import Options
 from volery.run.simulate import simulate
@@ -55,3 +57,34 @@ def test_the_same_values(library: str, tmp_path: Path, capfd: pytest.CaptureFixt
     pairs = zip(expressions, of_output(done.stdout), ours, strict=True)
     differ = [f"{one}\n  real {real}\n  ours {our}" for one, real, our in pairs if real != our]
     assert not differ, "\n".join(differ)
+
+
+FIELDS = """
+import importlib, json, pathlib, sys
+found = {}
+for folder in pathlib.Path(sys.argv[1]).glob("*/msg"):
+    module = importlib.import_module(f"{folder.parent.name}.msg")
+    for name, cls in vars(module).items():
+        if hasattr(cls, "get_fields_and_field_types") and folder.parent.name != "rosidl_adapter":
+            found[f"{folder.parent.name}/msg/{name}"] = list(cls.get_fields_and_field_types())
+print(json.dumps(found))
+"""
+
+
+def test_every_message_of_the_distribution_is_there_with_its_fields() -> None:
+    python = python_of("jazzy")
+    packages = Path(python).parents[1] / f"lib/python{sys.version_info.major}.{sys.version_info.minor}"
+    done = subprocess.run(
+        [python, "-c", FIELDS, str(packages / "site-packages")],
+        env=surroundings(),
+        capture_output=True,
+        text=True,
+        timeout=LIMIT_S,
+        check=True,
+    )
+    theirs: dict[str, list[str]] = json.loads(done.stdout)
+    assert len(theirs) > 100
+    for name, fields in theirs.items():
+        lines = definition(name).partition("\n===")[0].splitlines()
+        ours = [line.split()[1] for line in lines if re.match(r"[^#=]+ [^#=]+$", line.replace("<=", ""))]
+        assert ours == fields, name

@@ -266,6 +266,18 @@ def test_a_file_with_a_class_and_an_entry_point_is_a_script(bench):
     assert script_or_class(script, "Node") == ""
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from rclpy.node import Node\nimport rclpy\nrclpy.init()\n",  # named as an import
+        "import rclpy\nclass Node: pass\nrclpy.init(); node = Node(); rclpy.spin(node)\n",
+        "import rospy as r\nclass Node: pass\nfor _ in range(1):\n    r.init_node('x')\n",
+    ],
+)
+def test_a_file_whose_top_level_starts_a_node_is_a_script(bench, text):
+    assert script_or_class(bench.write("node.py", text), "Node") == ""
+
+
 def test_a_function_that_the_model_names_is_called_once_and_not_as_main(bench):
     script = bench.write("node.py", f"{MAIN}if __name__ == '__main__':\n    main()\n")
     assert bench.run(script, function="main") == ["node"]

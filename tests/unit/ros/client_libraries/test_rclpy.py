@@ -345,9 +345,34 @@ def test_an_action_that_is_cancelled(stage: Stage) -> None:
 
 
 def test_parameters(stage: Stage) -> None:
-    stage.launched["tuner"] = stage_launch(parameters={"gain": 2, "limits.high": 3})
+    stage.launched["tuner"] = stage_launch(parameters={"gain": 2.0, "limits.high": 3})
     stage.script("tuner", PARAMETERS)
     assert stage.run(S) == [2.0, [-1, 3], True, "too much", "type", 2.5, "undeclared"]
+
+
+def test_a_parameter_is_not_converted_to_the_type_that_is_declared(stage: Stage) -> None:
+    stage.launched["tuner"] = stage_launch(parameters={"rate": 50, "gains": (1, 2), "none": ()})
+    stage.script(
+        "tuner",
+        """
+        import rclpy
+        from rclpy.exceptions import InvalidParameterTypeException
+        rclpy.init()
+        node = rclpy.create_node("tuner")
+        for name, default in (("rate", 50.0), ("gains", [1.0, 2.0]), ("none", [1.0]), ("rate", 5)):
+            try:
+                out(node.declare_parameter(name, default).value)
+            except InvalidParameterTypeException as error:
+                out(str(error))
+        """,
+    )
+    assert stage.run(S) == [
+        "Trying to set parameter 'rate' to '50' of type 'INTEGER', expecting type 'DOUBLE': rate",
+        "Trying to set parameter 'gains' to '[1, 2]' of type 'INTEGER_ARRAY', "
+        "expecting type 'DOUBLE_ARRAY': gains",
+        [],
+        50,
+    ]
 
 
 def test_time(stage: Stage) -> None:

@@ -94,7 +94,7 @@ class ParameterException(Exception):  # noqa: N818 - rclpy's name
     """Base class of the errors about parameters."""
 
     def __init__(self, error_msg: str, parameters: Any) -> None:
-        super().__init__(error_msg, parameters)
+        super().__init__(f"{error_msg}: {parameters}")
 
 
 class ParameterNotDeclaredException(ParameterException):
@@ -122,7 +122,7 @@ class ParameterUninitializedException(ParameterException):
     """A parameter was declared without a value and has none."""
 
     def __init__(self, parameter: Any) -> None:
-        super().__init__("The parameter is not initialized", parameter)
+        super().__init__(f"The parameter '{parameter}' is not initialized", parameter)
 
 
 class InvalidParameterException(ParameterException):
@@ -147,7 +147,7 @@ class InvalidParameterValueException(ParameterException):
     """A value was refused."""
 
     def __init__(self, parameter: Any, value: Any, reason: str) -> None:
-        super().__init__(f"Invalid parameter value ({value}) for parameter. {reason}", parameter)
+        super().__init__(f"Invalid parameter value ({value}) for parameter. Reason: {reason}", parameter)
 
 
 EXCEPTIONS = {

@@ -230,10 +230,9 @@ class DeclaredParameters:
         if kind is None and given is not None and not described.dynamic_typing:
             kind = Parameter(name, value=default if default is not None else given).type_
         described.name, described.type = name, int(kind or 0)
-        fitting = given
-        if kind is Parameter.Type.DOUBLE and isinstance(given, int) and not isinstance(given, bool):
-            fitting = float(given)  # a launch file may give an integer where a double was declared
-        parameter = Parameter(name, kind if given is not None else None, fitting)
+        # rclpy converts nothing: 50 from a launch file does not fit a double. Only an empty list has no type.
+        empty = kind is not None and isinstance(given, _SEQUENCES) and not len(given)
+        parameter = Parameter(name, kind if empty else None, given)
         refusal = self._refusal([parameter])
         if refusal.startswith("Wrong parameter type"):
             raise InvalidParameterTypeException(parameter, Parameter.Type(described.type).name)
@@ -247,7 +246,9 @@ class DeclaredParameters:
         if name in self._overrides:
             return self._overrides[name]
         found = self._node.get_parameter(private) if self._node.has_parameter(private) else default
-        return default if isinstance(found, dict) else found  # others are below this name
+        if isinstance(found, dict):
+            return default  # others are below this name
+        return list(found) if isinstance(found, tuple) else found
 
     def _keep(self, parameter: Parameter) -> None:
         self._parameters[parameter.name] = parameter
