@@ -15,7 +15,7 @@ from typing import Protocol
 
 from volery.base.errors import ComponentError, VoleryError
 from volery.base.time import Ns
-from volery.cost import FREE, Cost, Pricing
+from volery.cost import FREE, STEPS_PER_NS, Cost, Pricing
 from volery.kernel.api import Kernel
 from volery.kernel.task import ComputeResource, ExecutionContext, Scope, Task
 from volery.kernel.waiting import Lock, Signal, executing_in
@@ -122,6 +122,8 @@ class Instance:
 
     def _read_meter(self) -> Ns:
         steps = self._read_steps() if self._read_steps else 0
+        if self.allocation.processor is None:
+            return steps // STEPS_PER_NS
         amount = round(steps * self.pricing.ns_per_step)
         self._uncharged += amount
         return amount

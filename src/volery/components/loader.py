@@ -31,7 +31,7 @@ from typing import Any
 
 from volery.base.errors import ComponentError, Location, ModelError, did_you_mean
 from volery.components.instance import COMPONENT_MARK, Instance, describe
-from volery.components.polling import Polling, empty_turns
+from volery.components.polling import Polling, empty_turns, has_busy_loop
 from volery.components.virtual_stdlib.process_modules import ProcessModules
 from volery.cost import StepCounter
 from volery.kernel.task import ExecutionContext
@@ -323,7 +323,8 @@ class Loader:
         if code is None:
             try:
                 empty = empty_turns(source.tree)
-                tree = self.steps.instrument(source.tree) if self.steps else source.tree
+                steps = self._counter_of(source.tree)
+                tree = steps.instrument(source.tree) if steps else source.tree
                 tree = self.polling.instrument(tree, source.path, empty) if self.polling else tree
                 code = compile(tree, str(source.path), "exec", dont_inherit=True)
             except SyntaxError as error:  # such as a return outside a function: its tree can be made
@@ -336,6 +337,11 @@ class Loader:
         if self.polling:
             module.__dict__.update(self.polling.names())
         return code
+
+    def _counter_of(self, tree: ast.Module) -> StepCounter | None:
+        if self.steps or self.polling is None or not has_busy_loop(tree):
+            return self.steps
+        return self.polling.steps
 
     def sibling(self, name: str, folder: Path) -> ModuleType | None:
         """Return the shared module or package ``name`` (dotted) in *folder*, or None."""

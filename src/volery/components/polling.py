@@ -7,7 +7,8 @@ virtual time nothing happens until a task lets go. So a call is compiled into ea
   thousands of turns until something changes;
 * another turn executes ``TURN`` after ``FREE_TURNS`` turns at one instant.
 
-Turns are counted, so the same run has the same trace. A loop that polls is named once, in a warning.
+Turns are counted, so the same run has the same trace; so are the operations of their code, also where code
+takes no time otherwise. A loop that polls is named once, in a warning.
 """
 
 from __future__ import annotations
@@ -19,17 +20,18 @@ from pathlib import Path
 from typing import Any
 
 from volery.base.time import US, Ns
+from volery.cost import STEPS_PER_NS, StepCounter
 from volery.kernel.api import Kernel
-from volery.kernel.waiting import FREE_POLLS, execute_polling
+from volery.kernel.waiting import FREE_POLLS, execute_polled, execute_polling
 from volery.trace.events import Text
 
 IDLE: Ns = 100 * US
 """What a turn that does nothing executes, ns. Python itself switches threads each 5 ms."""
 
 TURN: Ns = 100
-"""What another turn executes where its code is not counted, ns."""
+"""What another turn executes at least, ns, where its code is not counted."""
 
-TURNS = 1000
+TURNS = 64
 """Turns of all loops from one look at the clock to the next."""
 
 FREE_TURNS = 20_000
@@ -52,6 +54,9 @@ _ASKING = frozenset(
     ]
 )
 """Methods and functions of ROS, of threads and of clocks that change nothing."""
+
+_WAITING = ("sleep", "spin", "wait", "join", "get")
+"""How names of functions begin that let others run."""
 
 _EMPTY, _TURN, _LOOK = "__volery_empty_turn__", "__volery_turn__", "__volery_look__"
 _FRAMEWORK, _WARNING = "volery", 4
@@ -78,11 +83,28 @@ def empty_turns(tree: ast.Module) -> set[Place]:
     return found
 
 
-class Polling:
-    """The polling of all components of one run."""
+def has_busy_loop(tree: ast.Module) -> bool:
+    """Return whether a file has a ``while`` loop in which nothing seems to wait."""
+    return any(
+        isinstance(node, ast.While)
+        and not any(
+            _name_of(part).startswith(_WAITING) for part in ast.walk(node) if isinstance(part, ast.Call)
+        )
+        for node in ast.walk(tree)
+    )
 
-    def __init__(self, kernel: Kernel) -> None:
+
+class Polling:
+    """The polling of all components of one run.
+
+    Args:
+        kernel: The run's kernel.
+        counts: Count the code of loops that poll, since the run counts none.
+    """
+
+    def __init__(self, kernel: Kernel, counts: bool = False) -> None:
         self._kernel = kernel
+        self.steps = StepCounter() if counts else None
         self._named: set[str] = set()
         self._turn: Callable[[], int] = self._turns().__next__
         self._task: object = None
@@ -110,7 +132,8 @@ class Polling:
 
     def names(self) -> dict[str, Any]:
         """Return the names that the inserted calls need."""
-        return {_EMPTY: self._empty_turn, _TURN: self._turn, _LOOK: self._look}
+        counters = self.steps.names() if self.steps else {}
+        return {_EMPTY: self._empty_turn, _TURN: self._turn, _LOOK: self._look, **counters}
 
     def _empty_turn(self, where: str) -> None:
         self._warn(where, "has no sleep and does nothing")
@@ -118,21 +141,25 @@ class Polling:
 
     def _look(self, where: str) -> None:
         """Execute the last turns if the task has been at one instant for too many of them."""
+        counted = self.steps.take() // STEPS_PER_NS if self.steps else 0
         kernel = self._kernel
         task, now = kernel.current(), kernel.now()
         if task is None or task.adopted:
             return
         if task.polls > FREE_POLLS:
             self._warn(where, f"asks {FREE_POLLS} times whether something has changed, without a wait")
+            task.polled_ns += counted
+            if counted:
+                execute_polled(kernel, task)
+            return
         if (task, now) != (self._task, self._now):
             self._task, self._now, self._turns_here = task, now, 0
         self._turns_here += TURNS
         if self._turns_here <= FREE_TURNS:
             return
-        with kernel:
-            pass  # counted code takes its time
-        if kernel.now() == now:
-            execute_polling(kernel, TURNS * TURN)
+        if task.contexts[-1].meter is None:
+            task.polled_ns += max(counted, TURNS * TURN)
+        execute_polled(kernel, task)
         self._now = kernel.now()
         self._warn(where, f"has taken {FREE_TURNS} turns without a sleep")
 
@@ -155,6 +182,13 @@ def _place(node: ast.stmt) -> Place:
     return node.lineno, node.col_offset
 
 
+def _name_of(call: ast.Call) -> str:
+    """Return the last part of the name of what is called, or nothing."""
+    if isinstance(call.func, ast.Attribute):
+        return call.func.attr
+    return call.func.id if isinstance(call.func, ast.Name) else ""
+
+
 def _is_nothing(one: ast.stmt) -> bool:
     return isinstance(one, ast.Pass | ast.Continue) or (
         isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant)
@@ -165,7 +199,7 @@ def _only_asks(test: ast.expr) -> bool:
     """Return whether an expression has the same value until others have run or time has passed."""
     for part in ast.walk(test):
         if isinstance(part, ast.Call):
-            name = part.func.attr if isinstance(part.func, ast.Attribute) else ""
+            name = _name_of(part) if isinstance(part.func, ast.Attribute) else ""
             if name not in _ASKING or part.args or part.keywords:
                 return False
         elif isinstance(part, ast.Await | ast.Yield | ast.YieldFrom | ast.NamedExpr):

@@ -50,6 +50,7 @@ class ExecutionContext:
         deadline: Relative to the release of an activation, ns; None for none.
         period: Time between releases that the model states, ns; None for none.
         meter: Returns the execution time on the target since its last call, ns; read at interaction points.
+            Without a processor it takes simulated time in loops that poll only.
         on_release: Called with the task at each release of an activation; it may charge the activation.
     """
 
@@ -78,6 +79,7 @@ class Task:
         self.counted_from: Ns = 0  # the next release is due a period after this
         self.readings: dict[object, Ns] = {}  # last reading of the clock in this activation, by its place
         self.polls = 0  # calls in this activation that only look whether something has changed
+        self.polled_ns: Ns = 0  # time of a loop that polls which has not been executed yet
         self.is_activated = True  # False while what it does belongs to no activation, as a construction
         self.done = False
         self.adopted = False  # the flow of a script: the kernel did not start it and cannot end it
@@ -115,7 +117,7 @@ class Task:
         self.released = due
         self.counted_from = due if counted_from is None else counted_from
         self.readings.clear()
-        self.polls = 0
+        self.polls = self.polled_ns = 0
         hook = self.contexts[0].on_release
         if hook is not None:
             hook(self)

@@ -76,7 +76,7 @@ FREE_POLLS = 1000
 """Calls of one activation that are no polling yet."""
 POLLS = 64
 POLLED: Ns = 100 * US
-"""Calls of a polling loop, and what they take, ns, after which their time is executed."""
+"""Calls of a polling loop from one look at its time to the next; the least time executed at once, ns."""
 
 
 def execute_polling(kernel: Kernel, amount: Ns) -> None:
@@ -86,11 +86,26 @@ def execute_polling(kernel: Kernel, amount: Ns) -> None:
         kernel.sleep_until(before + amount)
 
 
+def execute_polled(kernel: Kernel, task: Task) -> None:
+    """Execute what a loop of `task` has polled, and the code that is counted, once that is ``POLLED`` ns."""
+    context = task.contexts[-1]
+    counted = 0 if context.meter is None else context.meter()
+    if context.processor is None:
+        task.polled_ns += counted
+    else:
+        task.pending_ns += counted
+    amount = task.polled_ns
+    if amount + task.pending_ns >= POLLED:
+        task.polled_ns = 0
+        execute_polling(kernel, amount)
+
+
 def poll(kernel: Kernel, price: Ns, *, executed: bool = False) -> bool:
     """Execute a call that loops repeat until something has changed. An interaction point.
 
     Such a call is too short to be priced. But after ``FREE_POLLS`` of them in one activation they are what
-    the task spends its time with: each counts `price` ns, which are executed for several of them at once.
+    the task spends its time with: each counts `price` ns, which are executed for several of them at once,
+    with the code between them.
     With *executed* each call executes its price.
 
     Returns:
@@ -99,15 +114,15 @@ def poll(kernel: Kernel, price: Ns, *, executed: bool = False) -> bool:
     task = kernel.current()
     if task is None or task.adopted:
         return False
-    task.polls += 1
+    polls = task.polls = task.polls + 1
     if executed and task.contexts[-1].processor is not None:
         kernel.consume(price)
         return True
-    if task.polls <= FREE_POLLS:
+    if polls <= FREE_POLLS:
         return False
-    together = max(1, min(POLLS, POLLED // price))
-    if task.polls % together == 0:
-        execute_polling(kernel, together * price)
+    task.polled_ns += price
+    if task.polled_ns >= POLLED or polls % POLLS == 0:
+        execute_polled(kernel, task)
     return True
 
 

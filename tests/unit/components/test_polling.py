@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import ast
+
 import pytest
 
-from volery.base.time import MS, S
+from volery.base.time import MS, US, S
 from volery.components.loader import Loader, parse
-from volery.components.polling import IDLE, Polling
+from volery.components.polling import IDLE, Polling, has_busy_loop
 from volery.cost import StepCounter
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
+from volery.kernel.waiting import poll
 from volery.trace.events import Text
 
 READY = 200 * MS
@@ -22,18 +25,21 @@ BEGIN = "ready = []\ngive(ready)\nclass poll:\n    ok = staticmethod(lambda: Fal
 def run(tmp_path):
     """Execute a file whose list ``ready`` gets an item at 0.2 s; return its end, ns, and the warnings."""
 
-    def execute(text, steps=None):
+    def execute(text, steps=None, counts=False):
         file = tmp_path / "busy.py"
         file.write_text(BEGIN + text)
         events = []
+        told.clear()
         kernel = VirtualKernel(events.append)
-        loader = Loader({}, steps, Polling(kernel))
+        loader = Loader({}, steps, Polling(kernel, counts))
         ends = []
 
         def body():
             source = parse(file)
             module = loader.shared.module("busy", file)
             module.give = lambda ready: kernel.call_at(READY, lambda: ready.append(1))
+            module.ask = lambda: poll(kernel, 30)
+            module.tell = told.append
             exec(loader.compile(source, module), vars(module))
             ends.append(kernel.now())
 
@@ -45,6 +51,15 @@ def run(tmp_path):
     return execute
 
 
+told = []
+COMPUTES = """turns = 0
+while not ready:
+    ask()
+    turns += 1
+    total = 0
+    for number in range(200): total += number
+tell(turns)
+"""
 IF = """while True:
     if ready:
         break
@@ -87,3 +102,19 @@ def test_only_the_turns_that_do_nothing_wait(run, counted):
 def test_a_condition_that_calls_is_no_empty_loop(run):
     end, warnings = run("items = iter(range(100))\nwhile next(items) < 90: pass\n")
     assert (end, warnings) == (0, [])
+
+
+def test_what_a_loop_computes_takes_time_where_no_code_is_counted(run):
+    end, warnings = run(COMPUTES, counts=True)
+    (turns,) = told
+    assert READY <= end <= READY + 2 * MS
+    assert len(warnings) == 1
+    assert 2 * US < READY / turns < 20 * US  # 200 additions
+    assert run(COMPUTES, counts=True) == (end, warnings)
+    assert told == [turns]
+
+
+def test_a_file_whose_loops_wait_is_not_counted():
+    waits = "while True:\n    rate.sleep()\nwhile not rospy.is_shutdown(): rclpy.spin_once(node)\n"
+    assert not has_busy_loop(ast.parse(waits))
+    assert has_busy_loop(ast.parse(f"{waits}while not rospy.is_shutdown(): compute()\n"))

@@ -251,7 +251,7 @@ class Builder:
         loader = Loader(
             {**virtual_modules(self._kernel, seed), **modules},
             steps,
-            Polling(self._kernel) if isinstance(self._kernel, VirtualKernel) else None,
+            Polling(self._kernel, counts=steps is None) if isinstance(self._kernel, VirtualKernel) else None,
             workspace=workspace,
             host=self._ends,
         )

@@ -259,8 +259,11 @@ class Sessions(LaunchedComponents):
 
         A component that was started again has none.
         """
-        found = self._open.get(self.component)
-        return None if found is None or self.started_again(found.scope) else found
+        task = self.kernel.current() or current_task(self.kernel)
+        found = self._open.get(task.contexts[-1].component)
+        if found is not None and found.scope.cancelled and self.started_again(found.scope):
+            return None
+        return found
 
     def now(self) -> Ns:
         """Return ROS time. An interaction point."""
