@@ -47,7 +47,7 @@ class Launch(NamedTuple):
         for key, value in _ros_2_arguments(arguments) if ros == 2 else _ros_1_arguments(arguments):
             if key.startswith("_parameter:"):
                 parameter = key.removeprefix("_parameter:")
-                made = made._replace(parameters={**made.parameters, parameter: _scalar(value)})
+                made = made._replace(parameters={**made.parameters, parameter: scalar(value)})
             elif key == "__ns":
                 made = made._replace(namespace=value)
             elif key == "__name":
@@ -81,7 +81,7 @@ def _ros_2_arguments(arguments: Iterable[str]) -> Iterator[tuple[str, str]]:
             option = argument
 
 
-def _scalar(text: str) -> Any:
+def scalar(text: str) -> Any:
     """Return the value that YAML reads from a text of a command line, for numbers, truth values and lists."""
     words = {"true": True, "false": False, "yes": True, "no": False, "on": True, "off": False}
     if text.lower() in words:

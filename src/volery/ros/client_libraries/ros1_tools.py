@@ -1,4 +1,8 @@
-"""The small Python packages of ROS 1: ``roslib``, ``rospkg``, ``rosunit``, ``rostest``, ``point_cloud2``."""
+"""The small Python packages of ROS 1.
+
+``genpy``, ``roslib``, ``rospkg``, ``rosunit``, ``rostest`` and ``sensor_msgs.point_cloud2``, and the
+command-line tools that files import: ``rosnode``, ``rosparam``, ``rosservice`` and ``rostopic``.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +15,18 @@ from math import isnan
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
-from volery.base.errors import did_you_mean
-from volery.ros.client_libraries.library_base import file_of_user, library_module
-from volery.ros.messages import Workspace
-from volery.ros.messages.client_classes import ROSPY, message_of
+from volery.base.errors import UsageError, did_you_mean
+from volery.ros.client_libraries.library_base import file_of_user, library_module, scalar
+from volery.ros.messages import Message, Workspace
+from volery.ros.messages.client_classes import (
+    ROSPY,
+    DeserializationError,
+    MessageException,
+    SerializationError,
+    message_of,
+    service_of,
+)
+from volery.ros.messages.encodings import our_name, ros1_name
 
 # -- packages
 
@@ -138,6 +150,174 @@ class _Tests:
         return any(name == full and wanted in nodes for name, nodes in state[kind])
 
 
+# -- classes by name, and the command-line tools as modules
+
+
+def get_message_class(message_type: str, reload_on_error: bool = False) -> Any:
+    """Return the class of a message type, such as ``std_msgs/String``; None if it is unknown."""
+    try:
+        return message_of(our_name(message_type), ROSPY)
+    except UsageError:
+        return None
+
+
+def get_service_class(service_type: str, reload_on_error: bool = False) -> Any:
+    """Return the class of a service type, such as ``std_srvs/Empty``; None if it is unknown."""
+    try:
+        return service_of(service_type.replace("/", "/srv/"), ROSPY)
+    except UsageError:
+        return None
+
+
+class ROSServiceException(Exception):  # noqa: N818 - rosservice's name
+    """A service or its type is unknown."""
+
+
+class RosParamException(Exception):  # noqa: N818 - rosparam's name
+    """A parameter is unknown."""
+
+
+class _Commands:
+    """What ``rosnode``, ``rosparam``, ``rosservice`` and ``rostopic`` ask of the graph of one run."""
+
+    def __init__(self, rospy: Any) -> None:
+        self._rospy = rospy
+        self._sessions = rospy.Publisher.sessions
+
+    def get_node_names(self, namespace: str | None = None) -> list[str]:
+        """Return the names of all nodes, or of those in a namespace."""
+        with self._sessions.kernel:
+            names: list[str] = self._sessions.graph.node_names()
+        below = f"/{(namespace or '').strip('/')}/".replace("//", "/")
+        return [name for name in names if name.startswith(below) or name == below.rstrip("/")]
+
+    def rosnode_ping(
+        self, node_name: str, max_count: int | None = None, verbose: bool = False, **_: Any
+    ) -> bool:
+        """Return whether a node is there."""
+        return self._rospy.resolve_name(node_name) in self.get_node_names()
+
+    def get_param(self, param: str) -> Any:
+        """Return a parameter; raise ``MasterError`` if there is none."""
+        return self._rospy.get_master().getParam(param)[2]
+
+    def set_param(self, param: str, value: str, verbose: bool = False) -> None:
+        """Set a parameter to a text as of a command line."""
+        self._rospy.set_param(param, scalar(value))
+
+    def delete_param(self, param: str, verbose: bool = False) -> None:
+        """Remove a parameter; raise ``RosParamException`` if there is none."""
+        try:
+            self._rospy.delete_param(param)
+        except KeyError as error:
+            raise RosParamException(str(error)) from error
+
+    def list_params(self, ns: str) -> list[str]:
+        """Return the names of the parameters in a namespace."""
+        full = self._rospy.resolve_name(ns).rstrip("/")
+        return [one for one in self._rospy.get_param_names() if one.startswith(f"{full}/")]
+
+    def upload_params(self, ns: str, values: Any, verbose: bool = False) -> None:
+        """Set the parameters of a namespace."""
+        for key, value in values.items():
+            self._rospy.set_param(f"{ns.rstrip('/')}/{key}", value)
+
+    def _services(self) -> Any:
+        with self._sessions.kernel:
+            return self._sessions.graph.services()
+
+    def get_service_list(self, node: str | None = None, namespace: str | None = None, **_: Any) -> list[str]:
+        """Return the names of all services, of one node or in one namespace."""
+        below = f"/{(namespace or '').strip('/')}/".replace("//", "/")
+        found = [one for one in self._services() if node in (None, one.server)]
+        return [one.name for one in found if one.name.startswith(below)]
+
+    def get_service_type(self, service_name: str) -> str | None:
+        """Return the type of a service; None if there is none."""
+        full = self._rospy.resolve_name(service_name)
+        return next((ros1_name(one.type) for one in self._services() if one.name == full), None)
+
+    def get_service_class_by_name(self, service_name: str) -> Any:
+        """Return the class of a service; raise ``ROSServiceException`` if there is none."""
+        kind = self.get_service_type(service_name)
+        if kind is None:
+            raise ROSServiceException(f"Service [{service_name}] is not available.")
+        return get_service_class(kind)
+
+    def get_topic_type(self, topic: str, blocking: bool = False) -> tuple[Any, Any, Any]:
+        """Return the type of a topic, its name and None; None three times if there is none."""
+        full = self._rospy.resolve_name(topic)
+        while not self._rospy.is_shutdown():
+            for name, kind in self._rospy.get_master().getTopicTypes()[2]:
+                if name == full:
+                    return kind, name, None
+            if not blocking:
+                break
+            self._rospy.sleep(0.1)
+        return None, None, None
+
+    def get_topic_class(self, topic: str, blocking: bool = False) -> tuple[Any, Any, Any]:
+        """Return the class of a topic, its name and None; None three times if there is none."""
+        kind, name, rest = self.get_topic_type(topic, blocking)
+        return (None if kind is None else get_message_class(kind)), name, rest
+
+    def get_topic_list(self, master: Any = None) -> tuple[list[Any], list[Any]]:
+        """Return the published and the subscribed topics, each as name, type and nodes."""
+        publishers, subscribers, _ = self._rospy.get_master().getSystemState()[2]
+        kinds = dict(self._rospy.get_master().getTopicTypes()[2])
+        return tuple([(name, kinds[name], nodes) for name, nodes in of] for of in (publishers, subscribers))  # type: ignore[return-value]  # two of them
+
+    def find_by_type(self, topic_type: str) -> list[str]:
+        """Return the topics of a type."""
+        return [name for name, kind in self._rospy.get_master().getTopicTypes()[2] if kind == topic_type]
+
+    def modules(self) -> dict[str, ModuleType]:
+        """Return the four modules by name."""
+        found: dict[str, tuple[Any, ...]] = {
+            "rosnode": (self.get_node_names, self.rosnode_ping),
+            "rosparam": (
+                *(self.get_param, self.set_param, self.delete_param, self.list_params, self.upload_params),
+                RosParamException,
+            ),
+            "rosservice": (
+                *(self.get_service_list, self.get_service_type, self.get_service_class_by_name),
+                ROSServiceException,
+            ),
+            "rostopic": (self.get_topic_type, self.get_topic_class, self.get_topic_list, self.find_by_type),
+        }
+        return {
+            name: library_module(name, {one.__name__: one for one in listed}, _REFUSED)
+            for name, listed in found.items()
+        }
+
+
+_REFUSED = {
+    "rosnode.kill_nodes": "a model's faults end nodes",
+    "rosparam.load_file": "read the file by yaml.safe_load, then use rosparam.upload_params",
+    "rosservice.call_service": "use rospy.ServiceProxy",
+    "rostopic.ROSTopicHz": "the report states the rates of topics",
+}
+"""Names that are not there on purpose, and what to do instead."""
+
+
+def _genpy() -> dict[str, ModuleType]:
+    """Return the modules of ``genpy`` by name, and ``roslib.message``."""
+    times = {name: message_of(f"builtin_interfaces/msg/{name}", ROSPY) for name in ("Time", "Duration")}
+    errors = (MessageException, SerializationError, DeserializationError)
+    names = {"Message": Message, **{one.__name__: one for one in errors}, **times}
+    classes = {one.__name__: one for one in (get_message_class, get_service_class)}
+    parts = {
+        "genpy.message": library_module("genpy.message", {**names, **classes}),
+        "genpy.rostime": library_module("genpy.rostime", times),
+    }
+    inside = {name.partition(".")[2]: module for name, module in parts.items()}
+    return {
+        "genpy": library_module("genpy", {**names, **inside}),
+        **parts,
+        "roslib.message": library_module("roslib.message", {**names, **classes}),
+    }
+
+
 # -- sensor_msgs.point_cloud2
 
 _FORMATS = {1: "b", 2: "B", 3: "h", 4: "H", 5: "i", 6: "I", 7: "f", 8: "d"}
@@ -232,8 +412,12 @@ def modules(rospy: ModuleType) -> dict[str, ModuleType]:
     )
     tests = _Tests(rospy)
     classes = {name: message_of(f"sensor_msgs/msg/{name}", ROSPY) for name in ("PointCloud2", "PointField")}
+    generated = _genpy()
+    in_roslib = {"load_manifest": load_manifest, "packages": packages, "message": generated["roslib.message"]}
     return {
-        "roslib": library_module("roslib", {"load_manifest": load_manifest, "packages": packages}),
+        **generated,
+        **_Commands(rospy).modules(),
+        "roslib": library_module("roslib", in_roslib),
         "roslib.packages": packages,
         "rospkg": library_module("rospkg", {"ResourceNotFound": ResourceNotFound, "RosPack": rospack}),
         "rosunit": library_module("rosunit", {"unitrun": tests.run}),

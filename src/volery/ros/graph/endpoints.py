@@ -456,6 +456,9 @@ class EmbeddedService:
                 raise UsageError(
                     f"the handler of {self.name} returned {answer!r}, not a {self.type} response"
                 )
+            with self.node.kernel:
+                content = self.node.graph.copy(answer)
+                size = cdr_size(content)
         except Exception as error:
             with self.node.kernel:
                 self._pending.remove(exchange)
@@ -465,8 +468,7 @@ class EmbeddedService:
             return
         with self.node.kernel:
             self._pending.remove(exchange)
-            content = self.node.graph.copy(answer)
-            self._send_back(exchange, exchange.succeed, content, cdr_size(content))
+            self._send_back(exchange, exchange.succeed, content, size)
 
     def _send_back(self, exchange: Exchange, end: Callable[[Any], None], content: Any, size: int) -> None:
         lost = partial(exchange.fail, "the answer was lost on the way")

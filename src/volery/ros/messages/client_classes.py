@@ -18,6 +18,7 @@ from typing import IO, TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
 
+from volery.base.errors import UsageError
 from volery.ros.messages.encodings import from_ros1, ros1_name, ros1_service, ros1_type, to_ros1
 from volery.ros.messages.message import (
     BYTES,
@@ -67,13 +68,15 @@ def service_of(full: str, library: Library = "") -> type:
     pair = service(full)
     request, response = (message_of(one.__msgtype__, library) for one in (pair.request, pair.response))
     members: dict[str, Any] = {"_type": full, "_request_class": request, "_response_class": response}
+    label = full.rpartition("/")[2]
     if library == ROSPY:
         members |= {"_type": ros1_name(full), "_md5sum": _Lazy(lambda _: ros1_service(full).md5)}
+        members["__module__"] = f"{full.partition('/')[0]}.srv._{label}"
     else:
         members |= {"Request": request, "Response": response}
     if library == RCLPY:
         members["__init__"] = _no_instance
-    return type(full.rpartition("/")[2], (), members)
+    return type(label, (), members)
 
 
 def _no_instance(self: Any) -> None:
@@ -219,12 +222,41 @@ def _converting(cls: Any, one: Field, convert: Callable[[Any], Any], put: Callab
 # -- rospy
 
 
+class MessageException(Exception):  # noqa: N818 - genpy's name
+    """A message is wrong."""
+
+
+class SerializationError(MessageException):
+    """A value does not fit its field."""
+
+
+class DeserializationError(MessageException):
+    """Bytes are no message of a type."""
+
+
+_ROS1_FIELDS: dict[str, dict[str, str]] = {
+    "sensor_msgs/msg/CameraInfo": {"d": "D", "k": "K", "r": "R", "p": "P"},
+    "sensor_msgs/msg/Range": {"variance": ""},
+    "shape_msgs/msg/SolidPrimitive": {"polygon": ""},
+    "stereo_msgs/msg/DisparityImage": {"t": "T"},
+    "visualization_msgs/msg/Marker": {
+        "texture_resource": "",
+        "texture": "",
+        "uv_coordinates": "",
+        "mesh_file": "",
+    },
+}
+"""ROS 1's names of fields by type and our name; empty for what ROS 1's definition lacks."""
+
+
 def _rospy_class(of_graph: Any) -> Any:
     name = of_graph.__msgtype__
     label = ros1_name(name).rpartition("/")[2].replace("_Request", "Request").replace("_Response", "Response")
     fields = _fields(of_graph)
-    slots = [one.name for one in fields]
-    types = [_ros1_type_of(one) for one in fields]
+    renamed = _ROS1_FIELDS.get(name, {})
+    shown = [one for one in fields if renamed.get(one.name, one.name)]
+    slots = [renamed.get(one.name, one.name) for one in shown]
+    types = [_ros1_type_of(one) for one in shown]
     bases: tuple[type, ...] = (_RospyMessage,)
     if issubclass(of_graph, Header):
         slots, types = ["seq", *slots], ["uint32", *types]
@@ -242,14 +274,45 @@ def _rospy_class(of_graph: Any) -> Any:
     for one in fields:
         if one.length is not None and one.nested is None and one.base != "string":
             members[one.name] = _converting(of_graph, one, partial(_as_tuple, one.base), None)
+    for ours, theirs in renamed.items():
+        if theirs:
+            members[theirs] = members.get(ours) or _Renamed(ours)
     package = name.partition("/")[0]
     stamps = issubclass(of_graph, Stamp)
     module = "genpy.rostime" if stamps else f"{package}.{name.split('/')[1]}._{label}"
     made = _derived(of_graph, label, module, ROSPY, bases, members)
     if not stamps:
         made.__slots__ = slots
-        made.__init__ = _rospy_init(made, of_graph, fields, slots)
+        made.__init__ = _rospy_init(made, of_graph, fields, slots, renamed)
     return made
+
+
+@cache
+def numpy_class(cls: Any) -> Any:
+    """Return ``rospy.numpy_msg.numpy_msg(cls)``: its received lists of numbers are numpy arrays."""
+    members = {
+        one.name: _converting(cls, one, np.copy, None)
+        for one in _fields(cls)
+        if one.length is not None and one.nested is None and one.base not in ("string", "uint8", "char")
+    }
+    label = f"Numpy_{cls._type.replace('/', '__')}"
+    made: Any = type(label, (cls,), {"__slots__": (), "__module__": "rospy.numpy_msg", **members})
+    made.__slots__ = cls.__slots__
+    made._adopt = _adopting(made, ROSPY)
+    return made
+
+
+class _Renamed:
+    """A field under ROS 1's name."""
+
+    def __init__(self, ours: str) -> None:
+        self._ours = ours
+
+    def __get__(self, instance: Any, owner: Any) -> Any:
+        return self if instance is None else getattr(instance, self._ours)
+
+    def __set__(self, instance: Any, value: Any) -> None:
+        setattr(instance, self._ours, value)
 
 
 def _ros1_type_of(one: Field) -> str:
@@ -264,14 +327,19 @@ def _as_tuple(base: str, values: Any) -> Any:
     return tuple((values.view(np.int8) if base in BYTES else values).tolist())
 
 
-def _rospy_init(cls: Any, of_graph: Any, fields: list[Field], slots: list[str]) -> Callable[..., None]:
+def _rospy_init(
+    cls: Any, of_graph: Any, fields: list[Field], slots: list[str], renamed: dict[str, str]
+) -> Callable[..., None]:
     """Return ``__init__``: no arguments, all fields in order, or some by name; None means the default."""
     writing = _Source()
-    defaults = {one.name: _rospy_default(one) for one in fields} | ({"seq": "0"} if "seq" in slots else {})
+    defaults = {renamed.get(one.name) or one.name: _rospy_default(one) for one in fields}
+    if "seq" in slots:
+        defaults["seq"] = "0"
     for key, value in list(defaults.items()):
         if callable(value):
             defaults[key] = f"{writing.name(value)}()"
     count = len(slots)
+    writing.lines += [f"self.{ours} = {defaults[ours]}" for ours, theirs in renamed.items() if not theirs]
     writing.lines += [
         "if args:",
         "    if fields: raise TypeError('Message constructor may only use args OR keywords, not both')",
@@ -336,6 +404,9 @@ class _RospyMessage:
     def __getstate__(self) -> list[Any]:
         return [getattr(self, one) for one in type(self).__slots__]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unset_message, (cast("Any", self).__msgtype__,), self.__getstate__()
+
     def __setstate__(self, state: list[Any]) -> None:
         for name, value in zip(type(self).__slots__, state, strict=True):
             setattr(self, name, value)
@@ -344,18 +415,27 @@ class _RospyMessage:
         return list(cast("Any", self)._slot_types)
 
     def _check_types(self, exc: Exception | None = None) -> None:
-        to_ros1(cast("Message", self))
+        self._encoded()
+
+    def _encoded(self) -> bytes:
+        try:
+            return to_ros1(cast("Message", self))
+        except UsageError as error:
+            raise SerializationError(str(error)) from error
 
     def serialize(self, buff: IO[bytes]) -> None:
-        """Write the message's ROS 1 bytes to a file-like object."""
-        data = to_ros1(cast("Message", self))
+        """Write the message's ROS 1 bytes to a file-like object; raise ``SerializationError``."""
+        data = self._encoded()
         header = self._header()
         buff.write(data if header is None else struct.pack("<I", header.seq) + data[4:])
 
     def deserialize(self, str: bytes) -> Any:  # noqa: A002 - rospy's name
-        """Read the fields from ROS 1 bytes; return the message."""
+        """Read the fields from ROS 1 bytes; return the message, raise ``DeserializationError``."""
         cls: Any = type(self)
-        made = cls._adopt(from_ros1(cls.__msgtype__, str))
+        try:
+            made = cls._adopt(from_ros1(cls.__msgtype__, str))
+        except UsageError as error:
+            raise DeserializationError(error.args[0]) from error
         for one in cls.__slots__:
             setattr(self, one, getattr(made, one))
         header = self._header()
@@ -367,6 +447,11 @@ class _RospyMessage:
         """Return the header that the encoding begins with, or None."""
         message: Any = self
         return message if isinstance(self, Header) else message.header if message._has_header else None
+
+
+def _unset_message(name: str) -> Any:
+    """Return a message of rospy whose state is set next, by ``pickle`` or ``copy``."""
+    return message_of(name, ROSPY)()
 
 
 def _alike(one: Any, other: Any) -> bool:
@@ -433,7 +518,17 @@ class _Ros1Stamp:
         whole = int(float_secs)
         return cls(whole, int((float_secs - whole) * _SECOND))
 
-    from_seconds = from_sec
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unset_message, (cast("Any", self).__msgtype__,), (self.sec, self.nanosec)
+
+    def __setstate__(self, state: tuple[int, int]) -> None:
+        self.set(*state)
+
+    def __copy__(self) -> Any:
+        return type(self)(self.sec, self.nanosec)
+
+    def __deepcopy__(self, memo: Any) -> Any:
+        return self.__copy__()
 
     def to_nsec(self) -> int:
         """Return the value in ns."""
@@ -487,6 +582,11 @@ class Ros1Time(_Ros1Stamp):
     """``genpy.Time``: a point in time, never negative."""
 
     __slots__ = ()
+
+    @classmethod
+    def from_seconds(cls, float_secs: float) -> Any:
+        """Return ``from_sec``."""
+        return cls.from_sec(float_secs)
 
     def to_time(self) -> float:
         """Return the value in s."""

@@ -110,7 +110,9 @@ rospy.init_node("server")
 rospy.Service("response", SetBool, lambda request: SetBoolResponse(request.data, "response"))
 rospy.Service("pair", SetBool, lambda request: (request.data, "pair"))
 rospy.Service("dict", SetBool, lambda request: {"success": request.data, "message": "dict"})
+rospy.Service("empty", Empty, lambda request: [])
 rospy.Service("nothing", Empty, lambda request: None)
+rospy.Service("misfit", Trigger, lambda request: (True, 5))
 rospy.Service("none", Trigger, lambda request: None)
 rospy.spin()
 """,
@@ -124,8 +126,8 @@ for name in ("response", "pair", "dict"):
     rospy.wait_for_service(name)
     proxy = rospy.ServiceProxy(name, SetBool)
     out((proxy(True).message, proxy(data=True).success, proxy.call(SetBoolRequest(data=False)).success))
-out(type(rospy.ServiceProxy("nothing", Empty)()).__name__)
-for name, kind in (("none", Trigger), ("nowhere", Trigger)):
+out(type(rospy.ServiceProxy("empty", Empty)()).__name__)
+for name, kind in (("nothing", Empty), ("misfit", Trigger), ("none", Trigger), ("nowhere", Trigger)):
     try:
         rospy.ServiceProxy(name, kind)()
     except rospy.ServiceException as error:
@@ -137,6 +139,8 @@ for name, kind in (("none", Trigger), ("nowhere", Trigger)):
         ("pair", True, False),
         ("dict", True, False),
         "Empty_Response",
+        "service [/nothing]",
+        "service [/misfit]",
         "service [/none]",
         "service [/nowhere]",
     ]
@@ -400,18 +404,20 @@ def test_what_is_not_there_is_named(stage: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("call", "words"),
+    ("call", "error", "words"),
     [
-        ("rospy.Publisher('a', str)", "no message class"),
-        ("rospy.Subscriber('a', None, out)", "no message class"),
-        ("rospy.Service('a', 'std_srvs/Empty', out)", "no service class"),
-        ("rospy.Rate(0)", "above 0 Hz"),
-        ("rospy.Publisher('not a name', Empty)", "no valid ROS name"),
+        ("rospy.Publisher('a', str)", ValueError, "no message class"),
+        ("rospy.Subscriber('a', None, out)", ValueError, "no message class"),
+        ("rospy.Service('a', 'std_srvs/Empty', out)", AttributeError, "no service class"),
+        ("rospy.Rate(0)", ZeroDivisionError, "above 0 Hz"),
+        ("rospy.Publisher('not a name', Empty)", UsageError, "no valid ROS name"),
+        ("rospy.init_node('m')", Exception, "already been called with different arguments: 'n'"),
+        ("rospy.set_param('a', 2**31)", OverflowError, "a parameter has 32 bits"),
     ],
 )
-def test_wrong_calls_are_explained(stage: Any, call: str, words: str) -> None:
+def test_wrong_calls_are_explained(stage: Any, call: str, error: type[Exception], words: str) -> None:
     stage.component("n", f"from std_msgs.msg import Empty\nrospy.init_node('n')\n{call}")
-    with pytest.raises(UsageError, match=words):
+    with pytest.raises(error, match=words):
         stage.run()
 
 

@@ -124,7 +124,9 @@ out(round(rospy.get_time() - began, 6))
 
 
 def test_a_wait_ends_when_the_transform_comes(stage: Any) -> None:
-    stage.script("broadcaster", "import rospy\nrospy.init_node('b')\nrospy.sleep(1.25)\n" + BROADCASTER)
+    stage.script(
+        "broadcaster", "import rospy\nrospy.init_node('broadcaster')\nrospy.sleep(1.25)\n" + BROADCASTER
+    )
     stage.script(
         "asker",
         ASKING

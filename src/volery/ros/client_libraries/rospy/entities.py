@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from typing import Any, ClassVar, cast
 
@@ -10,6 +10,7 @@ from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
 from volery.kernel.waiting import Signal
 from volery.ros.client_libraries.library_base import WARNING
+from volery.ros.client_libraries.rospy.master import canonicalize_name
 from volery.ros.client_libraries.rospy.session import (
     ROSException,
     ROSSerializationException,
@@ -20,7 +21,8 @@ from volery.ros.client_libraries.rospy.session import (
 from volery.ros.graph import BEST_AVAILABLE, LATCHED, QoS, ServiceError, Subscription, Work
 from volery.ros.graph.endpoints import EmbeddedPublisher
 from volery.ros.messages import Message, ros1_type, to_cdr, to_ros1
-from volery.ros.messages.client_classes import adopt, library_of, receiving
+from volery.ros.messages.client_classes import SerializationError, adopt, library_of, receiving
+from volery.ros.messages.encodings import ros1_name
 
 _TYPE_POLL: Ns = 100 * MS
 """Period at which an ``AnyMsg`` subscription looks for the type of its topic."""
@@ -31,13 +33,43 @@ class AnyMsg:
 
     _type = "*"
     _md5sum = "*"
+    _has_header = False
+    _full_text = ""
+    __slots__ = ("_buff", "_connection_header")
 
-    def __init__(self, message: Message, topic: str) -> None:
-        kind = ros1_type(message.__msgtype__)
-        self._buff = to_ros1(message)
-        self._connection_header = {
+    def __init__(self) -> None:
+        self._buff: bytes | None = None
+        self._connection_header: dict[str, Any] | None = None
+
+    @classmethod
+    def of(cls, message: Message, topic: str) -> AnyMsg:
+        """Return a received message."""
+        kind, made = ros1_type(message.__msgtype__), cls()
+        made._buff = to_ros1(message)
+        made._connection_header = {
             "topic": topic, "type": kind.name, "md5sum": kind.md5, "message_definition": kind.text
         }  # fmt: skip
+        return made
+
+    def serialize(self, buff: Any) -> None:
+        """Write the bytes to a file-like object; raise ``ROSException`` if there are none."""
+        if self._buff is None:
+            raise ROSException("AnyMsg is not initialized")
+        buff.write(self._buff)
+
+    def deserialize(self, str: bytes) -> AnyMsg:  # noqa: A002 - rospy's name
+        """Keep bytes."""
+        self._buff = str
+        return self
+
+
+def args_kwds_to_message(data_class: Any, args: Sequence[Any], kwds: Mapping[str, Any]) -> Any:
+    """Return the message that ``publish(*args, **kwds)`` sends; raise ``TypeError`` if they do not fit."""
+    if len(args) == 1 and not kwds and isinstance(args[0], data_class.of_graph):
+        return args[0]
+    if args and kwds:
+        raise TypeError("publish() can be called with arguments or keywords, but not both.")
+    return data_class(*args, **kwds)
 
 
 class AnySubscription:
@@ -61,7 +93,7 @@ class AnySubscription:
             node.sleep(_TYPE_POLL)
 
     def _call(self, message: Any) -> None:
-        self._callback(AnyMsg(message, self.topic))
+        self._callback(AnyMsg.of(message, self.topic))
 
     def publishers(self) -> int:
         """Return the number of connected publishers."""
@@ -74,19 +106,30 @@ class AnySubscription:
             self._made.close()
 
 
+def topic_name(name: Any) -> str:
+    """Return the name of a topic as rospy takes it; raise ``ValueError`` if there is none."""
+    if not isinstance(name, str) or not name:
+        raise ValueError("topic name is not a non-empty string")
+    return canonicalize_name(name)
+
+
 def type_name(caller: str, data_class: Any) -> str:
-    """Return the name of a message class; raise ``UsageError`` in the name of *caller* for anything else."""
+    """Return the name of a message class; raise ``ValueError`` in the name of *caller* for anything else."""
     name = getattr(data_class, "__msgtype__", "")
     if not name:
-        raise UsageError(
+        raise ValueError(
             f"rospy.{caller}: {data_class!r} is no message class; import one, as in std_msgs.msg"
         )
     return str(name)
 
 
-def _subscriber_qos(depth: int | None) -> QoS:
+def _subscriber_qos(depth: Any) -> QoS:
     """Return a QoS that matches every publisher, because ROS 1 has no QoS."""
-    return QoS(depth or None, BEST_AVAILABLE, BEST_AVAILABLE)
+    if depth is not None and not isinstance(depth, int):
+        raise ROSException("queue size must be an integer")
+    if depth == 0:
+        raise ROSException("queue size may not be set to zero")
+    return QoS(depth if depth and depth > 0 else None, BEST_AVAILABLE, BEST_AVAILABLE)
 
 
 class SubscribeListener:
@@ -112,6 +155,7 @@ class Publisher:
     """
 
     sessions: ClassVar[Sessions]
+    reg_type = "pub"
 
     def __init__(
         self,
@@ -125,14 +169,16 @@ class Publisher:
         queue_size: int | None = None,
     ) -> None:
         session = self._session = self.sessions.joined()
-        qos = LATCHED if latch else QoS(queue_size or None)
+        bounded = isinstance(queue_size, int) and queue_size > 0
+        qos = LATCHED if latch else QoS(queue_size if bounded else None)
         self.data_class = data_class
-        self.type = type_name("Publisher", data_class)
+        kind = type_name("Publisher", data_class)
+        self.type = ros1_name(kind)
         self._count: int | None = 0 if getattr(data_class, "_has_header", False) else None
-        self._publisher = session.node.advertise(name, self.type, qos)
+        self._publisher = session.node.advertise(topic_name(name), kind, qos)
         self.name = self.resolved_name = self._publisher.topic
-        if headers:
-            self.sessions.headers[session.node.name, self.name] = dict(headers)
+        added = {"latching": "1" if latch else "0", **(headers or {})}
+        self.sessions.headers[session.node.name, self.name] = added
         if subscriber_listener is not None:
             self._tell(subscriber_listener)
 
@@ -157,9 +203,7 @@ class Publisher:
         """Publish a message, or one made of these fields; raise ``ROSException`` before ``init_node``."""
         if not self._session.initialised:
             raise ROSException("ROS node has not been initialized yet. Please call init_node() first")
-        kind = self.data_class
-        whole = len(args) == 1 and not fields and isinstance(args[0], kind.of_graph)
-        message: Any = args[0] if whole else kind(*args, **fields)
+        message = args_kwds_to_message(self.data_class, args, fields)
         if self._count is not None:
             self._count += 1
             message.header.seq = self._count
@@ -170,6 +214,11 @@ class Publisher:
                 raise ROSSerializationException(str(error)) from error
             text = f"{self.name}: not sent (rospy raises this only when the topic has a subscriber): {error}"
             self._session.log(WARNING, text)
+
+    @property
+    def md5sum(self) -> str:
+        """Checksum of the type."""
+        return str(self.data_class._md5sum)
 
     def get_num_connections(self) -> int:
         """Return the number of connected subscribers."""
@@ -193,6 +242,7 @@ class Subscriber:
     """Calls *callback* with each message, in a thread of its own."""
 
     sessions: ClassVar[Sessions]
+    reg_type = "sub"
 
     def __init__(
         self,
@@ -211,6 +261,7 @@ class Subscriber:
         self._args = callback_args
         self._received: Callable[[Any], Any] | None = None
         self._headers: dict[str, Callable[[], dict[str, Any]]] = {}
+        name = topic_name(name)
         topic = self.name = self.resolved_name = session.node.resolve(name)
         qos = _subscriber_qos(queue_size)
         self._subscription: AnySubscription | Subscription
@@ -218,12 +269,13 @@ class Subscriber:
             self.type = AnyMsg._type
             self._subscription = AnySubscription(session, topic, self._call, qos)
             return
-        self.type = type_name("Subscriber", data_class)
+        kind = type_name("Subscriber", data_class)
+        self.type = ros1_name(kind)
         group = session.spinning_group(topic, f"callback of {topic}")
         self._received = receiving(data_class)
         simple = callback is not None and callback_args is None and self._received is None
         call = cast("Callable[[Any], None]", callback) if simple else self._call
-        self._subscription = session.node.subscribe(name, self.type, call, qos, group)
+        self._subscription = session.node.subscribe(name, kind, call, qos, group)
 
     def _call(self, message: Any) -> None:
         if self.callback is None:
@@ -244,8 +296,13 @@ class Subscriber:
         """Return the header of the connection to a publisher, as ROS 1 has it."""
         known = {} if not sender else {"callerid": sender}
         of_type = {"type": self.data_class._type, "md5sum": self.data_class._md5sum}
-        rest = {"topic": self.name, "message_definition": self.data_class._full_text, "tcp_nodelay": "0"}
+        rest = {"topic": self.name, "message_definition": self.data_class._full_text}
         return {**known, **of_type, **rest, **self.sessions.headers.get((sender, self.name), {})}
+
+    @property
+    def md5sum(self) -> str:
+        """Checksum of the type."""
+        return str(self.data_class._md5sum)
 
     def get_num_connections(self) -> int:
         """Return the number of connected publishers."""
@@ -267,7 +324,7 @@ def wait_for_message(session: Session, topic: str, data_class: Any, timeout: Ns 
 
     group = session.node.group()
     kind = type_name("wait_for_message", data_class)
-    subscription = session.node.subscribe(topic, kind, keep, _subscriber_qos(1), group)
+    subscription = session.node.subscribe(topic_name(topic), kind, keep, _subscriber_qos(1), group)
     try:
         group.spin_once(timeout)
     finally:
@@ -281,7 +338,7 @@ def wait_for_message(session: Session, topic: str, data_class: Any, timeout: Ns 
 def _service_type(caller: str, service_class: Any) -> str:
     name = getattr(service_class, "_type", "")
     if not name or not hasattr(service_class, "_request_class"):
-        raise UsageError(
+        raise AttributeError(
             f"rospy.{caller}: {service_class!r} is no service class; import one, as in std_srvs.srv"
         )
     return str(name)
@@ -309,13 +366,16 @@ class Service:
     ) -> None:
         self._session = self.sessions.joined()
         self.service_class = service_class
-        self.type = _service_type("Service", service_class)
+        kind = _service_type("Service", service_class)
         self._handler = handler
         self._error_handler = error_handler
         node = self._session.node
-        resolved = node.resolve(name)
+        resolved = node.resolve(canonicalize_name(name))
         group = self._session.spawning_group(resolved, f"handler of {resolved}")
-        self._service = node.serve(name, self.type, self._handle, group)
+        try:
+            self._service = node.serve(canonicalize_name(name), kind, self._handle, group)
+        except UsageError as error:
+            raise ServiceException(f"service [{resolved}] already registered: {error}") from error
         self.resolved_name = resolved
 
     def _handle(self, request: Any) -> Any:
@@ -349,9 +409,7 @@ def _to_response(service_class: Any, given: Any) -> Any:
     if isinstance(given, (list, tuple)):
         return kind(*given)
     if given is None:
-        if kind.__match_args__:
-            raise ServiceException("service handler returned None")
-        return kind()
+        raise ServiceException("service handler returned None")
     return kind(given)
 
 
@@ -359,14 +417,15 @@ class ServiceProxy:
     """A client that calls a service like a function."""
 
     sessions: ClassVar[Sessions]
+    uri: str | None = None
 
     def __init__(self, name: str, service_class: Any, persistent: bool = False, headers: Any = None) -> None:
         self._session = self.sessions.joined()
         self.service_class = service_class
         self.request_class = getattr(service_class, "_request_class", None)
         self.response_class = getattr(service_class, "_response_class", None)
-        self.type = _service_type("ServiceProxy", service_class)
-        self._client = self._session.node.client(name, self.type)
+        kind = _service_type("ServiceProxy", service_class)
+        self._client = self._session.node.client(canonicalize_name(name), kind)
         self.resolved_name = self._client.name
         if headers:
             self.sessions.headers[self._session.node.name, self.resolved_name] = dict(headers)
@@ -376,19 +435,25 @@ class ServiceProxy:
         return self.call(*args, **fields)
 
     def call(self, *args: Any, **fields: Any) -> Any:
-        """Call the service with a request or the fields of one; raise ``ServiceException`` on failure."""
+        """Call the service with a request or the fields of one.
+
+        Raises:
+            ServiceException: the call has failed.
+            SerializationError: a value does not fit its field.
+            TypeError, AttributeError: the fields are not those of the request.
+        """
         self._session.check()
         kind = self.service_class._request_class
         given = len(args) == 1 and not fields and isinstance(args[0], kind)
+        request = args[0] if given else kind(*args, **fields)
         try:
-            request = args[0] if given else kind(*args, **fields)
             answer = adopt(self._client.call(request), library_of(kind))
-            answer.connection_of = cache(self._header)
-            return answer
         except ServiceError as error:
             raise ServiceException(f"service [{self.resolved_name}]: {error.what}") from error
-        except (TypeError, AttributeError) as error:
-            raise ServiceException(f"service [{self.resolved_name}]: bad request: {error}") from error
+        except UsageError as error:
+            raise SerializationError(f"service [{self.resolved_name}]: bad request: {error}") from error
+        answer.connection_of = cache(self._header)
+        return answer
 
     def _header(self) -> dict[str, Any]:
         """Return the header of the connection to the server, as ROS 1 has it."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from functools import partial
+from itertools import count
 from types import ModuleType
 from typing import Any, ClassVar, NoReturn
 
@@ -209,11 +209,31 @@ def global_name(name: str) -> str:
     return f"/{name}" if not is_global(name) else name
 
 
+def anonymous_name(id: str) -> str:  # noqa: A002 - rosgraph's name
+    """Return a name for a node that no other node has."""
+    return f"{id}_{next(_anonymous)}"
+
+
+_anonymous = count(1)
+
+
+def resolved(name: str, namespace_: str, remappings: Mapping[str, str] | None = None) -> str:
+    """Return the absolute form of a name that a node or namespace uses, with remappings applied."""
+    if not name:
+        return namespace(namespace_)
+    full = canonicalize_name(name)
+    if is_private(full):
+        full = ns_join(namespace_, full[1:])
+    elif not is_global(full):
+        full = namespace(namespace_) + full
+    return (remappings or {}).get(full, full)
+
+
 NAMES: dict[str, Any] = {
     one.__name__: one
     for one in (
         *(is_global, is_private, is_legal_name, is_legal_base_name, namespace, ns_join, canonicalize_name),
-        *(make_global_ns, scoped_name, global_name),
+        *(make_global_ns, scoped_name, global_name, anonymous_name),
     )
 } | {"ANYTYPE": "*", "GLOBALNS": "/", "PRIV_NAME": "~", "REMAP": ":=", "SEP": "/"}
 """Content of ``rosgraph.names``."""
@@ -230,8 +250,7 @@ def master_names(sessions: Sessions) -> dict[str, Any]:
 def rosgraph_modules(master: Any, rospy: Mapping[str, Any]) -> dict[str, ModuleType]:
     """Return ``rosgraph`` and the modules in it by name."""
     api = {**_EXCEPTIONS, "Master": master, "is_online": lambda master_uri=None: True}
-    resolved = {"resolve_name": partial(_resolved, rospy)}
-    names = library_module("rosgraph.names", {**NAMES, **resolved})
+    names = library_module("rosgraph.names", {**NAMES, "resolve_name": resolved})
     whole = {
         **_EXCEPTIONS,
         "Master": master,
@@ -245,15 +264,3 @@ def rosgraph_modules(master: Any, rospy: Mapping[str, Any]) -> dict[str, ModuleT
         "rosgraph.names": names,
         "rosgraph.masterapi": whole["masterapi"],
     }
-
-
-def _resolved(rospy: Mapping[str, Any], name: str, namespace_: str, remappings: Any = None) -> str:
-    """Return a name below a namespace with remappings applied."""
-    if not name:
-        return namespace(namespace_)
-    full = canonicalize_name(name)
-    if is_private(full):
-        full = ns_join(namespace_, full[1:])
-    elif not is_global(full):
-        full = namespace(namespace_) + full
-    return str((remappings or {}).get(full, full))

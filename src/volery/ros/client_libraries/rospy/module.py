@@ -7,6 +7,7 @@ under the name of the component.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
 from functools import partial
 from types import ModuleType
 from typing import Any
@@ -17,11 +18,18 @@ from volery.kernel.waiting import poll
 from volery.ros import messages
 from volery.ros.client_libraries.library_base import AtEnd, Caller, Launch, caller, ignore_end, library_module
 from volery.ros.client_libraries.rospy import entities
-from volery.ros.client_libraries.rospy.master import NAMES, master_names, rosgraph_modules
+from volery.ros.client_libraries.rospy.master import (
+    NAMES,
+    is_legal_name,
+    master_names,
+    resolved,
+    rosgraph_modules,
+)
 from volery.ros.client_libraries.rospy.session import (
     EXCEPTIONS,
     Duration,
     Rate,
+    ROSException,
     Sessions,
     Time,
     Timer,
@@ -29,7 +37,7 @@ from volery.ros.client_libraries.rospy.session import (
     as_ns,
 )
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
-from volery.ros.messages.client_classes import ROSPY, message_of
+from volery.ros.messages.client_classes import ROSPY, message_of, numpy_class
 from volery.trace.events import Text
 
 LEVELS = {"DEBUG": 1, "INFO": 2, "WARN": 4, "ERROR": 8, "FATAL": 16}
@@ -128,8 +136,37 @@ def get_param_cached(sessions: Sessions, param_name: str, default: Any = _NO_DEF
 
 
 def set_param(sessions: Sessions, param_name: str, param_value: Any) -> None:
-    """Set a parameter."""
-    sessions.joined().node.set_parameter(param_name, param_value)
+    """Set a parameter; raise ``TypeError`` or ``OverflowError`` for a value that XML-RPC cannot carry."""
+    sessions.joined().node.set_parameter(param_name, _carried(param_value))
+
+
+_WHOLE = 2**31
+_SCALARS = (bool, float, str, bytes, bytearray, datetime)
+
+
+def _carried(value: Any) -> Any:
+    """Return a value as the parameter server of ROS 1 gives it back: XML-RPC carries the exact types only."""
+    kind = type(value)
+    if kind is int:
+        if not -_WHOLE <= value < _WHOLE:
+            raise OverflowError(f"int exceeds XML-RPC limits: {value}; a parameter has 32 bits")
+        return value
+    if kind in _SCALARS:
+        return value
+    if kind in (list, tuple):
+        return [_carried(one) for one in value]
+    if kind is dict:
+        for key in value:
+            if not isinstance(key, str):
+                raise TypeError(f"dictionary key must be string, not {key!r}")
+        return {key: _carried(one) for key, one in value.items()}
+    if value is None:
+        raise TypeError("cannot marshal None unless allow_none is enabled: a parameter cannot be None")
+    carried = next((one for one in kind.__mro__ if one in (int, *_SCALARS, list, tuple, dict)), None)
+    if carried is None and hasattr(value, "__dict__"):
+        return {key: _carried(one) for key, one in vars(value).items()}
+    as_what = "float(), int(), str() or tolist()" if carried is None else f"{carried.__name__}()"
+    raise TypeError(f"cannot marshal {kind} objects; convert the value by {as_what}")
 
 
 def has_param(sessions: Sessions, param_name: str) -> bool:
@@ -161,7 +198,11 @@ def search_param(sessions: Sessions, param_name: str) -> str | None:
     parts, only the first is searched for.
     """
     node = sessions.joined().node
-    if param_name.startswith(("/", "~")):
+    if param_name == "":
+        return None
+    if param_name.startswith("~"):
+        raise ROSException("cannot search for parameter: invalid key: it begins with ~")
+    if param_name.startswith("/"):
         full = node.resolve(param_name)
         return full if node.has_parameter(full) else None
     first = param_name.partition("/")[0]
@@ -179,15 +220,16 @@ FUNCTIONS = (
 )  # fmt: skip
 
 
-_BOUND = (
-    entities.Publisher,
-    entities.Subscriber,
-    entities.Service,
-    entities.ServiceProxy,
-    Rate,
-    Timer,
-    Time,
-)
+_BOUND: dict[type, str] = {
+    entities.Publisher: "topics",
+    entities.Subscriber: "topics",
+    entities.Service: "impl.tcpros_service",
+    entities.ServiceProxy: "impl.tcpros_service",
+    Rate: "timer",
+    Timer: "timer",
+    Time: "rostime",
+}
+"""Classes with the modules of rospy that have them."""
 
 
 def modules(
@@ -206,8 +248,8 @@ def modules(
     """
     sessions = Sessions(graph, launched, nodes, at_end)
     names: dict[str, Any] = {**EXCEPTIONS, **LEVELS, **loggers(sessions), **_functions(sessions)}
-    for kind in _BOUND:
-        members = {"__slots__": (), "__module__": kind.__module__, "sessions": sessions}
+    for kind, module in _BOUND.items():
+        members = {"__slots__": (), "__module__": f"rospy.{module}", "sessions": sessions}
         names[kind.__name__] = type(kind.__name__, (kind,), members)
     names["Duration"] = Duration
     names["TimerEvent"] = TimerEvent
@@ -218,17 +260,31 @@ def modules(
     masters = master_names(sessions)
     master = masters.pop("Master")
     names |= masters
-    parts: dict[str, Mapping[str, Any]] = {
+    parts: dict[str, dict[str, Any]] = {
         **{part: {one: names[one] for one in inside} for part, inside in _PARTS.items()},
-        "names": {**_NAMES_OF_ROSPY, **{one: names[one] for one in _NAMES_OF_NODE}},
+        "names": {
+            **{one: NAMES[one] for one in _NAMES_OF_ROSPY},
+            **{one: names[one] for one in _NAMES_OF_NODE},
+            "TOPIC_ANYTYPE": "*",
+            "SERVICE_ANYTYPE": "*",
+            "get_ros_namespace": lambda env=None, argv=None: names["get_namespace"](),
+        },
         "exceptions": EXCEPTIONS,
-        "msg": {"AnyMsg": entities.AnyMsg},
-        "numpy_msg": {"numpy_msg": numpy_msg},
-        "rostime": {one: names[one] for one in ("Duration", "Time", "get_rostime", "get_time")},
+        "msg": {"AnyMsg": entities.AnyMsg, "args_kwds_to_message": entities.args_kwds_to_message},
+        "numpy_msg": {"numpy_msg": numpy_class},
+        "rostime": {
+            **{one: names[one] for one in ("Duration", "Time", "get_rostime", "get_time")},
+            "is_rostime_initialized": names["is_initialized"],
+            "is_wallclock": names.pop("is_wallclock"),
+            "wallsleep": names["sleep"],
+        },
     }
+    core = parts["core"] = {**parts["core"], "is_shutdown_requested": names["is_shutdown"]}
+    core["add_client_shutdown_hook"] = names["on_shutdown"]
+    core["add_shutdown_hook"] = core["add_preshutdown_hook"] = names.pop("add_preshutdown_hook")
     found = {f"rospy.{part}": library_module(f"rospy.{part}", inside) for part, inside in parts.items()}
     names.pop("is_initialized")  # rospy has it in core alone
-    inside = {**names, **{part: found[f"rospy.{part}"] for part in parts}}
+    inside = {**names, **{part: found[f"rospy.{part}"] for part in parts if part != "numpy_msg"}}
     rospy = library_module("rospy", inside, REFUSED)
     return {**messages.modules(library=ROSPY), "rospy": rospy, **found, **rosgraph_modules(master, names)}
 
@@ -239,12 +295,16 @@ REFUSED = {
     "rospy.parse_rosrpc_uri": _NO_ADDRESSES,
     "rospy.get_ros_root": "rospkg.RosPack finds packages",
     "rospy.impl": "its content is rospy's own; there are no connections",
+    "rospy.numpy_msg": "import rospy.numpy_msg, as on a real graph",
     "rospy.logout": "the log is the topic /rosout",
 }
 """Names that are not there on purpose, and what to do instead."""
 _LOGS = tuple(f"log{name}{ending}" for name in _FUNCTIONS if name != "error" for ending in _ENDINGS)
 _NAMES_OF_NODE = ("get_caller_id", "get_name", "get_namespace", "remap_name", "resolve_name")
-_NAMES_OF_ROSPY = {one: NAMES[one] for one in ("canonicalize_name", "global_name", "scoped_name")}
+_NAMES_OF_ROSPY = (
+    *("ANYTYPE", "GLOBALNS", "PRIV_NAME", "REMAP", "SEP", "canonicalize_name", "global_name"),
+    *("is_global", "is_private", "make_global_ns", "namespace", "ns_join", "scoped_name"),
+)
 _PARTS: dict[str, tuple[str, ...]] = {
     "client": (
         *("delete_param", "get_master", "get_param", "get_param_cached", "get_param_names", "has_param"),
@@ -260,32 +320,34 @@ _PARTS: dict[str, tuple[str, ...]] = {
 """Names of rospy's modules that files import from them."""
 
 
-def numpy_msg(msg_type: Any) -> Any:
-    """Return *msg_type* unchanged: arrays of all messages are numpy arrays."""
-    return msg_type
-
-
 def _functions(sessions: Sessions) -> dict[str, Callable[..., Any]]:
     """Return the functions of rospy, bound to the sessions of one run."""
     found: tuple[Any, ...] = (
         init_node, is_shutdown, signal_shutdown, on_shutdown, spin, sleep, wait_for_message, wait_for_service,
         get_name, get_namespace, get_time, get_rostime, resolve_name, get_published_topics, myargv,
-        is_initialized,
+        is_initialized, remap_name, add_preshutdown_hook, is_wallclock,
         *FUNCTIONS,
     )  # fmt: skip
     bound: dict[str, Callable[..., Any]] = {one.__name__: partial(one, sessions) for one in found}
-    return {
-        **bound,
-        "get_caller_id": bound["get_name"],
-        "remap_name": bound["resolve_name"],
-    }
+    return {**bound, "get_caller_id": bound["get_name"]}
 
 
 def init_node(
     sessions: Sessions, name: str, argv: Any = None, anonymous: bool = False, **options: Any
 ) -> None:
-    """Join the graph. Options about signals, logging and ports are accepted without effect."""
-    sessions.join(name, anonymous)
+    """Join the graph. Options about signals, logging and ports are accepted without effect.
+
+    Raises:
+        ValueError: the name is empty or has a namespace.
+        ROSException: it was called before with other arguments.
+    """
+    if not name:
+        raise ValueError("name must not be empty")
+    if "/" in name:
+        raise ValueError(
+            f"namespaces are not allowed in node names: {name!r}; a launch file or model sets one"
+        )
+    sessions.join(name, anonymous, *(options.get(one) for one in ("log_level", "disable_rostime")))
 
 
 IS_SHUTDOWN: Ns = 30
@@ -314,7 +376,20 @@ def signal_shutdown(sessions: Sessions, reason: str = "") -> None:
 
 def on_shutdown(sessions: Sessions, h: Callable[[], Any]) -> None:
     """Call *h* when this node shuts down, or the run ends."""
-    sessions.joined().on_shutdown(h)
+    sessions.joined().on_shutdown(_hook(h))
+
+
+def add_preshutdown_hook(sessions: Sessions, h: Callable[[str], Any]) -> None:
+    """Call *h* with the reason when this node shuts down, or the run ends."""
+    session = sessions.joined()
+    hook = _hook(h)
+    session.on_shutdown(lambda: hook(session.shutdown))
+
+
+def _hook(given: Any) -> Any:
+    if not callable(given):
+        raise TypeError(f"shutdown hook [{given}] must be a function or callable object: {type(given)}")
+    return given
 
 
 def spin(sessions: Sessions) -> None:
@@ -365,9 +440,23 @@ def get_rostime(sessions: Sessions) -> Time:
     return Time(0, sessions.now())
 
 
-def resolve_name(sessions: Sessions, name: str) -> str:
-    """Return the absolute name with remappings applied."""
-    return sessions.joined().node.resolve(name)
+def resolve_name(sessions: Sessions, name: str, caller_id: str | None = None) -> str:
+    """Return the absolute name with remappings applied, optionally as another node sees it."""
+    node = sessions.joined().node
+    full = resolved(name, caller_id or node.name)
+    return node.resolve(full) if full[1:] and is_legal_name(full) else full
+
+
+def remap_name(sessions: Sessions, name: str) -> str:
+    """Return what a name is remapped to, or the name."""
+    full = resolved(name, sessions.joined().node.name)
+    found = resolve_name(sessions, name)
+    return name if found == full else found
+
+
+def is_wallclock(sessions: Sessions) -> bool:
+    """Return whether the parameter ``/use_sim_time`` is not set."""
+    return not get_param(sessions, "/use_sim_time", False)
 
 
 def get_published_topics(sessions: Sessions, namespace: str = "/") -> list[list[str]]:

@@ -11,12 +11,19 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple, Self
 
-from volery.base.errors import ComponentError, UsageError, VoleryError
+from volery.base.errors import ComponentError, VoleryError
 from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Kernel
 from volery.kernel.task import Scope
 from volery.kernel.waiting import Signal, current_task, poll, read_clock
-from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComponents, Rosout, node_of_file
+from volery.ros.client_libraries.library_base import (
+    WARNING,
+    AtEnd,
+    Launch,
+    LaunchedComponents,
+    Rosout,
+    node_of_file,
+)
 from volery.ros.graph import LATCHED, Group, Node, RosGraph, Work
 from volery.ros.messages.client_classes import ROSPY, message_of
 from volery.ros.messages.message import nanoseconds
@@ -68,21 +75,21 @@ class ServiceException(Exception):  # noqa: N818 - rospy's name
     """A service call has failed."""
 
 
-EXCEPTIONS = {
-    kind.__name__: kind
-    for kind in (
-        ROSException,
-        ROSInitException,
-        ROSSerializationException,
-        ROSInterruptException,
-        ROSTimeMovedBackwardsException,
-        ROSInternalException,
-        TransportException,
-        TransportInitError,
-        TransportTerminated,
-        ServiceException,
-    )
-}
+_EXCEPTIONS: tuple[type[Exception], ...] = (
+    ROSException,
+    ROSInitException,
+    ROSSerializationException,
+    ROSInterruptException,
+    ROSTimeMovedBackwardsException,
+    ROSInternalException,
+    TransportException,
+    TransportInitError,
+    TransportTerminated,
+)
+for _kind in _EXCEPTIONS:
+    _kind.__module__ = "rospy.exceptions"
+ServiceException.__module__ = "rospy.service"
+EXCEPTIONS = {kind.__name__: kind for kind in (*_EXCEPTIONS, ServiceException)}
 
 
 @dataclass(eq=False)
@@ -99,6 +106,8 @@ class Session:
     shutdown: str = ""
     """Reason of the shutdown; empty while the node is not shut down."""
     hooks: list[Callable[[], Any]] = field(default_factory=list)
+    given: tuple[Any, ...] = ()
+    """Arguments of ``init_node``."""
     failures: dict[str, None] = field(default_factory=dict)
     callbacks: int = 0
     """Number of callbacks that were called, without shutdown hooks."""
@@ -220,10 +229,17 @@ class Sessions(LaunchedComponents):
     headers: dict[tuple[str, str], dict[str, Any]] = field(default_factory=dict, init=False)
     """What files add to the headers of connections, by node and topic or service."""
 
-    def join(self, name: str, anonymous: bool) -> None:
-        """Execute ``init_node``; a second call of the same component changes nothing."""
+    def join(self, name: str, anonymous: bool, *options: Any) -> None:
+        """Execute ``init_node``; raise ``ROSException`` at a second call with other arguments."""
         session = self.find() or self._open_session(name, anonymous)
-        session.initialised = True
+        given = name, anonymous, *options
+        if session.initialised and session.given != given:
+            before = ", ".join(map(repr, session.given))
+            raise ROSException(
+                f"rospy.init_node() has already been called with different arguments: {before}; a process "
+                "has one node"
+            )
+        session.initialised, session.given = True, given
 
     def _open_session(self, name: str, anonymous: bool) -> Session:
         component = self.component
@@ -310,21 +326,35 @@ class Rate:
     sessions: ClassVar[Sessions]
 
     def __init__(self, hz: float, reset: bool = False) -> None:
-        if hz <= 0:
-            raise UsageError(f"rospy.Rate({hz}): give a frequency above 0 Hz")
         self._session = self.sessions.initialised()
+        if hz == 0:
+            raise ZeroDivisionError(f"rospy.Rate({hz}): give a frequency above 0 Hz")
         period = int(S / hz)  # truncated, as by rospy
         self.sleep_dur = Duration(0, period)
-        self._rate = self._session.node.rate(period)
+        self._last = self._session.node.now()
+        self._rate = self._session.node.rate(period) if period > 0 else None
+        if self._rate is None:
+            self._session.log(
+                WARNING, f"rospy.Rate({hz}) never sleeps; give a frequency from above 0 to 1e9 Hz"
+            )
+
+    @property
+    def last_time(self) -> Time:
+        """Time at which the last sleep has ended, or the rate was made."""
+        return Time(0, self._last)
 
     def remaining(self) -> Duration:
         """Return the time until the next release."""
-        return Duration(0, self._rate.remaining())
+        return self.sleep_dur if self._rate is None else Duration(0, self._rate.remaining())
 
     def sleep(self) -> None:
         """Block until the next release; raise ``ROSInterruptException`` at shutdown."""
         self._session.check()
-        self._rate.sleep()
+        if self._rate is not None:
+            self._rate.sleep()
+            self._last = self._session.node.now()
+        elif not poll(self._session.kernel, READ_CLOCK):
+            read_clock(self._session.kernel)
         self._session.check()
 
 
@@ -342,6 +372,7 @@ class Timer:
     """Calls *callback* each *period* in a thread of its own."""
 
     sessions: ClassVar[Sessions]
+    daemon = True
 
     def __init__(
         self, period: Any, callback: Callable[[TimerEvent], Any], oneshot: bool = False, reset: bool = False

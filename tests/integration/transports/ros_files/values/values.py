@@ -6,6 +6,7 @@ error.
 
 import array
 import copy
+import importlib
 import io
 import json
 import pathlib
@@ -15,20 +16,37 @@ import sys
 
 import numpy as np
 
+MODULES = {
+    "geometry": "geometry_msgs.msg",
+    "sensor": "sensor_msgs.msg",
+    "srv": "std_srvs.srv",
+    "std": "std_msgs.msg",
+}
+"""Modules by the names that expressions give them; imported by name, since only expressions use them."""
+
+
+def imported(**modules):
+    return {label: importlib.import_module(name) for label, name in {**MODULES, **modules}.items()}
+
 
 def names_of_rclpy():
-    import rclpy
-    from rclpy.serialization import deserialize_message, serialize_message
+    names = imported(
+        rclpy="rclpy", time="rclpy.time", duration="rclpy.duration", times="builtin_interfaces.msg"
+    )
+    serialization = importlib.import_module("rclpy.serialization")
 
     def sent(message):
         """Return the message as it arrives."""
-        return deserialize_message(serialize_message(message), type(message))
+        return serialization.deserialize_message(serialization.serialize_message(message), type(message))
 
-    rclpy.init()
-    return locals()
+    names["rclpy"].init()
+    names |= {"Time": names["time"].Time, "Duration": names["duration"].Duration, "sent": sent}
+    names["ClockType"] = importlib.import_module("rclpy.clock").ClockType
+    return names | {"TimeMsg": names["times"].Time, "DurationMsg": names["times"].Duration}
 
 
 def names_of_rospy():
+    names = imported(rospy="rospy", genpy="genpy", numpy_messages="rospy.numpy_msg")
 
     def sent(message):
         """Return the message as it arrives."""
@@ -36,12 +54,14 @@ def names_of_rospy():
         message.serialize(buffer)
         return type(message)().deserialize(buffer.getvalue())
 
-    return locals()
+    return names | {"numpy_msg": names["numpy_messages"].numpy_msg, "sent": sent}
 
 
 def described(expression, names):
     try:
         value = eval(expression, names)
+    except NameError:
+        raise
     except Exception as error:
         return f"raises {type(error).__name__}"
     return re.sub("0x[0-9a-f]+", "", f"{type(value).__name__}: {value!r}")
