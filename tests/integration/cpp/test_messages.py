@@ -66,7 +66,7 @@ def echo(tmp_path: Path) -> Any:
     component = CppComponent(
         "Echo", tmp_path / "echo.cpp", "Echo", operations(ECHO), (), {"Echoing": ECHO}, ("-O0", "-g0")
     )
-    face = ClientLibrary((roscpp.INCLUDE,), (roscpp.FALLBACK,), roscpp.generate_headers)
+    face = ClientLibrary((roscpp.INCLUDE,), roscpp.FALLBACK, roscpp.generate_headers)
     kernel = VirtualKernel()
     made = CppProgram(kernel, "echo", compile_component(component, face)).make({})
     assert isinstance(made, CppObject)

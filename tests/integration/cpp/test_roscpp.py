@@ -132,6 +132,28 @@ def test_frames_of_tf_and_tf2(run_model):
     ]
 
 
+def test_filters_of_messages_and_values_of_parameters(run_model):
+    """The sets are those of message_filters 1.15.15 for the same streams."""
+    places = "{places: [{name: here, at: [1.5, 2.5], level: 3}, {name: far, at: [3.0, 4.0]}]}"
+    model = QUEUES.replace("queues.cpp", "filters.cpp").replace(
+        "is: Queues", f"is: Queues, parameters: {places}"
+    )
+    outcome = run_model(model, "filters.cpp")
+    assert outcome.run.completed, outcome.run.record.outcome
+    assert [one.text for one in outcome.of(Text) if one.source == "queues"] == [
+        *("exact 0.1 0.1", "near 0.1 0.1", "known 0.1", "near 0.2 0.2", "exact 0.3 0.3", "near 0.3 0.3"),
+        *("known 0.2", "near 0.4 0.5", "known 0.3", "known 0.4", "known 0.5"),
+        "kept 0.400000000 to 0.500000000",
+        "here 2.5",
+        "far 4",
+        "value {[at:{1.5,2.5},level:3,name:here],[at:{3,4},name:far]}",
+        "wrong type error 3",
+        "set 1",
+        "at={3,4}",
+        "name=there",
+    ]
+
+
 def test_actions(run_model):
     outcome = run_model(QUEUES.replace("queues.cpp", "actions.cpp"), "actions.cpp", "robot_msgs")
     assert outcome.run.completed, outcome.run.record.outcome
@@ -146,11 +168,14 @@ def test_actions(run_model):
 
 
 def test_it_compiles_without_boost(tmp_path):
-    headers = roscpp.generate_headers(_includes("pose_keeper.cpp"), FILES / "pose_keeper.cpp")
+    both = _includes("pose_keeper.cpp") + _includes("filters.cpp")
+    headers = roscpp.generate_headers(both, FILES / "pose_keeper.cpp")
     for name, text in headers.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
-    _check("pose_keeper.cpp", *(f"-I{one}" for one in (roscpp.FALLBACK, tmp_path, roscpp.INCLUDE, *INCLUDE)))
+    folders = [f"-I{one}" for one in (roscpp.FALLBACK[0], tmp_path, roscpp.INCLUDE, *INCLUDE)]
+    _check("pose_keeper.cpp", *folders)
+    _check("filters.cpp", *folders)
 
 
 def test_it_compiles_with_the_real_roscpp():

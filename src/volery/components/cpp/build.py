@@ -270,12 +270,14 @@ class ClientLibrary:
     """Headers of a client library.
 
     ``include`` folders are searched before the system's, ``fallback`` folders after them. ``generate`` makes
-    message headers for the names that a component includes.
+    message headers for the names that a component includes; the text of one that is not offered begins with
+    ``not_offered``, and says why.
     """
 
     include: tuple[Path, ...] = ()
     fallback: tuple[Path, ...] = ()
     generate: GenerateHeaders = lambda includes, folder, found: {}
+    not_offered: str = "//"
 
 
 @dataclass(frozen=True)
@@ -309,7 +311,8 @@ def compile_component(
     try:
         units = compiled_by(tools, files, include, (*component.flags, *fallback))
     except ModelError as error:
-        raise _of_the_class(component, sources, error) from None
+        error = _of_the_class(component, sources, error)
+        raise _with_missing_headers(sources, headers, client_library.not_offered, error) from None
     ours = ["component.cpp", "virtual_time.cpp", *(["main_entry.cpp"] if not component.class_name else [])]
     objects = [*units, *(_runtime_object(name) for name in ours)]
     options = [str(framework), *(f"-l{library}" for library in component.libraries)]
@@ -323,6 +326,7 @@ def _include_flags(flags: Sequence[str]) -> tuple[Path, ...]:
     return tuple(Path(one) for one in (*joined, *separate))
 
 
+_REFUSALS = 3
 _NO_MEMBER = re.compile(r"has no member named '(\w+)'|no member named '(\w+)' in")
 
 
@@ -338,6 +342,19 @@ def _of_the_class(component: CppComponent, sources: Sources, error: ModelError) 
     else:
         what = f"does not fit the ports and operations of the model: {error.what}"
     return ModelError(what, component.name, where)
+
+
+def _with_missing_headers(sources: Sources, headers: Path, not_offered: str, error: ModelError) -> ModelError:
+    """Return an error of the compiler with the headers that are not offered, those that it names first."""
+    refused = {}
+    for name in sources.included:
+        file = headers / name
+        text = file.read_text(encoding="utf-8") if file.is_file() else ""
+        if text.startswith(not_offered) and "\n" not in text.rstrip():
+            refused[name] = text.removeprefix(not_offered).strip()
+    named = [why for name, why in refused.items() if name.partition("/")[0] in error.what]
+    shown = (named or list(refused.values()))[:_REFUSALS]
+    return ModelError("\n".join((error.what, *shown)), error.path, error.where) if shown else error
 
 
 def build_framework() -> Path:

@@ -12,7 +12,7 @@ import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
@@ -24,10 +24,17 @@ from volery.base.errors import Location, ModelError, UsageError
 COMPILERS = ("g++", "clang++", "c++")
 FLAGS = ("-std=c++17", "-O2", "-g", "-fPIC", "-Wall", "-fdiagnostics-color=never")
 COMPILER_HINT = "apt install g++ (or clang)"
-_SHOWN_LINES = 30
+_PACKAGE = Path(__file__).parents[2]
+_SHOWN_LINES, _SHOWN_LETTERS = 12, 300
 _COMPILE_ERROR = re.compile(
     r"^(?P<file>[^\s:][^:\n]*):(?P<line>\d+):(?:\d+:)? (?:fatal )?error: ", re.MULTILINE
 )
+_USE = re.compile(
+    r"^(?P<file>[^\s:][^:\n]*):(?P<line>\d+):(?:\d+:)? +"
+    r"(?:required from|note: in (?:expansion of macro|instantiation))",
+    re.MULTILINE,
+)
+"""Where g++ and clang++ say that a template or macro is used."""
 _LINK_ERROR = re.compile(
     r"^(?:\S*ld: )?(?P<file>[^\s:]+\.(?:cpp|cc|cxx|h|hpp)):(?P<line>\d+): ", re.MULTILINE
 )
@@ -100,7 +107,7 @@ class CppToolchain:
     component: str
     report_progress: ReportProgress | None = None
 
-    def object_file(self, source: Path, include: Iterable[Path] = (), flags: Sequence[str] = ()) -> Path:
+    def object_file(self, source: Path, include: Sequence[Path] = (), flags: Sequence[str] = ()) -> Path:
         """Compile ``source`` and return its object file.
 
         Raises:
@@ -108,7 +115,8 @@ class CppToolchain:
         """
         folders = [option for folder in include for option in ("-I", str(folder))]
         command = [compiler().program, *FLAGS, *_extra_flags(), *flags, *folders, "-c", str(source)]
-        place = cache_folder() / _digest(compiler().version, *command, content_digest(source))
+        names = [name for folder in include for name in _names_of_ours(folder)]
+        place = cache_folder() / _digest(compiler().version, *command, *names, content_digest(source))
         made, record = place.with_suffix(".o"), place.with_suffix(".json")
         if made.exists() and is_current(record):
             return made
@@ -153,17 +161,65 @@ class CppToolchain:
             raise self._error(Path(command[0]).name, done.stderr)
 
     def _error(self, program: str, output: str) -> ModelError:
-        found = _COMPILE_ERROR.search(output) or _LINK_ERROR.search(output)
-        where = Location(found["file"], int(found["line"])) if found else None
-        lines = output.strip().splitlines()
-        if len(lines) > _SHOWN_LINES:
-            lines = [*lines[:_SHOWN_LINES], f"... {len(lines) - _SHOWN_LINES} more lines"]
+        where = _place(output)
+        lines = list(_essential(output))
+        more = len(lines) - _SHOWN_LINES
+        if more > 0:
+            lines[_SHOWN_LINES:] = [f"... {more} more lines"]
         return ModelError("\n".join((f"does not compile; {program} says:", *lines)), self.component, where)
+
+
+def _is_ours(file: str) -> bool:
+    """Return whether a file is of the system, of volery, or generated, and so not the user's."""
+    path = Path(file)
+    return bool({Path("/usr"), _PACKAGE, cache_folder()} & {*path.parents})
+
+
+def _place(output: str) -> Location | None:
+    """Return the place of the first error; of one in a header that is not the user's, where it is used."""
+    found = _COMPILE_ERROR.search(output)
+    if found is None:
+        found = _LINK_ERROR.search(output)
+    elif _is_ours(found["file"]):
+        used = [one for one in _USE.finditer(output) if not _is_ours(one["file"])]
+        before = [one for one in used if one.start() < found.start()]
+        found = (before[-1:] or used[:1] or [found])[0]
+    return Location(found["file"], int(found["line"])) if found else None
+
+
+def _essential(output: str) -> Iterator[str]:
+    """Yield the errors, each with its line of the source, without what the compiler says beside them."""
+    lines = output.strip().splitlines()
+    if not _COMPILE_ERROR.search(output):
+        yield from lines
+        return
+    left = 0
+    for line in lines:
+        if _COMPILE_ERROR.match(line):
+            left = 3
+        elif _USE.match(line):
+            left = 1 if not _is_ours(line.partition(":")[0]) else 0
+        elif not line.startswith(" "):
+            left = 0
+        if left > 0:
+            left -= 1
+            yield line if len(line) <= _SHOWN_LETTERS else f"{line[:_SHOWN_LETTERS]}..."
 
 
 def _extra_flags() -> tuple[str, ...]:
     """Return the flags that keep static variables of templates separate in each copy of a library."""
     return () if "clang" in compiler().version else ("-fno-gnu-unique",)
+
+
+@cache
+def _names_of_ours(folder: Path) -> tuple[str, ...]:
+    """Return the names of the headers in a folder that comes with volery, else none.
+
+    A new one may be found before a header of the system that an object has been compiled with.
+    """
+    if _PACKAGE not in folder.parents:
+        return ()
+    return tuple(sorted(str(file.relative_to(folder)) for file in folder.rglob("*") if file.is_file()))
 
 
 def _digest(*parts: str) -> str:

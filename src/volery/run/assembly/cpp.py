@@ -182,7 +182,7 @@ class TracingCompiler:
 
 
 LANGUAGES = ("c++", "roscpp")
-_ROSCPP = ClientLibrary((roscpp.INCLUDE,), (roscpp.FALLBACK,), roscpp.generate_headers)
+_ROSCPP = ClientLibrary((roscpp.INCLUDE,), roscpp.FALLBACK, roscpp.generate_headers, roscpp.NOT_OFFERED)
 
 
 def is_cpp(component: Component) -> bool:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from volery.base.errors import UsageError
+from volery.base.errors import ModelError, UsageError
 from volery.base.time import S
 from volery.kernel.task import ExecutionContext
 from volery.ros.client_libraries import roscpp
@@ -63,6 +63,36 @@ def test_what_ros_has_and_is_not_offered_says_so():
     assert set(texts) == {"ros/poll_set.h", "std_msgs/Nothing.h", "cv_bridge/cv_bridge.h"}
     assert all("is not offered" in text for text in texts.values())
     assert "read sensor_msgs::Image::data" in texts["cv_bridge/cv_bridge.h"]
+
+
+CFG = """
+from dynamic_reconfigure.parameter_generator_catkin import *
+gen = ParameterGenerator()
+gen.add("gain", double_t, 1, 'A "gain"', 2, 0, max=5)
+motion = gen.add_group("motion")
+motion.add("steps", int_t, 0x2, "Steps", 3)
+gen.add("name", str_t, 0, "Name", "x")
+gen.add("on", bool_t, 0, "On", True)
+exit(gen.generate("pkg", "node", "Tuning"))
+"""
+
+
+def test_the_class_of_a_cfg_file(tmp_path):
+    (tmp_path / "package.xml").write_text("<package><name>pkg</name></package>")
+    (tmp_path / "cfg").mkdir()
+    (tmp_path / "cfg" / "Tuning.cfg").write_text(CFG)
+    file = tmp_path / "node.cpp"
+    text = roscpp.generate_headers(["pkg/TuningConfig.h"], file)["pkg/TuningConfig.h"]
+    for line in ("double gain = 2.0;", "int steps = 3;", 'std::string name = "x";', "bool on = true;"):
+        assert f"    {line}\n" in text
+    described = r'Parameter{"gain", "double", 1, "A \"gain\""}, &TuningConfig::gain, double(0.0), double(5.0)'
+    assert described in text
+    assert "&TuningConfig::steps, int(std::numeric_limits<int>::min())" in text
+    assert "pkg/OtherConfig.h" not in roscpp.generate_headers(["pkg/OtherConfig.h"], file)
+
+    (tmp_path / "cfg" / "Tuning.cfg").write_text(CFG.replace('"Steps", 3', '"Steps", len("x")'))
+    with pytest.raises(ModelError, match=r"Tuning\.cfg:6: default of the parameter is computed"):
+        roscpp.generate_headers(["pkg/TuningConfig.h"], file)
 
 
 @pytest.mark.parametrize("value", [True, -3, 2.5, "text", [1, 2.5, ["x"]], {"a": {"b": 1}, "c": []}])

@@ -8,11 +8,13 @@ from pathlib import Path
 
 from volery.base.errors import UsageError
 from volery.ros import messages
+from volery.ros.client_libraries.roscpp.config_headers import config_header
 from volery.ros.messages.encodings import Constant, FieldLayout, Layout, ros1_layout
 from volery.ros.messages.store import ROS1_SPELLING, define_ros1_action
 
 INCLUDE = Path(__file__).parent / "include"
 _HEADER = re.compile(r"^(\w+)/(\w+)\.h$")
+_CONFIG_HEADER = re.compile(r"^(\w+)/(\w+)Config\.h$")
 _INCLUDED = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
 _BASES = {
     "bool": "std::uint8_t", "byte": "std::int8_t", "char": "std::uint8_t", "octet": "std::uint8_t",
@@ -20,14 +22,16 @@ _BASES = {
     "int32": "std::int32_t", "uint32": "std::uint32_t", "int64": "std::int64_t", "uint64": "std::uint64_t",
     "float32": "float", "float64": "double", "string": "std::string",
 }  # fmt: skip
+NOT_OFFERED = "// volery: "
+"""Beginning of the text of a header that is not offered; the rest says so, and what to do instead."""
 _TIMES = {"builtin_interfaces/msg/Time": "ros::Time", "builtin_interfaces/msg/Duration": "ros::Duration"}
 
 
 def generate_headers(includes: Sequence[str], path: Path, present: Collection[str] = ()) -> Mapping[str, str]:
     """Return the texts of the headers that *includes* name, and of those they include, by name.
 
-    A header of ROS that is not offered becomes an ``#error``, so that the compiler does not find a real one.
-    Other names are left to the compiler.
+    A header of ROS that is not offered has a comment that says so, so that the compiler does not find a real
+    one, and code that includes it in vain compiles. Other names are left to the compiler.
 
     Args:
         includes: Names in the ``#include`` lines of a file.
@@ -37,6 +41,8 @@ def generate_headers(includes: Sequence[str], path: Path, present: Collection[st
     Raises:
         ModelError: The file of an interface is not a valid definition.
     """
+    if any(_CONFIG_HEADER.match(name) for name in includes):
+        includes = [*includes, "dynamic_reconfigure/config_tools.h"]
     includes = _with_ours(includes)
     named = [found for name in includes if (found := _HEADER.match(name))]
     messages.define_packages(path, dict.fromkeys(found[1] for found in named))
@@ -46,11 +52,15 @@ def generate_headers(includes: Sequence[str], path: Path, present: Collection[st
         _add(texts, found[1], found[2])
     for name in includes:
         package = name.partition("/")[0]
+        config = _CONFIG_HEADER.match(name)
+        if config and name not in texts and name not in present:
+            made = config_header(config[1], config[2], path)
+            texts.update({} if made is None else {name: made})
         if name in texts or name in present or package == name or (INCLUDE / name).exists():
             continue
         remedy = "no message or service of this name" if package in packages else _NOT_OFFERED.get(package)
         if remedy is not None:
-            texts[name] = f'#error "volery: <{name}> is not offered: {remedy}"\n'
+            texts[name] = f"{NOT_OFFERED}<{name}> is not offered: {remedy}\n"
     return texts
 
 
@@ -76,9 +86,14 @@ _NOT_OFFERED = {
     "tf2": "include <tf2/LinearMath/Quaternion.h>, <tf2/LinearMath/Transform.h> or <tf2/utils.h>",
     "actionlib": "include <actionlib/client/simple_action_client.h> or "
     "<actionlib/server/simple_action_server.h>",
-    "message_filters": "keep the last message of each topic, or write the component in Python",
-    "dynamic_reconfigure": "read the parameters with NodeHandle::param()",
-    "image_transport": "publish and subscribe sensor_msgs::Image with a NodeHandle",
+    "message_filters": "include <message_filters/subscriber.h>, <message_filters/synchronizer.h>, "
+    "<message_filters/time_synchronizer.h> or <message_filters/cache.h>",
+    "dynamic_reconfigure": "include <dynamic_reconfigure/server.h>",
+    "image_transport": "include <image_transport/image_transport.h>",
+    "kdl_conversions": "use the types of tf2 or Eigen",
+    "tf_conversions": "include <tf_conversions/tf_eigen.h>",
+    "eigen_conversions": "include <eigen_conversions/eigen_msg.h>",
+    "xmlrpcpp": "include <xmlrpcpp/XmlRpcValue.h>; the graph has no servers of XML-RPC",
     "cv_bridge": "read sensor_msgs::Image::data",
     "pcl_ros": "read sensor_msgs::PointCloud2::data",
     "nodelet": _OWN_PROCESS,

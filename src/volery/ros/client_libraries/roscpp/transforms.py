@@ -11,7 +11,8 @@ from volery.ros.client_libraries.abi_codec import Reader, Writer
 from volery.ros.client_libraries.roscpp.session import Session
 from volery.ros.client_libraries.tf2.tf2_ros import TF, TF_STATIC, Buffer
 from volery.ros.client_libraries.tf2.transform_tree import TransformException
-from volery.ros.graph import AS_OFFERED
+from volery.ros.graph import AS_OFFERED, Group
+from volery.ros.graph.work import Work
 from volery.ros.messages import from_cdr, to_cdr
 
 
@@ -21,9 +22,52 @@ class _Nanoseconds(NamedTuple):
     nanoseconds: Ns
 
 
+class _WatchedBuffer(Buffer):
+    """A buffer that tells of each change."""
+
+    def __init__(self, cache_time: Any) -> None:
+        super().__init__(cache_time)
+        self.watches: dict[_Watch, None] = {}
+
+    def set_transform(self, transform: Any, authority: str = "", *, static: bool = False) -> None:
+        """See ``Buffer``."""
+        super().set_transform(transform, authority, static=static)
+        for watch in list(self.watches):
+            watch.changed()
+
+
+class _Watch:
+    """Calls back in the tasks of a queue after changes of a buffer, once for changes at one time."""
+
+    def __init__(self, session: Session, buffer: _WatchedBuffer, callback: int, group: Group) -> None:
+        self._session, self._buffer, self._callback, self._group = session, buffer, callback, group
+        self._pending = False
+        buffer.watches[self] = None
+
+    def changed(self) -> None:
+        """Let the queue have the callback, if it has not got it already."""
+        if not self._pending:
+            self._pending = True
+            self._group.add(Work(self._session.kernel.now(), self._tell))
+
+    def _tell(self) -> None:
+        self._pending = False
+        if self in self._buffer.watches:
+            self._session.call_back(self._callback, b"")
+
+    def close(self) -> None:
+        """End."""
+        self._buffer.watches.pop(self, None)
+
+
 def _create(session: Session, arguments: Reader) -> int:
-    kind: Any = type("Buffer", (Buffer,), {"graph": session.graph, "kernel": session.kernel})
+    kind: Any = type("Buffer", (_WatchedBuffer,), {"graph": session.graph, "kernel": session.kernel})
     return session.keep(kind(_Nanoseconds(arguments.integer())))
+
+
+def _watch(session: Session, arguments: Reader) -> int:
+    buffer = session.find(arguments.integer(), _WatchedBuffer)
+    return session.keep(_Watch(session, buffer, arguments.integer(), session.group(arguments.integer())))
 
 
 def _buffer(session: Session, arguments: Reader) -> Buffer:
@@ -76,6 +120,7 @@ TRANSFORMS: dict[str, Callable[[Session, Reader], Any]] = {
     "tf_buffer": _create,
     "tf_listen": _listen,
     "tf_set": _set,
+    "tf_watch": _watch,
     "tf_can": _can,
     "tf_look_up": _look_up,
     "tf_clear": lambda session, arguments: _buffer(session, arguments).clear(),

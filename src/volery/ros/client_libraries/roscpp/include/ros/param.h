@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ros/names.h"
+#include "xmlrpcpp/XmlRpcValue.h"
 
 namespace ros {
 namespace detail {
@@ -30,6 +31,25 @@ void put_value(volery::Writer& out, const std::map<std::string, Value>& values) 
     for (const auto& [name, value] : values) {
         out.put(name);
         put_value(out, value);
+    }
+}
+
+inline void put_value(volery::Writer& out, const XmlRpc::XmlRpcValue& value) {
+    using XmlRpc::XmlRpcValue;
+    switch (value.getType()) {
+        case XmlRpcValue::TypeBoolean: return put_value(out, static_cast<const bool&>(value));
+        case XmlRpcValue::TypeInt: return put_value(out, static_cast<const int&>(value));
+        case XmlRpcValue::TypeDouble: return put_value(out, static_cast<const double&>(value));
+        case XmlRpcValue::TypeString: return put_value(out, static_cast<const std::string&>(value));
+        case XmlRpcValue::TypeArray:
+            out.put("l").put(value.size());
+            for (int index = 0; index < value.size(); ++index) put_value(out, value[index]);
+            return;
+        case XmlRpcValue::TypeStruct:
+            out.put("m").put(value.size());
+            for (const auto& [name, one] : value) put_value(out.put(name), one);
+            return;
+        default: throw XmlRpc::XmlRpcException("a parameter that is set has no value");
     }
 }
 
@@ -84,6 +104,31 @@ bool get_value(volery::Reader& in, std::map<std::string, Value>& values) {
         found[name] = value;
     }
     values = std::move(found);
+    return true;
+}
+
+inline bool get_value(volery::Reader& in, XmlRpc::XmlRpcValue& value) {
+    auto const kind = in.text();
+    value.clear();
+    if (kind == "b")
+        value = in.flag();
+    else if (kind == "i")
+        value = static_cast<int>(in.integer());
+    else if (kind == "d")
+        value = in.real();
+    else if (kind == "s")
+        value = in.text();
+    else if (kind == "l") {
+        auto const count = static_cast<int>(in.integer());
+        value.setSize(count);
+        for (int index = 0; index < count; ++index) get_value(in, value[index]);
+    } else if (kind == "m") {
+        value = XmlRpc::XmlRpcValue::ofMembers_();
+        for (auto left = in.integer(); left > 0; --left) {
+            auto const name = in.text();
+            get_value(in, value[name]);
+        }
+    }
     return true;
 }
 

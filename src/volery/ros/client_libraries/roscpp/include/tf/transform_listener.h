@@ -7,12 +7,12 @@ namespace tf {
 
 class Transformer {
 public:
-    explicit Transformer(bool = true, ros::Duration cache_time = ros::Duration(10.0)) : buffer_(cache_time) {}
+    explicit Transformer(bool = true, ros::Duration cache_time = ros::Duration(10.0)) : core_(cache_time) {}
     virtual ~Transformer() = default;
 
     void lookupTransform(const std::string& target, const std::string& source, const ros::Time& time,
                          StampedTransform& found) const {
-        auto const message = buffer_.lookupTransform(plain(target), plain(source), time);
+        auto const message = core_.lookupTransform(plain(target), plain(source), time);
         transformStampedMsgToTF(message, found);
         found.frame_id_ = target;
         found.child_frame_id_ = source;
@@ -20,34 +20,35 @@ public:
     void lookupTransform(const std::string& target, const ros::Time& target_time, const std::string& source,
                          const ros::Time& source_time, const std::string& fixed_frame, StampedTransform& found) const {
         auto const message =
-            buffer_.lookupTransform(plain(target), target_time, plain(source), source_time, plain(fixed_frame));
+            core_.lookupTransform(plain(target), target_time, plain(source), source_time, plain(fixed_frame));
         transformStampedMsgToTF(message, found);
     }
     bool waitForTransform(const std::string& target, const std::string& source, const ros::Time& time,
                           const ros::Duration& timeout, const ros::Duration& = ros::Duration(0.01),
                           std::string* error = nullptr) const {
-        return buffer_.canTransform(plain(target), plain(source), time, timeout, error);
+        return core_.canTransform(plain(target), plain(source), time, timeout, error);
     }
     bool waitForTransform(const std::string& target, const ros::Time& target_time, const std::string& source,
                           const ros::Time& source_time, const std::string& fixed_frame, const ros::Duration& timeout,
                           const ros::Duration& = ros::Duration(0.01), std::string* error = nullptr) const {
-        return buffer_.canTransform(plain(target), target_time, plain(source), source_time, plain(fixed_frame), timeout,
+        return core_.canTransform(plain(target), target_time, plain(source), source_time, plain(fixed_frame), timeout,
                                     error);
     }
     bool canTransform(const std::string& target, const std::string& source, const ros::Time& time,
                       std::string* error = nullptr) const {
-        return buffer_.canTransform(plain(target), plain(source), time, error);
+        return core_.canTransform(plain(target), plain(source), time, error);
     }
     bool frameExists(const std::string& frame) const {
-        return ("\n" + buffer_.allFramesAsString()).find("\nFrame " + plain(frame) + " exists") != std::string::npos;
+        return ("\n" + core_.allFramesAsString()).find("\nFrame " + plain(frame) + " exists") != std::string::npos;
     }
-    std::string allFramesAsString() const { return buffer_.allFramesAsString(); }
+    std::string allFramesAsString() const { return core_.allFramesAsString(); }
     bool setTransform(const StampedTransform& transform, const std::string& authority = "") {
         geometry_msgs::TransformStamped message;
         transformStampedTFToMsg(transform, message);
-        return buffer_.setTransform(message, authority);
+        return core_.setTransform(message, authority);
     }
-    void clear() { buffer_.clear(); }
+    void clear() { core_.clear(); }
+    tf2_ros::Buffer& buffer_() { return core_; }
 
     // The argument in another frame, at its own time.
     template <class Value>
@@ -68,7 +69,7 @@ public:
     }
     template <class Message>
     void transform_message(const std::string& target, const Message& in, Message& out) const {
-        auto const by = buffer_.lookupTransform(plain(target), plain(in.header.frame_id), in.header.stamp);
+        auto const by = core_.lookupTransform(plain(target), plain(in.header.frame_id), in.header.stamp);
         tf2::doTransform(in, out, by);
         out.header.frame_id = target;
     }
@@ -91,13 +92,13 @@ public:
 
 protected:
     static std::string plain(const std::string& frame) { return resolve("", frame); }
-    tf2_ros::Buffer buffer_;
+    tf2_ros::Buffer core_;
 };
 
 class TransformListener : public Transformer {
 public:
     explicit TransformListener(ros::Duration cache_time = ros::Duration(10.0), bool = true)
-        : Transformer(true, cache_time), listener_(buffer_) {}
+        : Transformer(true, cache_time), listener_(core_) {}
     explicit TransformListener(const ros::NodeHandle&, ros::Duration cache_time = ros::Duration(10.0), bool = true)
         : TransformListener(cache_time) {}
     bool ok() const { return ros::ok(); }
