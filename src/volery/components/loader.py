@@ -717,6 +717,9 @@ class _Import:
                 "no package of that name defines interfaces beside the file or in ROS_PACKAGE_PATH or "
                 "AMENT_PREFIX_PATH; source its workspace"
             )
+        elif name != top and self._find(top) is not None:
+            why = f"{top} has no such module; one in C or C++ must be built first"
+            raise ModuleNotFoundError(f"No module named {name!r}: {why}", name=name)
         else:
             why = (
                 "it is not beside the file, in a package of the workspace (ROS_PACKAGE_PATH, "

@@ -39,6 +39,7 @@ FREE_TURNS = 20_000
 
 _ASKING = frozenset(
     [
+        "is_alive",
         "is_shutdown",
         "ok",
         "is_set",
@@ -69,13 +70,14 @@ Place = tuple[int, int]
 def empty_turns(tree: ast.Module) -> set[Place]:
     """Return where a file does nothing but wait: loops without a body, and each ``if`` that is all of a body.
 
-    What they ask must not change anything.
+    What they ask must not change anything. Names that get what was asked, as in ``now = time.time()``, may
+    stand before the ``if``.
     """
     found = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.While) and _only_asks(node.test):
             last: ast.stmt = node
-            body = [one for one in node.body if not _is_nothing(one)]
+            body = _without_readings([one for one in node.body if not _is_nothing(one)])
             while len(body) == 1 and isinstance(body[0], ast.If) and _only_asks(body[0].test):
                 last, body = body[0], body[0].orelse
             if not body:
@@ -193,6 +195,21 @@ def _is_nothing(one: ast.stmt) -> bool:
     return isinstance(one, ast.Pass | ast.Continue) or (
         isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant)
     )
+
+
+def _without_readings(body: list[ast.stmt]) -> list[ast.stmt]:
+    """Return a body without what it begins with: names that get what was asked for."""
+    given: set[str] = set()
+    used: set[str] = set()
+    for index, one in enumerate(body):
+        target = one.targets[0] if isinstance(one, ast.Assign) else None
+        if not (isinstance(one, ast.Assign) and isinstance(target, ast.Name) and _only_asks(one.value)):
+            return body[index:]
+        given |= {target.id}
+        used |= {part.id for part in ast.walk(one.value) if isinstance(part, ast.Name)}
+        if given & used:
+            return body
+    return []
 
 
 def _only_asks(test: ast.expr) -> bool:

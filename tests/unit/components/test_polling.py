@@ -18,7 +18,7 @@ from volery.trace.events import Text
 READY = 200 * MS
 EMPTY = "while not ready: pass\n"
 FULL = "turns = 0\nwhile not ready:\n    turns += 1\n"
-BEGIN = "ready = []\ngive(ready)\nclass poll:\n    ok = staticmethod(lambda: False)\n"
+BEGIN = "ready = []\ngive(ready)\nclass poll:\n    ok = time = staticmethod(lambda: False)\n"
 
 
 @pytest.fixture
@@ -60,6 +60,7 @@ while not ready:
     for number in range(200): total += number
 tell(turns)
 """
+CLOCK = "while True:\n    now = poll.time()\n    if ready:\n        break\n"
 IF = """while True:
     if ready:
         break
@@ -70,7 +71,12 @@ IF = """while True:
 
 @pytest.mark.parametrize(
     "text",
-    [EMPTY, IF.replace("len(ready) > 1", "ready is None"), EMPTY.replace("not", "not poll.ok() and not")],
+    [
+        EMPTY,
+        CLOCK,
+        IF.replace("len(ready) > 1", "ready is None"),
+        EMPTY.replace("not", "not poll.ok() and not"),
+    ],
 )
 @pytest.mark.parametrize("counted", [False, True])
 def test_an_empty_loop_ends_soon_after_what_it_waits_for(run, text, counted):

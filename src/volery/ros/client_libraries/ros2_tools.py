@@ -18,7 +18,9 @@ from volery.base.errors import did_you_mean
 from volery.ros.client_libraries.library_base import file_of_user, library_module
 from volery.ros.messages import Workspace
 from volery.ros.messages.client_classes import RCLPY, message_of
+from volery.ros.messages.packages import define_packages
 from volery.ros.messages.packages import modules as interface_modules
+from volery.ros.messages.store import action_types, service_types, types
 from volery.ros.messages.workspace import Package, entries
 
 # -- ament_index_python
@@ -52,7 +54,7 @@ class _AmentIndex:
         if not package_name or "/" in package_name:
             raise ValueError(f"'{package_name}' is not a valid package name")
         file = file_of_user()
-        found = self._workspace.find(package_name, file)
+        found = self._workspace.installed(package_name) or self._workspace.find(package_name, file)
         if found is None:
             near = did_you_mean(package_name, self._workspace.names(file))
             paths = [str(one) for one in entries("AMENT_PREFIX_PATH")]
@@ -251,9 +253,42 @@ def _interface(kind: str, identifier: str) -> Any:
     if not package or not name:
         raise ValueError(f"Expected the full name of {kind}, got '{identifier}'")
     module = interface_modules(package, RCLPY).get(f"{package}.{kind}")
+    if module is None and define_packages(file_of_user(), [package]):
+        module = interface_modules(package, RCLPY).get(f"{package}.{kind}")
     if module is None:
         raise ModuleNotFoundError(f"No module named '{package}'")
     return getattr(module, name)
+
+
+def _interfaces(kind: str, package_names: Iterable[str] = ()) -> dict[str, list[str]]:
+    """Return the interfaces of a kind by package, of all that a file has used or volery has by default."""
+    wanted = set(package_names)
+    found: dict[str, list[str]] = {}
+    for full in _KNOWN[kind]():
+        package, _, rest = full.partition("/")
+        if (not wanted or package in wanted) and "_" not in rest:  # those are parts of actions
+            found.setdefault(package, []).append(rest if "/" in rest else f"{kind}/{rest}")
+    unknown = sorted(wanted - {name.partition("/")[0] for known in _KNOWN.values() for name in known()})
+    if unknown:
+        raise LookupError(f"Unknown package '{unknown[0]}'")
+    return found
+
+
+_KNOWN = {"msg": types, "srv": service_types, "action": action_types}
+
+
+def get_interfaces(package_names: Iterable[str] = ()) -> dict[str, list[str]]:
+    """Return the interfaces by package, such as ``msg/String``."""
+    found: dict[str, list[str]] = {}
+    for kind in _KNOWN:
+        for package, names in _interfaces(kind, package_names).items():
+            found.setdefault(package, []).extend(names)
+    return {package: sorted(names) for package, names in found.items()}
+
+
+def get_interface_packages() -> dict[str, str]:
+    """Return the packages that have interfaces; none has an installation prefix."""
+    return dict.fromkeys(get_interfaces(), "")
 
 
 def set_message_fields(
@@ -358,16 +393,23 @@ def modules() -> dict[str, ModuleType]:
         "PointCloud2": message_of("sensor_msgs/msg/PointCloud2", RCLPY),
         "PointField": message_of("sensor_msgs/msg/PointField", RCLPY),
     }
+    listed: dict[str, Any] = {
+        "get_message_interfaces": partial(_interfaces, "msg"),
+        "get_service_interfaces": partial(_interfaces, "srv"),
+        "get_action_interfaces": partial(_interfaces, "action"),
+        **_names(get_interfaces, get_interface_packages),
+    }
     written = _names(message_to_csv, message_to_ordereddict, message_to_yaml)
     point_cloud2 = library_module("sensor_msgs_py.point_cloud2", clouds)
     inside = library_module("rosidl_runtime_py.utilities", utilities)
-    top = {**written, "set_message_fields": set_message_fields, "utilities": inside}
+    top = {**written, **listed, "set_message_fields": set_message_fields, "utilities": inside}
     return {
         **_ament_modules(Workspace()),
         "sensor_msgs_py": library_module("sensor_msgs_py", {"point_cloud2": point_cloud2}),
         "sensor_msgs_py.point_cloud2": point_cloud2,
         "rosidl_runtime_py": library_module("rosidl_runtime_py", top),
         "rosidl_runtime_py.convert": library_module("rosidl_runtime_py.convert", written),
+        "rosidl_runtime_py.get_interfaces": library_module("rosidl_runtime_py.get_interfaces", listed),
         "rosidl_runtime_py.set_message": library_module(
             "rosidl_runtime_py.set_message", _names(set_message_fields)
         ),

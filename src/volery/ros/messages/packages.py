@@ -21,6 +21,7 @@ from volery.ros.messages.store import (
     action_types,
     define_all,
     define_ros1_action,
+    replace_known,
     service_types,
     types,
 )
@@ -67,11 +68,20 @@ def _action_class(full: str, library: Library) -> type:
     members = {
         "_type": full,
         **{part: message_of(f"{inner}_{part}", library) for part in ("Goal", "Result", "Feedback")},
+    }
+    parts = {
         "SendGoal": service_of(f"{full}_SendGoal", library),
         "GetResult": service_of(f"{full}_GetResult", library),
         "FeedbackMessage": message_of(f"{full}_FeedbackMessage", library),
     }
-    return type(full.rpartition("/")[2], (), members)
+    protocol = {  # as rosidl names them
+        "SendGoalService": parts["SendGoal"],
+        "GetResultService": parts["GetResult"],
+        "FeedbackMessage": parts["FeedbackMessage"],
+        "CancelGoalService": service_of("action_msgs/srv/CancelGoal", library),
+        "GoalStatusMessage": message_of("action_msgs/msg/GoalStatusArray", library),
+    }
+    return type(full.rpartition("/")[2], (), {**members, **parts, "Impl": type("Impl", (), protocol)})
 
 
 _MAKERS: dict[str, Callable[[str, Library], type]] = {
@@ -154,7 +164,8 @@ def define_packages(file: Path, packages: Iterable[str], workspace: Workspace | 
     """Define the interfaces of `packages`, used in `file`, as far as they are not known; return those found.
 
     They are searched beside the file and in `workspace`, by default what the environment names now. A package
-    that is known, as volery has a part of it, gets the types that are found there in addition.
+    that is known, as volery has a part of it, gets the types that are found there in addition, and those that
+    are defined otherwise there; see ``replace_known``.
 
     Raises ``ModelError`` at the interface's file if it is no definition. Packages that are not found are
     ignored.
@@ -173,7 +184,7 @@ def define_packages(file: Path, packages: Iterable[str], workspace: Workspace | 
             continue
         there = list(_texts(package, folder))
         if package in known:
-            there = [one for one in there if one[0] not in types_known]
+            there = [one for one in there if one[0] not in types_known or replace_known(*one)]
             if not there:
                 continue
         found.append(package)

@@ -112,6 +112,12 @@ def distribution() -> str:
     return DISTRIBUTIONS[max(known, default=min(DISTRIBUTIONS))]
 
 
+@cache
+def types_of_noetic() -> rosbags.Typestore:
+    """Return the types of ROS 1 Noetic."""
+    return rosbags.get_typestore(rosbags.Stores.ROS1_NOETIC)
+
+
 def types_of(named: str) -> rosbags.Typestore:
     """Return the types of a ROS 2 distribution, as rosbags knows them; ``ValueError`` if it does not."""
     return rosbags.get_typestore(rosbags.Stores(f"ros2_{named}"))
@@ -293,6 +299,77 @@ def define_all(texts: Mapping[str, str]) -> None:
     for name, text in texts.items():
         found.update(interface_messages(name, text))
     _register(store(), found)
+
+
+_STATEMENT = re.compile(r"^[ \t]*([\w/]+(?:<=\d+)?)(\[[^]\n]*\])?[ \t]+(\w+)", re.MULTILINE)
+_KEPT = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration", "std_msgs/msg/Header")
+"""Types whose definitions stay: their classes have arithmetic, or differ between ROS 1 and 2."""
+_OF_VEHICLES = ("geographic_msgs", "geometry_msgs", "mavros_msgs", "nav_msgs", "sensor_msgs", "std_msgs")
+"""Packages whose messages the nodes of vehicles publish: another definition must have the fields of these."""
+
+
+def replace_known(name: str, text: str) -> bool:
+    """Forget the known definition of a type if *text* states another, which can be defined then.
+
+    A definition stays if the text is that of ROS 1 Noetic, if messages of the type exist, or if the nodes of
+    vehicles fill fields that the other one lacks.
+
+    Returns:
+        Whether the known definition was forgotten.
+    """
+    known = store().fielddefs
+    stated = interface_messages(name, text)
+    if all(_outline(full, one) == _known_outline(full) for full, one in stated.items()):
+        return False
+    if any(full in _KEPT or full in _classes for full in stated):
+        return False
+    for full, one in stated.items():
+        read_as = full.replace("/srv/", "/msg/").replace("/action/", "/msg/")
+        try:
+            [(constants, fields)] = parse_messages(read_as, one).values()
+        except rosbags.TypesysError:
+            return True  # defining it says what is wrong
+        ours = [field for field in known[full][1] if field[0] != _FILLER]
+        noetic = types_of_noetic().fielddefs.get(full)
+        if noetic is not None and list(noetic[1]) == fields:
+            continue
+        lacking = {label for label, _ in ours} - {label for label, _ in fields}
+        if lacking and full.partition("/")[0] in _OF_VEHICLES:
+            return False
+        if fields != ours or sorted(map(str, constants)) != sorted(map(str, known[full][0])):
+            for part in stated:
+                known.pop(part, None)
+                store().types.pop(part, None)
+            return True
+    return False
+
+
+def _outline(full: str, text: str) -> set[str]:
+    """Return types and names that a definition states, spelled as in ROS 2."""
+    package = full.partition("/")[0]
+    found = set()
+    for kind, bounds, label in _STATEMENT.findall(text):
+        array = bounds.replace("<=", "")
+        of, _, last = kind.rpartition("/")
+        if not of and kind[0].isupper():
+            of = "std_msgs" if kind == "Header" else package
+        found.add(f"{of.removesuffix('/msg')}/{last}{array} {label}" if of else f"{kind}{array} {label}")
+    return found
+
+
+def _known_outline(full: str) -> set[str]:
+    constants, fields = store().fielddefs[full]
+    found = {f"{kind} {label}" for label, kind, _ in constants}
+    return found | {f"{_stated(what)} {label}" for label, what in fields if label != _FILLER}
+
+
+def _stated(what: Any) -> str:
+    kind, detail = what
+    if kind == rosbags.Nodetype.NAME:
+        return str(detail).replace("/msg/", "/")
+    if kind == rosbags.Nodetype.BASE:
+        return f"{detail[0]}<={detail[1]}" if detail[1] else str(detail[0])
+    return f"{_stated(detail[0])}[{detail[1] or ''}]"
 
 
 def types() -> list[str]:

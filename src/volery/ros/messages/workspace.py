@@ -87,6 +87,11 @@ class Workspace:
                 return known[name]
         return None
 
+    def installed(self, name: str) -> Package | None:
+        """Return the package *name* as a sourced workspace has installed it, or None."""
+        found = self._sourced.get(name)
+        return None if found is None or found.prefix is None else found
+
     def names(self, file: Path) -> set[str]:
         """Return the names of all packages that *file* sees."""
         return {*self._own(file), *self._sourced}

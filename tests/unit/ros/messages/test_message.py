@@ -251,3 +251,20 @@ def test_definitions_lie_in_folders_below_the_packages_own(tmp_path: Path) -> No
     program.write_text("from sorted_msgs.msg import Gain\n", encoding="utf-8")
     assert messages.define_imported(program) == ["sorted_msgs"]
     assert messages.new("sorted_msgs/Gain", p=2.0).p == 2.0
+
+
+def test_a_definition_of_the_workspace_wins_over_a_known_one_until_it_is_used(tmp_path: Path) -> None:
+    messages.define("won_msgs/msg/Plate", "float64[4] coef\nHeader header\n")
+    folder = tmp_path / "won_msgs/msg"
+    folder.mkdir(parents=True)
+    program = tmp_path / "node.py"
+    program.write_text("from won_msgs.msg import Plate\n", encoding="utf-8")
+
+    def defined(text: str) -> list[str]:
+        (folder / "Plate.msg").write_text(text, encoding="utf-8")
+        return messages.define_imported(program)
+
+    assert defined("# the same\nfloat64[4] coef  # normal\n\nstd_msgs/Header header\n") == []
+    assert defined("uint8 FLAT = 1\nfloat64[4] coef\nHeader header\nstring label\n") == ["won_msgs"]
+    assert messages.new("won_msgs/Plate", label="a").FLAT == 1
+    assert "string label" in messages.definition("won_msgs/Plate")

@@ -34,6 +34,7 @@ from volery.ros.client_libraries.rclpy.context import (
     ExternalShutdownException,
     Logger,
     LoggingSeverity,
+    NodeNameNonExistentError,
     NotInitializedException,
     NoTypeSupportImportedException,
     ShutdownException,
@@ -45,7 +46,7 @@ from volery.ros.client_libraries.rclpy.node import Node
 from volery.ros.client_libraries.rclpy.qos import QOS, graph_qos
 from volery.ros.graph import Node as GraphNode
 from volery.ros.graph import RosGraph
-from volery.ros.messages.client_classes import RCLPY, adopt, library_of
+from volery.ros.messages.client_classes import RCLPY, adopt, library_of, message_of
 
 
 def modules(
@@ -62,6 +63,8 @@ def modules(
     bound = _bound_classes(contexts)
     functions = _functions(contexts, bound)
     parts = {"impl": {}, **_submodules(bound, functions)}
+    parts["node"] |= {name: parts[part][name] for part, inside in _OF_NODE.items() for name in inside}
+    parts["node"] |= {name: message_of(f"rcl_interfaces/msg/{name}", RCLPY) for name in _MESSAGES_OF_NODE}
     top: dict[str, Any] = {
         **functions,
         "Context": Context,
@@ -106,7 +109,11 @@ def _submodules(
 ) -> dict[str, dict[str, Any]]:
     """Return the content of each submodule."""
     duration = {"Duration": ros_time.Duration, "Infinite": ros_time.Infinite}
-    node = {"Node": bound["Node"]}
+    node = {
+        "Node": bound["Node"],
+        "HIDDEN_NODE_PREFIX": "_",
+        "NodeNameNonExistentError": NodeNameNonExistentError,
+    }
     publisher, subscription = {"Publisher": entities.Publisher}, {"Subscription": entities.Subscription}
     logging = {"LoggingSeverity": LoggingSeverity, **logging_functions(bound["Logger"])}
     groups = {
@@ -209,6 +216,37 @@ def _submodules(
         "wait_for_message": {"wait_for_message": wait_for_message},
         **names.NAMES,
     }
+
+
+_OF_NODE: dict[str, tuple[str, ...]] = {
+    "client": ("Client",),
+    "clock": ("Clock", "ROSClock"),
+    "constants": ("S_TO_NS",),
+    "context": ("Context",),
+    "event_handler": ("PublisherEventCallbacks", "SubscriptionEventCallbacks"),
+    "exceptions": (
+        *("InvalidParameterTypeException", "InvalidParameterValueException", "InvalidTopicNameException"),
+        *("NotInitializedException", "ParameterAlreadyDeclaredException", "ParameterImmutableException"),
+        *("ParameterNotDeclaredException", "ParameterUninitializedException"),
+    ),
+    "executors": ("Executor",),
+    "expand_topic_name": ("expand_topic_name",),
+    "guard_condition": ("GuardCondition",),
+    "logging": ("get_logger",),
+    "publisher": ("Publisher",),
+    "qos": ("QoSProfile", "qos_profile_parameter_events", "qos_profile_services_default"),
+    "qos_overriding_options": ("QoSOverridingOptions",),
+    "service": ("Service",),
+    "subscription": ("Subscription",),
+    "timer": ("Rate", "Timer"),
+    "topic_endpoint_info": ("TopicEndpointInfo",),
+    "utilities": ("get_default_context",),
+}
+"""What ``rclpy.node`` imports from other modules, which files import from there."""
+_MESSAGES_OF_NODE = (
+    *("FloatingPointRange", "IntegerRange", "ListParametersResult", "ParameterDescriptor", "ParameterEvent"),
+    *("ParameterType", "ParameterValue", "SetParametersResult"),
+)
 
 
 def _functions(contexts: Contexts, bound: Mapping[str, Any]) -> dict[str, Callable[..., Any]]:

@@ -163,7 +163,7 @@ def _module(*functions: Callable[..., Any]) -> dict[str, dict[str, Any]]:
     return {one.__name__: {one.__name__: one} for one in functions}
 
 
-NAMES = _module(
+NAMES: dict[str, dict[str, Any]] = _module(
     expand_topic_name,
     topic_or_service_is_hidden,
     validate_full_topic_name,
@@ -173,3 +173,5 @@ NAMES = _module(
     validate_topic_name,
 )
 """Content of the modules that are named after their function: ``rclpy.validate_topic_name`` and so on."""
+NAMES["topic_or_service_is_hidden"]["HIDDEN_TOPIC_PREFIX"] = "_"
+NAMES["validate_topic_name"]["TOPIC_SEPARATOR_STRING"] = "/"

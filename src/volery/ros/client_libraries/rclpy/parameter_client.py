@@ -17,6 +17,7 @@ from volery.ros.client_libraries.rclpy.node_parameters import Parameter
 from volery.ros.client_libraries.rclpy.qos import qos_profile_parameter_events
 from volery.ros.messages import message_class, new
 from volery.ros.messages.client_classes import service_of
+from volery.ros.messages.store import distribution
 
 # -- values in text
 
@@ -103,6 +104,8 @@ _KINDS = {
     "get_parameter_types": "GetParameterTypes",
 }
 Done = Callable[[Future], Any] | None
+_READS_ITS_NODE = distribution() not in ("humble", "iron", "jazzy")
+"""Whether a client takes the parameters of its node alone from a file; before Kilted it takes all."""
 
 
 class AsyncParameterClient:
@@ -189,8 +192,9 @@ class AsyncParameterClient:
         return self.set_parameters_atomically(self._of_file(parameter_file, use_wildcard), callback)
 
     def _of_file(self, parameter_file: str, use_wildcard: bool) -> list[Any]:
-        name = self.remote_node_name if self.remote_node_name.startswith("/") else f"/{self.remote_node_name}"
-        return list(parameter_dict_from_yaml_file(parameter_file, use_wildcard, [name]).values())
+        name = f"/{self.remote_node_name.removeprefix('/')}"
+        nodes = [name] if _READS_ITS_NODE else None
+        return list(parameter_dict_from_yaml_file(parameter_file, use_wildcard, nodes).values())
 
     def on_parameter_event(
         self, callback: Callable[[Any], Any], qos_profile: Any = None, **options: Any
