@@ -259,7 +259,7 @@ def exit_status(end: SystemExit) -> int:
     """Return the exit status of a process that ends by ``sys.exit()``, as Python does."""
     if end.code is None:
         return 0
-    return end.code if isinstance(end.code, int) else 1
+    return int(end.code) if isinstance(end.code, int) else 1
 
 
 def describe(error: BaseException) -> str:

@@ -1,4 +1,4 @@
-"""``sys``, ``os``, ``signal``, ``atexit``, ``importlib`` and ``argparse`` of a script, which is a process.
+"""``sys``, ``os``, ``signal``, ``atexit``, ``importlib``, ``argparse`` and ``unittest`` of a script, a process.
 
 They are Python's own where a script cannot reach beyond itself. Its arguments, its search path, its output,
 its signals and its end are its own.
@@ -13,13 +13,15 @@ import importlib.util
 import os as real_os
 import signal as real_signal
 import sys as real_sys
+import unittest as real_unittest
 import zlib
 from collections.abc import Callable, Sequence
 from io import TextIOBase
-from types import FrameType, ModuleType
+from types import FrameType, ModuleType, SimpleNamespace
 from typing import Any, NoReturn
 
 from volery.base.errors import UsageError
+from volery.base.time import to_seconds
 from volery.components.virtual_stdlib.process_environment import make_module, record_output
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
@@ -125,6 +127,8 @@ class ProcessModules:
         """Return the module of this process, or None if it is that of the run."""
         if name in READ_ARGUMENTS and name not in self._modules:
             self._modules[name] = _private_copy(name, self.sys)
+        if name == "unittest" and name not in self._modules:
+            self._modules[name] = self._unittest()
         return self._modules.get(name)
 
     def finish(self) -> None:
@@ -132,6 +136,14 @@ class ProcessModules:
         self.over = True
         self.output.finish()
         self.errors.finish()
+
+    def _unittest(self) -> ModuleType:
+        """Return ``unittest`` whose ``main`` runs the tests of this process, in its arguments and time."""
+        runner, program = (_private_copy(f"unittest.{one}", self.sys) for one in ("runner", "main"))
+        vars(runner)["time"] = SimpleNamespace(perf_counter=lambda: to_seconds(self._kernel.now()))
+        vars(program)["runner"] = runner
+        of_program = {one: vars(program)[one] for one in ("main", "TestProgram")}
+        return _changed(real_unittest, **of_program, TextTestRunner=vars(runner)["TextTestRunner"])
 
     # -- atexit
 
@@ -243,7 +255,9 @@ def _private_copy(name: str, own_sys: ModuleType) -> ModuleType:
     """Return a copy of a module of Python that uses another ``sys``. Its code is not counted."""
 
     def import_(wanted: str, *args: Any, **kwargs: Any) -> ModuleType:
-        return own_sys if wanted == "sys" else builtins.__import__(wanted, *args, **kwargs)
+        if wanted in ("sys", "__main__"):
+            return own_sys if wanted == "sys" else own_sys.modules["__main__"]
+        return builtins.__import__(wanted, *args, **kwargs)
 
     spec = importlib.util.find_spec(name)
     loader: Any = None if spec is None else spec.loader

@@ -97,6 +97,27 @@ def test_a_script_that_fails_is_stopped_and_the_outcome_is_failed(runs, end, rea
     assert [event.who for event in events if isinstance(event, Failure)] == ["speaker"]
 
 
+TESTED = """
+import unittest, rospy
+class TestRate(unittest.TestCase):
+    def test_time(self):
+        rospy.sleep(1.5)
+        self.assertEqual(rospy.get_time() // 1, 1)
+    def test_wrong(self):
+        self.fail("as meant")
+if __name__ == "__main__":
+    rospy.init_node("tested")
+    unittest.main()
+"""
+
+
+def test_unittest_runs_the_tests_of_the_script_in_its_arguments_and_its_time(runs):
+    done, _, events = runs(tested=TESTED)
+    text = "\n".join(event.text for event in events if isinstance(event, Text))
+    assert "Ran 2 tests in 1.50" in text and "as meant" in text
+    assert done.record.outcome.reason == "tested: ended with exit status 1 (tested.py:11)"
+
+
 def test_a_failed_run_in_which_nothing_is_left_ends_at_once(runs):
     done, _, _ = runs(speaker=SPEAKER + "raise ValueError('lost')")
     assert done.record.outcome.status == "failed"
