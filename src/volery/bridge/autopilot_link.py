@@ -224,6 +224,11 @@ class AutopilotLink:
         with self.kernel.guard:
             self._link.send(Frame(name, fields, self._system, self._component))
 
+    def pass_on(self, frame: Frame) -> None:
+        """Send a message of another sender."""
+        with self.kernel.guard:
+            self._link.send(frame)
+
     def send_to_autopilot(self, name: str, fields: dict[str, Any]) -> None:
         """Send a message to the autopilot."""
         system, component = self.target

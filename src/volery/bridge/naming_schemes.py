@@ -12,7 +12,7 @@ no field for it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -58,6 +58,7 @@ from volery.bridge.payload_services import (
     LogServices,
     mount_services,
     payload_subscriptions,
+    raw_subscription,
 )
 from volery.bridge.plan_services import (
     GEOFENCE,
@@ -110,10 +111,16 @@ def mavros_interface(context: InterfaceContext) -> NodeInterface:
         status.disconnected(stamp)
         diagnostics.disconnected(stamp)
 
+    def due(now: Ns) -> Callable[[], object] | None:
+        jobs = (one.due(now) for one in lists)
+        return next((job for job in jobs if job is not None), None)
+
+    raw = () if context.parameter_services else (raw_subscription(context.node.namespace),)
     return NodeInterface(
         topics=MAVROS_TOPICS,
         translators=merge_translators(*(part.translators() for part in parts)),
-        subscriptions=(*subscriptions(context.geoid), *payload_subscriptions()),
+        subscriptions=(*subscriptions(context.geoid), *payload_subscriptions(), *raw),
+        due=due,
         services={
             **commands.services(),
             **parameters.services(),

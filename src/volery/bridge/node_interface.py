@@ -10,6 +10,7 @@ from volery.base.frames import LocalFrame
 from volery.base.geoid import EGM96, Geoid
 from volery.base.time import Ns, S
 from volery.bridge.autopilot_link import AutopilotLink
+from volery.links.frame import Frame
 from volery.ros.graph import DEFAULT, TRANSIENT_LOCAL, Handler, Node, QoS
 from volery.ros.messages import message_class
 
@@ -46,14 +47,16 @@ class Subscription(NamedTuple):
 
     name: str
     type: str
-    translate: Callable[[Any, Ns], OutgoingMessage | list[OutgoingMessage]]
+    translate: Callable[[Any, Ns], OutgoingMessage | list[OutgoingMessage] | Frame]
+    """A ``Frame`` is sent as it is."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NodeInterface:
     """All topics, translators, subscriptions and services of a vehicle node.
 
-    ``disconnected`` publishes that the autopilot has stopped sending.
+    ``disconnected`` publishes that the autopilot has stopped sending. ``due`` is asked in each cycle and
+    returns what is to be done beside the loop.
     """
 
     topics: Sequence[Topic]
@@ -61,6 +64,7 @@ class NodeInterface:
     subscriptions: Sequence[Subscription]
     services: Mapping[str, Service]
     disconnected: Callable[[Ns], None]
+    due: Callable[[Ns], Callable[[], object] | None] = lambda now: None
 
 
 @dataclass(frozen=True)

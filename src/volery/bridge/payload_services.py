@@ -1,4 +1,4 @@
-"""MAVROS's topics and services for a gimbal, for logs on board and for RTK corrections.
+"""MAVROS's topics and services for a gimbal, for logs on board, for RTK corrections and for whole messages.
 
 As in MAVROS, the log services only send the request; entries and data arrive as messages on topics.
 """
@@ -23,6 +23,8 @@ from volery.bridge.node_interface import (
     Translator,
     stamped,
 )
+from volery.links.frame import Frame
+from volery.links.mavlink_codec import STX_V1, MavlinkParser
 from volery.links.mavlink_messages import constant
 from volery.ros.graph import QoS
 from volery.ros.messages import message_class, new, service
@@ -117,6 +119,27 @@ def payload_subscriptions() -> tuple[Subscription, ...]:
         Subscription("mount_control/command", "mavros_msgs/msg/MountControl", mount_control),
         Subscription("gps_rtk/send_rtcm", "mavros_msgs/msg/RTCM", partial(corrections, count())),
     )
+
+
+def raw_subscription(namespace: str) -> Subscription:
+    """Return the subscription for whole MAVLink messages; MAVROS 1 has it beside its node's namespace."""
+    above = namespace.rstrip("/").rpartition("/")[0] if namespace.endswith("/mavros") else namespace
+    return Subscription(f"{above.rstrip('/')}/mavlink/to", "mavros_msgs/msg/Mavlink", whole_message)
+
+
+def whole_message(message: Any, now: Ns) -> Frame:
+    """Return the frame of a ``mavros_msgs/Mavlink``; ``UsageError`` if it is none."""
+    version_1 = message.magic == STX_V1
+    flags = () if version_1 else (message.incompat_flags, message.compat_flags)
+    start = message.magic, message.len, *flags, message.seq, message.sysid, message.compid
+    number = int(message.msgid).to_bytes(1 if version_1 else 3, "little")
+    words = [int(one).to_bytes(8, "little") for one in message.payload64]
+    payload = b"".join(words)[: message.len]
+    whole = bytes(start) + number + payload + int(message.checksum).to_bytes(2, "little")
+    frames = MavlinkParser().feed(whole + bytes(message.signature))
+    if not frames:
+        raise UsageError(f"MAVLink message {message.msgid} is unknown or its checksum is wrong")
+    return frames[0]
 
 
 def mount_control(message: Any, now: Ns) -> OutgoingMessage:

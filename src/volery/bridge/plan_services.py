@@ -7,10 +7,11 @@ published.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, NamedTuple
 
-from volery.base.time import MS, Ns
+from volery.base.time import MS, Ns, S
 from volery.bridge.autopilot_link import ARDUPILOT_ID, FrameSubscription
 from volery.bridge.node_interface import (
     LATCHED_STATE,
@@ -27,6 +28,8 @@ from volery.ros.messages import new, service
 
 ANSWERED_WITHIN: Ns = 1500 * MS
 ATTEMPTS = 3
+READ_AFTER: Ns = 15 * S
+"""When MAVROS reads the lists, after it has connected."""
 REPORTS = 5
 """Reports of the current item that may still state the one before."""
 ACCEPTED = 0
@@ -48,7 +51,7 @@ RALLY_POINTS = PlanList(2, "rallypoint", ("rallypoint/waypoints", "rallypoint/ra
 
 PLAN_TOPICS = (
     *(
-        Topic(topic, _LIST, LATCHED_STATE)
+        Topic(topic, _LIST, LATCHED_STATE, on_demand=True)
         for plan in (MISSION, GEOFENCE, RALLY_POINTS)
         for topic in plan.topics
     ),
@@ -92,7 +95,8 @@ def to_waypoint(item: dict[str, Any]) -> Any:
 class PlanServices:
     """Handlers of ``push``, ``pull`` and ``clear`` of one list.
 
-    The list is published after each ``pull``, ``push`` and ``clear``.
+    The list is published after each ``pull``, ``push`` and ``clear``. It is read by itself once the autopilot
+    has been connected for a while, if its topic has a subscription.
 
     Args:
         context: The interface.
@@ -101,7 +105,11 @@ class PlanServices:
 
     def __init__(self, context: InterfaceContext, plan: PlanList) -> None:
         self._link, self._publish, self._warn = context.link, context.publish, context.warn
+        self._wanted = context.wanted
         self._plan = plan
+        self._read_at: Ns | None = None
+        self._known = False
+        """Whether the list on board is known, or a request about it is under way."""
         self._of = {"mission_type": plan.kind}
         self.waypoints: list[Any] = []
         self.current = 0
@@ -113,6 +121,16 @@ class PlanServices:
             f"{self._plan.name}/pull": ("mavros_msgs/srv/WaypointPull", self.pull),
             f"{self._plan.name}/clear": ("mavros_msgs/srv/WaypointClear", self.clear),
         }
+
+    def due(self, now: Ns) -> Callable[[], object] | None:
+        """Return what reads the list, once it is time and somebody listens."""
+        if self._known or not self._link.known:
+            return None
+        self._read_at = now + READ_AFTER if self._read_at is None else self._read_at
+        if now < self._read_at or not any(self._wanted(topic) for topic in self._plan.topics):
+            return None
+        self._known = True
+        return partial(self.pull, None)
 
     def publish_list(self, waypoints: list[Any]) -> None:
         """Publish the list as it is on board."""
@@ -137,7 +155,7 @@ class PlanServices:
 
     def push(self, request: Any) -> Any:
         """Handle ``push`` of a whole list, or of a part from ``start_index`` on, which ArduPilot stores."""
-        response = service("mavros_msgs/srv/WaypointPush").response
+        response, self._known = service("mavros_msgs/srv/WaypointPush").response, True
         given, first = list(request.waypoints), request.start_index
         if not given:
             return response(False, 0)
@@ -182,7 +200,7 @@ class PlanServices:
 
     def pull(self, request: Any) -> Any:
         """Handle ``pull``."""
-        response = service("mavros_msgs/srv/WaypointPull").response
+        response, self._known = service("mavros_msgs/srv/WaypointPull").response, True
         with self._link.subscribe("MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_ACK") as answers:
             count = self._request(answers, "MISSION_REQUEST_LIST", self._of)
             if count is None or count.name != "MISSION_COUNT":
@@ -199,6 +217,7 @@ class PlanServices:
 
     def clear(self, request: Any) -> Any:
         """Handle ``clear``."""
+        self._known = True
         with self._link.subscribe("MISSION_ACK") as answers:
             answer = self._request(answers, "MISSION_CLEAR_ALL", self._of)
         accepted = answer is not None and answer.fields["type"] == ACCEPTED

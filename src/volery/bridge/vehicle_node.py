@@ -144,6 +144,9 @@ class VehicleNode:
         rate = None if options.period is None else node.rate(options.period)
         while not node.closed:
             self._cycle(node, interface)
+            job = interface.due(self._kernel.now())
+            if job is not None:
+                self._kernel.spawn(job, f"{context.component} (beside its loop)", helper, scope)
             if rate is not None:
                 rate.sleep()
             else:
@@ -206,6 +209,10 @@ class VehicleNode:
         """Send a set-point to the autopilot; an invalid one is dropped with a warning."""
         try:
             translated = subscription.translate(message, self._kernel.now())
+            if isinstance(translated, Frame):
+                with self._kernel:
+                    self.link.pass_on(translated)
+                return
             outgoing = translated if isinstance(translated, list) else [translated]
             with self._kernel:
                 for name, fields in outgoing:

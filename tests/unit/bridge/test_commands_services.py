@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from volery.base.time import MS
+from volery.base.time import MS, S
 from volery.bridge.plan_services import MissionServices, to_item, to_waypoint
 from volery.ros import messages
 from volery.trace.events import Text
@@ -325,6 +325,35 @@ def test_a_mission_is_pushed_pulled_and_cleared(rig: Any) -> None:
     assert shown[-1].waypoints == []
 
 
+def test_the_mission_is_read_by_itself_for_whoever_listens(rig: Any) -> None:
+    rig.answers["MISSION_REQUEST_LIST"] = lambda fields: rig.emit("MISSION_COUNT", count=0)
+    rig.heartbeat()
+    rig.run(16 * S)
+    assert "MISSION_REQUEST_LIST" not in [frame.name for frame in rig.sent]
+    shown = rig.listen("mission/waypoints", "mavros_msgs/WaypointList")
+    rig.run(S)
+    assert [message.waypoints for message in shown] == [[]]
+    assert [frame.fields["mission_type"] for frame in rig.sent if frame.name == "MISSION_REQUEST_LIST"] == [0]
+
+
+@pytest.mark.parametrize("version_1", [False, True])
+def test_a_whole_message_of_another_sender_is_passed_on(rig: Any, version_1: bool) -> None:
+    rig.connect()
+    usual, first = "fd09000005ff00000000000000000608c004032ec1", "fe0905ff0000000000000608c004034a0a"
+    data = bytes.fromhex(first if version_1 else usual)
+    payload, checksum = data[6 if version_1 else 10 : -2], int.from_bytes(data[-2:], "little")
+    words = [int.from_bytes(payload[at : at + 8], "little") for at in (0, 8)]
+    fields = {"magic": data[0], "len": 9, "seq": 5, "sysid": 255, "msgid": 0, "payload64": words}
+    rig.publish("mavlink/to", "mavros_msgs/Mavlink", **fields, checksum=checksum ^ 1)
+    rig.publish("mavlink/to", "mavros_msgs/Mavlink", **fields, checksum=checksum)
+    rig.run(100 * MS)
+    heartbeats = [frame for frame in rig.sent if frame.name == "HEARTBEAT"]
+    assert [(frame.fields["type"], frame.component) for frame in heartbeats] == [(6, 0)]
+    assert [text.text for text in rig.of_texts()] == [
+        "/drone_1/mavlink/to: message dropped: MAVLink message 0 is unknown or its checksum is wrong"
+    ]
+
+
 def test_a_mission_that_is_refused_or_not_answered(rig: Any) -> None:
     rig.connect()
     rig.answers["MISSION_COUNT"] = lambda fields: rig.emit("MISSION_ACK", type=4)
@@ -392,7 +421,7 @@ def test_the_current_waypoint(rig: Any) -> None:
 def test_the_current_waypoint_is_marked_whatever_was_pushed() -> None:
     published: list[Any] = []
     context: Any = SimpleNamespace(
-        link=None, publish=lambda topic, message: published.append(message), warn=None
+        link=None, publish=lambda topic, message: published.append(message), warn=None, wanted=None
     )
     services = MissionServices(context)
     services.publish_list([messages.new(WAYPOINT, is_current=one == 1) for one in range(3)])

@@ -1,4 +1,4 @@
-"""``sys``, ``os``, ``signal``, ``atexit``, ``importlib``, ``argparse`` and ``unittest`` of a script, a process.
+"""Modules of a script, which is a process: ``sys``, ``os``, ``signal``, ``argparse``, ``unittest`` ...
 
 They are Python's own where a script cannot reach beyond itself. Its arguments, its search path, its output,
 its signals and its end are its own.

@@ -1,13 +1,13 @@
 """The Python package ``mavros`` of MAVROS 1: its services, set-point topics and files, on the graph.
 
 Each component has a namespace of its own (``mavros.set_namespace``). Services are clients of that namespace's
-server, made when they are first used. Raw MAVLink (``mavros.mavlink``) and files on the vehicle
-(``mavros.ftp``) are not offered.
+server, made when they are first used. Files on the vehicle (``mavros.ftp``) are not offered.
 """
 
 from __future__ import annotations
 
 import csv
+import struct
 from collections.abc import Callable, Iterator
 from functools import partial
 from types import ModuleType
@@ -181,6 +181,54 @@ def _value_of(value: Any) -> float:
     return int(value.integer) if value.integer else float(value.real)
 
 
+# -- mavros.mavlink
+
+
+def convert_to_payload64(payload_bytes: Any) -> tuple[int, ...]:
+    """Return bytes as the words of ``mavros_msgs/Mavlink.payload64``, filled with zeros."""
+    data = bytes(payload_bytes)
+    count = -(-len(data) // 8)
+    return struct.unpack(f"<{count}Q", data.ljust(8 * count, b"\0"))
+
+
+def convert_to_bytes(msg: Any) -> bytearray:
+    """Return the bytes of a ``mavros_msgs/Mavlink``; raise ``ValueError`` if its payload is too short."""
+    payload = struct.pack(f"<{len(msg.payload64)}Q", *msg.payload64)
+    if len(payload) < msg.len:
+        raise ValueError("Specified message length is bigger than payload64")
+    ids = msg.seq, msg.sysid, msg.compid
+    if msg.magic == _MAVLINK_1:
+        head = struct.pack("<6B", msg.magic, msg.len, *ids, msg.msgid)
+    else:
+        number = msg.msgid.to_bytes(3, "little")
+        head = struct.pack("<7B", msg.magic, msg.len, msg.incompat_flags, msg.compat_flags, *ids) + number
+    return bytearray(head + payload[: msg.len] + struct.pack("<H", msg.checksum) + bytes(msg.signature))
+
+
+_MAVLINK_1 = 254
+
+
+def convert_to_rosmsg(rospy: Any, mavmsg: Any, stamp: Any = None) -> Any:
+    """Return a packed message of pymavlink as ``mavros_msgs/Mavlink``."""
+    data, payload = bytes(mavmsg.get_msgbuf()), bytes(mavmsg.get_payload())
+    flags = (0, 0) if data[0] == _MAVLINK_1 else (data[2], data[3])
+    header = message_of("std_msgs/msg/Header", ROSPY)(stamp=stamp or rospy.get_rostime())
+    return message_of("mavros_msgs/msg/Mavlink", ROSPY)(
+        header=header,
+        framing_status=1,
+        magic=data[0],
+        len=len(payload),
+        incompat_flags=flags[0],
+        compat_flags=flags[1],
+        seq=mavmsg.get_seq(),
+        sysid=mavmsg.get_srcSystem(),
+        compid=mavmsg.get_srcComponent(),
+        msgid=mavmsg.get_msgId(),
+        checksum=mavmsg.get_crc(),
+        payload64=convert_to_payload64(payload),
+    )
+
+
 _HEAD = "QGC WPL"
 
 
@@ -247,8 +295,15 @@ def modules(rospy: ModuleType) -> dict[str, ModuleType]:
         **{one.__name__: one for one in (of.param_get, of.param_set, of.param_get_all, of.param_set_list)},
     }
     utils = {one.__name__: one for one in (of.wait_fcu_connection, of.fault, of.print_if)}
+    raw = {
+        "convert_to_bytes": convert_to_bytes,
+        "convert_to_payload64": convert_to_payload64,
+        "convert_to_rosmsg": partial(convert_to_rosmsg, rospy),
+        "Mavlink": message_of("mavros_msgs/msg/Mavlink", ROSPY),
+    }
     parts = {
         "command": library_module("mavros.command", of.proxies("command")),
+        "mavlink": library_module("mavros.mavlink", raw),
         "mission": library_module("mavros.mission", {**of.proxies("mission"), **missions}),
         "param": library_module("mavros.param", params),
         "setpoint": library_module("mavros.setpoint", setpoints),

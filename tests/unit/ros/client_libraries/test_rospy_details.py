@@ -5,6 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
+from pymavlink.dialects.v20 import common
+
 from volery.base.time import S
 from volery.ros import messages
 from volery.trace.events import Text
@@ -282,6 +285,23 @@ except IOError as error:
         2.5,
         True,
     ]
+
+
+@pytest.mark.parametrize("version_1", [False, True])
+def test_mavlink_of_the_package_mavros(stage: Any, version_1: bool) -> None:
+    stage.modules["packed"] = packed = common.MAVLink_statustext_message(6, b"all is well")
+    data = bytes(packed.pack(common.MAVLink("", 255, 1), force_mavlink1=version_1))
+    stage.component(
+        "node",
+        """
+import packed
+from mavros import mavlink
+rospy.init_node("node")
+message = mavlink.convert_to_rosmsg(packed)
+out((message.magic, message.sysid, message.msgid, bytes(mavlink.convert_to_bytes(message))))
+""",
+    )
+    assert stage.run() == [(data[0], 255, 253, data)]
 
 
 def test_headers_of_connections(stage: Any) -> None:
