@@ -111,7 +111,7 @@ def mavros_interface(context: InterfaceContext) -> NodeInterface:
         status.disconnected(stamp)
         diagnostics.disconnected(stamp)
 
-    def due(now: Ns) -> Callable[[], object] | None:
+    def due(now: Ns) -> Callable[[], None] | None:
         jobs = (one.due(now) for one in lists)
         return next((job for job in jobs if job is not None), None)
 

@@ -64,7 +64,7 @@ class NodeInterface:
     subscriptions: Sequence[Subscription]
     services: Mapping[str, Service]
     disconnected: Callable[[Ns], None]
-    due: Callable[[Ns], Callable[[], object] | None] = lambda now: None
+    due: Callable[[Ns], Callable[[], None] | None] = lambda now: None
 
 
 @dataclass(frozen=True)

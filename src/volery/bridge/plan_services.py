@@ -8,7 +8,6 @@ published.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any, NamedTuple
 
 from volery.base.time import MS, Ns, S
@@ -122,7 +121,7 @@ class PlanServices:
             f"{self._plan.name}/clear": ("mavros_msgs/srv/WaypointClear", self.clear),
         }
 
-    def due(self, now: Ns) -> Callable[[], object] | None:
+    def due(self, now: Ns) -> Callable[[], None] | None:
         """Return what reads the list, once it is time and somebody listens."""
         if self._known or not self._link.known:
             return None
@@ -130,7 +129,10 @@ class PlanServices:
         if now < self._read_at or not any(self._wanted(topic) for topic in self._plan.topics):
             return None
         self._known = True
-        return partial(self.pull, None)
+        return self._read
+
+    def _read(self) -> None:
+        self.pull(None)
 
     def publish_list(self, waypoints: list[Any]) -> None:
         """Publish the list as it is on board."""
