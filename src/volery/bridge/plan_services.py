@@ -122,7 +122,7 @@ class PlanServices:
         }
 
     def due(self, now: Ns) -> Callable[[], None] | None:
-        """Return what reads the list, once it is time and somebody listens."""
+        """Return what reads the list, once it is time and its topic has a subscription."""
         if self._known or not self._link.known:
             return None
         self._read_at = now + READ_AFTER if self._read_at is None else self._read_at
