@@ -160,6 +160,7 @@ class Bridge:
             vehicle=0 if self._interpreted else int(address.number("system", 0)),
             geoid=parse_geoid(wanted.geoid),
             control=wanted.control,
+            best_effort=wanted.graph == "ros2",
             parameter_services=wanted.graph == "ros2",
         )
         return VehicleNode(graph, self._link, self.namespace, options)

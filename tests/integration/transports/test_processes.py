@@ -72,6 +72,21 @@ class Speaker:
         volery.log(f"slept until {volery.now():.0f}")
         print("I have spoken", flush=True)
 """
+WAITER = """
+import rospy
+from std_msgs.msg import String
+from std_srvs.srv import Empty
+rospy.init_node("waiter")
+words = rospy.Publisher("words", String, queue_size=5)
+rospy.Subscriber("words", String, print)
+rospy.Subscriber("wordz", String, print)
+rospy.Service("reset", Empty, print)
+try:
+    rospy.wait_for_service("resett", 1.5)
+except rospy.ROSException:
+    words.publish("none")
+rospy.spin()
+"""
 ECHOER = """
 import os
 from words import Words
@@ -169,8 +184,18 @@ def on_ros1(
 
 
 def test_what_a_component_raises_reaches_its_caller_in_another_process(roscore: Roscore, pair: Path) -> None:
+    (pair / "waiter.py").write_text(WAITER)
+    model = pair / "model.yaml"
+    waiter = "  Waiter: {language: rospy, path: waiter.py, active: true}\n"
+    waits = MODEL.replace("application:", f"{waiter}application:\n  waiter: {{is: Waiter}}")
+    model.write_text(waits.replace("echoer: pc}", "echoer: pc, waiter: pc}"))
     done, said = on_ros1(roscore, pair, "--set", "components.Speaker.parameters.ask=fall")
     assert done.returncode == 0, done.stderr
+    unserved = json.loads((pair.parent / "out" / "run.json").read_text())["unserved"]
+    assert [(one["kind"], one["name"], one["who"], one["hint"]) for one in unserved] == [
+        ("service", "/resett", "/waiter", "did you mean /reset?"),
+        ("subscription", "/wordz", "/waiter", "did you mean /words?"),
+    ]
     assert said[0] == "Words(text='HELLO', times=(1, 2))"
     assert said[1] == "echoer: fall raised ValueError: no voice (echoer.py:10)"
     assert said[2] == "slept until 1"

@@ -62,6 +62,11 @@ class Want:
     met: bool = False
     reason: str = ""
 
+    def note(self, met: bool) -> bool:
+        """Note whether a node serves it now, and return that."""
+        self.met = self.met or met
+        return met
+
 
 @dataclass(slots=True)
 class Wants:
@@ -123,7 +128,7 @@ def unserved(wants: Wants, around: Surroundings, now: Ns) -> list[Unserved]:
 
 def _is_met(want: Want, wants: Wants) -> bool:
     if want.kind == SERVICE:
-        return want.name in wants.served
+        return want.met or want.name in wants.served
     return want.met or (want.kind in (PUBLISHED, SUBSCRIBED) and want.name in NEED_NOBODY)
 
 
@@ -150,6 +155,10 @@ def _action_of(want: Want) -> tuple[str, str] | None:
 
 def _near_miss(kind: str, name: str, type_name: str, wants: Wants, around: Surroundings) -> str:
     """Return what is there instead and what to do, or an empty string."""
+    other = PUBLISHED if kind == SUBSCRIBED else SUBSCRIBED
+    for want in wants.entries.values():
+        if (want.kind, want.name) == (other, name) and kind in (PUBLISHED, SUBSCRIBED):
+            return f"{want.node} {'publishes' if kind == SUBSCRIBED else 'takes'} it with another QoS or type"
     for prefix, whose in _DDS_NAMES.items():
         if prefix in name and around.vehicles:
             listed = [

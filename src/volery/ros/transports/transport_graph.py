@@ -33,10 +33,11 @@ from volery.ros.graph.interface import (
     free,
     no_route,
 )
+from volery.ros.graph.unserved import PUBLISHED, SUBSCRIBED, Surroundings, unserved
 from volery.ros.messages import new, to_cdr
 from volery.ros.transports.client_library import ClientLibrary, LibraryNode, ReceivedMessage, run_in_thread
 from volery.ros.transports.transport_node import TransportNode
-from volery.trace.events import Text
+from volery.trace.events import Text, Unserved
 
 if TYPE_CHECKING:
 
@@ -135,6 +136,23 @@ class TransportGraph:
         self._library = library
         self._nodes: dict[str, TransportNode] = {}
         self._numbers = 0
+
+    def notice(self) -> None:
+        """Note for ``unserved`` which topics of this process have another side now, else what is there."""
+        for node in self._nodes.values():
+            node.notice()
+        wants, now = self._graph.wants, self.kernel.now()
+        if all(one.met for one in wants.entries.values() if one.node in self._nodes):
+            return
+        for topic in self.topics():
+            for kind, nodes in ((PUBLISHED, topic.publishers), (SUBSCRIBED, topic.subscribers)):
+                for node_name in nodes:
+                    wants.of(kind, topic.name, topic.type, ("", node_name), now)
+        wants.served.update((one.name, one.type) for one in self.services())
+
+    def unserved(self, around: Surroundings) -> list[Unserved]:
+        """Return what components of this process have offered or asked for and no node took or served."""
+        return unserved(self._graph.wants, around, self.kernel.now())
 
     @property
     def epoch(self) -> Ns:

@@ -31,6 +31,7 @@ from volery.ros.graph.interface import (
     QoS,
     full_node_name,
 )
+from volery.ros.graph.unserved import PUBLISHED, SERVICE, SUBSCRIBED
 from volery.ros.graph.work import Work
 from volery.ros.messages import Message, ServiceType, message_class, service
 from volery.ros.messages.encodings import copied_to_cdr
@@ -68,6 +69,12 @@ class TransportPublisher:
         self._publisher = publisher
         self._recorded = node.graph.records(topic)
         self._open = True
+        self._want = node.want(PUBLISHED, self.topic, self.type)
+
+    def notice(self) -> None:
+        """Note whether a node takes the topic."""
+        if not self._want.met and self._open:
+            self._want.met = self._publisher.connected() > 0
 
     def publish(self, message: Any) -> None:
         """Send a copy of `message` as it is now."""
@@ -83,6 +90,8 @@ class TransportPublisher:
             if self._recorded:
                 kernel.record(Published(kernel.now(), self.topic, self.type, node.name, data))
             self._publisher.send(data)
+            if not self._want.met:
+                self._want.count += 1
 
     def subscribers(self) -> int:
         """Return the number of subscriptions it is connected to."""
@@ -123,6 +132,12 @@ class TransportSubscription:
         self._sender = "", False
         self._works = 0  # callbacks in the group, one for each queued message that `_admit` has seen
         self._open = True
+        self._want = node.want(SUBSCRIBED, self.topic, self.type)
+
+    def notice(self) -> None:
+        """Note whether a node gives the topic."""
+        if not self._want.met and self._open:
+            self._want.met = self.subscription.connected() > 0
 
     def connect(self, subscription: LibrarySubscription, qos: QoS) -> None:
         """Set the client library's subscription and the depth of the queue."""
@@ -147,6 +162,7 @@ class TransportSubscription:
         now = node.kernel.now()
         with self._guard:
             self._announced = False
+            self._want.met = True
             fresh = list(self._queue)[self._works :]
             self._works += len(fresh)
         for received in fresh:
@@ -280,17 +296,25 @@ class TransportClient:
             answer, problem = outcome[0]
             component, end = self._node.id.component, "ServiceError" if problem else "ok"
             kernel.record(Call(start, kernel.now(), component, "", self.name, end))
+            want = self._node.want(SERVICE, self.name, self.type)
+            want.met = want.met or not problem
         if problem:
+            if not want.met and not self.ready():
+                want.count += 1
             raise ServiceError(self.name, problem)
         return answer
 
     def wait(self, within: Ns | None = None) -> bool:
         """Block until a node serves it; return False if `within` ns have passed first."""
-        return poll_in_thread(self._node.kernel, f"service {self.name}", self._client.ready, within)
+        want = self._node.want(SERVICE, self.name, self.type)
+        return want.note(
+            poll_in_thread(self._node.kernel, f"service {self.name}", self._client.ready, within)
+        )
 
     def ready(self) -> bool:
         """Return whether a node serves it now."""
-        return run_in_thread(self._node.kernel, f"service {self.name}", self._client.ready)
+        want = self._node.want(SERVICE, self.name, self.type)
+        return want.note(run_in_thread(self._node.kernel, f"service {self.name}", self._client.ready))
 
     def close(self) -> None:
         """Close the client library's client."""
@@ -342,6 +366,12 @@ class TransportNode(LocalNode):
         """Set the node of the client library, which has joined the graph."""
         self.library = library
         self._graph.changed.notify()
+
+    def notice(self) -> None:
+        """Note which of its topics have another side now."""
+        for part in self._parts:
+            if isinstance(part, (TransportPublisher, TransportSubscription)):
+                part.notice()
 
     def close_with_node(self, close: Callable[[], None]) -> None:
         """Call `close` when the node is closed."""
@@ -402,9 +432,9 @@ class TransportNode(LocalNode):
     def wait_for_service(self, name: str, within: Ns | None = None) -> bool:
         """Block until a node serves `name`; return False if `within` ns have passed first."""
         full = self.resolve(name)
-        return poll_in_thread(
-            self._graph.kernel, f"service {full}", partial(self.library.has_service, full), within
-        )
+        want = self._node.want(SERVICE, full, "")
+        ready = partial(self.library.has_service, full)
+        return want.note(poll_in_thread(self._graph.kernel, f"service {full}", ready, within))
 
     def get_parameter(self, name: str, default: Any = ...) -> Any:
         """Return a parameter's value."""

@@ -459,10 +459,10 @@ class Builder:
     def _serve(self, fleet: SimulatedFleet, name: str, processor: str | None) -> None:
         """Serve a vehicle in the root scope: its node outlives the components, for the landing."""
         context = ExecutionContext(
-            node_name(name), self._platform.processors[processor] if processor else None
+            node_name(name), self._platform.processors.get(processor) if processor else None
         )
         access = graph_access(self._autopilot(name), name)
-        ros2 = any(model.component.language == "rclpy" for model in self._models)
+        ros2 = any(model.component.language == "rclpy" for model in self._system.instances)
         serve_on_graph(self._graph, fleet, name, access, context, NodeNames(self._served[name], ros2))
 
 

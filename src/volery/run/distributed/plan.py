@@ -14,7 +14,9 @@ from volery.model.components import RUNNING_LANGUAGES
 from volery.model.instances import Instance
 from volery.model.system import Bound, System
 from volery.ros.graph.interface import full_node_name
-from volery.run.assembly.computers import Platform
+from volery.run.assembly.computers import Platform, commanded_by
+from volery.run.assembly.vehicle_nodes import names_of
+from volery.vehicles.driver import drivers
 
 if TYPE_CHECKING:
     from volery.kernel.api import Kernel
@@ -74,10 +76,6 @@ def without_computers(system: System) -> tuple[System, tuple[str, ...]]:
         system,
         processors=(),
         networks=(),
-        environment=replace(
-            system.environment,
-            vehicles=tuple(replace(one, processor=None) for one in system.environment.vehicles),
-        ),
         requirements=tuple(one for one in system.requirements if one.name not in left_out),
     )
     return made, left_out
@@ -93,9 +91,26 @@ def without_truth(system: System) -> tuple[System, tuple[str, ...]]:
     return replace(system, requirements=kept), left_out
 
 
+def vehicles_on_graph(system: System) -> tuple[dict[str, str], list[str]]:
+    """Return whose names the nodes of vehicles have on a real graph, by vehicle; and those without a node."""
+    commanded = {name for model in system.instances for name in commanded_by(model)}
+    found = {}
+    for vehicle in system.vehicles:
+        by_port = vehicle.name in commanded
+        if by_port or vehicle.processor is not None:
+            factory = drivers.load(vehicle.autopilot)
+            found[vehicle.name] = names_of(vehicle, factory.codec if factory.on_link else None, by_port)
+    return found, [one.name for one in system.vehicles if one.name not in found]
+
+
 def unallocated(system: System) -> System:
-    """Return *system* with no component on a processor, as it is accounted for."""
-    return replace(system, instances=tuple(replace(one, processor=None) for one in system.instances))
+    """Return *system* with no component or vehicle on a processor, as it is accounted for."""
+    vehicles = tuple(replace(one, processor=None) for one in system.environment.vehicles)
+    return replace(
+        system,
+        instances=tuple(replace(one, processor=None) for one in system.instances),
+        environment=replace(system.environment, vehicles=vehicles),
+    )
 
 
 class HostPlatform(Platform):

@@ -18,9 +18,12 @@ from types import ModuleType
 from volery.base.errors import VoleryError
 from volery.base.position import Position
 from volery.base.process import outlive_output
+from volery.base.time import Ns, S
 from volery.components.loader import Loader
+from volery.kernel.task import ExecutionContext
 from volery.kernel.wall import FollowingKernel, WallKernel
 from volery.requirements.record import Status
+from volery.ros.graph.unserved import Surroundings
 from volery.run.assembly.component_builder import Builder, BuiltComponents, ProcessPart
 from volery.run.assembly.ros_graphs import open_graph
 from volery.run.distributed import pipe, plan
@@ -32,6 +35,9 @@ from volery.trace.events import Activation, Charge, Event
 
 UNREPORTED = (Activation, Charge)
 """Events about computing. It takes the time of this machine, not that of the model's processors."""
+
+NOTICE: Ns = S
+"""Time between two looks at who takes and gives the topics."""
 
 ORPHAN_S = 10.0
 """Wall seconds between the loss of the run's process and the exit."""
@@ -96,13 +102,29 @@ class Worker:
     def live(self, built: BuiltComponents) -> None:
         """Run the component to its end."""
         threading.Thread(target=self._listen, name="run", daemon=True).start()
-        built.start()
+        self._kernel.spawn(self._notice, "notice", ExecutionContext(plan.NODE))
+        try:
+            built.start()
+        except VoleryError as error:
+            self._ending.failed(self._model.name, error)
         self._pass_time()
 
     def _pass_time(self) -> None:
         self._kernel.call_at(FOREVER, lambda: None)  # keeps a passive component running until Stop
         self._ending.pass_time()
+        self._report_unserved()
         self.graph.close()
+
+    def _notice(self) -> None:
+        while True:
+            self._kernel.sleep_until(self._kernel.now() + NOTICE)
+            self.graph.notice()
+
+    def _report_unserved(self) -> None:
+        names = (self._model.name, plan.node_label(self._model))
+        found = self.graph.unserved(Surroundings(names, *plan.vehicles_on_graph(self._system)))
+        for one in found:
+            self._record(one)
 
     def _truth_source(self) -> Callable[[str], Callable[[], Position]] | None:
         return self._truth
