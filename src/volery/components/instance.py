@@ -34,6 +34,9 @@ class Joinable(Protocol):
     def join(self) -> None:
         """Wait until it has ended."""
 
+    def is_alive(self) -> bool:
+        """Return whether it has not ended."""
+
 
 ReadSteps = Callable[[], int]
 """Returns the steps of counted code since the last call."""
@@ -201,12 +204,17 @@ class Instance:
             body()
         except SystemExit:
             pass
-        except VoleryError as error:
+        except Exception as error:
+            self.report_thread(error, f"thread {name}")
+
+    def report_thread(self, error: Exception, doing: str) -> None:
+        """Record and report what ended one flow of control in ``doing``, while others go on."""
+        if isinstance(error, VoleryError):
             with self.kernel as kernel:
                 kernel.record(Failure(kernel.now(), self.name, str(error)))
-            self.on_thread_failure(self.name, error)
-        except Exception as error:
-            self.on_thread_failure(self.name, self.component_error(error, f"thread {name}"))
+        else:
+            error = self.component_error(error, doing)
+        self.on_thread_failure(self.name, error)
 
     def report_exit(self, status: int, end: SystemExit | None = None) -> None:
         """Record and report that the component has ended with an exit status that is not 0."""

@@ -538,8 +538,16 @@ class ScriptSpace(Space):
             exec(self.loader.compile(self._source, module), module.__dict__)
             if function:
                 raise SystemExit(getattr(module, function)())
-        except (Exception, SystemExit):
+        except SystemExit:
             self._finish()
+            raise
+        except Exception as error:
+            waits = any(thread.is_alive() for thread in self._instance.threads)
+            if waits:  # Python, too, shows what was raised before it waits for threads
+                self._instance.report_thread(error, "run")
+            self._finish()
+            if waits:
+                raise SystemExit(1) from error
             raise
         self._finish()
 

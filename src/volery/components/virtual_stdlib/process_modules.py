@@ -10,6 +10,7 @@ import atexit as real_atexit
 import builtins
 import importlib as real_importlib
 import importlib.util
+import inspect as real_inspect
 import os as real_os
 import signal as real_signal
 import sys as real_sys
@@ -98,6 +99,7 @@ class ProcessModules:
         self._pid = 10_000 + zlib.crc32(name.encode()) % 20_000
         self._at_end = at_end
         self._leave = leave
+        self._import_module = import_module
         self._exits: list[tuple[Callable[..., object], tuple[Any, ...], dict[str, Any]]] = []
         self._handlers: dict[int, Any] = {}
         self.over = False  # no signal reaches it any more
@@ -120,6 +122,7 @@ class ProcessModules:
             "signal": self._signal(),
             "atexit": _changed(real_atexit, register=self._register, unregister=self._unregister),
             "importlib": _changed(real_importlib, import_module=import_module),
+            "inspect": _changed(real_inspect, getmodule=self._module_of),
             **below,
         }
 
@@ -162,6 +165,15 @@ class ProcessModules:
             function(*args, **kwargs)
 
     # -- os
+
+    def _module_of(self, object: Any, _filename: str | None = None) -> ModuleType | None:  # noqa: A002 - Python's
+        """Return the module that defines an object: of a message class the package's ``msg``."""
+        name = getattr(object, "__module__", None) or ""
+        above = name.rpartition(".")[0]
+        if above.rpartition(".")[2] in ("msg", "srv", "action"):
+            return self._import_module(above)
+        found: ModuleType | None = self.sys.modules.get(name) or real_inspect.getmodule(object, _filename)
+        return found
 
     def _os(self) -> ModuleType:
         environment = dict(real_os.environ)

@@ -75,8 +75,14 @@ def service_of(full: str, library: Library = "") -> type:
     else:
         members |= {"Request": request, "Response": response}
     if library == RCLPY:
-        members["__init__"] = _no_instance
+        members |= {"__init__": _no_instance, "__module__": generated_module(full)}
     return type(label, (), members)
+
+
+def generated_module(full: str) -> str:
+    """Return the module that rosidl generates for a type: ``std_msgs.msg._string``."""
+    package, kind, label = full.split("/")
+    return f"{package}.{kind}." + "".join(f"_{one.lower()}" if one.isupper() else one for one in label)
 
 
 def _no_instance(self: Any) -> None:
@@ -699,7 +705,8 @@ def _c_number(base: str, value: Any, message: Any, path: str) -> Any:
     """Return what rclpy's generated code in C sends for a value of another type.
 
     It reads a ``float`` from the object's memory without looking at its type (an int of Python 3.11 has its
-    number of digits there, from 3.12 on a tag), takes nothing but ``True`` as true, and cuts whole numbers.
+    number of digits there, from 3.12 on a tag; None nothing), takes nothing but ``True`` as true, and cuts
+    whole numbers.
     """
     if base == "bool":
         sent: Any = value is True
@@ -707,7 +714,7 @@ def _c_number(base: str, value: Any, message: Any, path: str) -> Any:
     elif base.startswith("float"):
         if isinstance(value, float):
             return float(value)
-        sent = _as_c_double(value)
+        sent = 0.0 if value is None else _as_c_double(value)
         same = sent == value
     else:
         limits = np.iinfo(base if base not in BYTES and base != "char" else "uint8")
@@ -767,8 +774,8 @@ def _rclpy_class(of_graph: Any) -> Any:
         operators = ("add", "radd", "sub", "neg", "abs", "mul", "rmul", "truediv", "bool")
         members |= {f"__{one}__": None for one in operators if hasattr(of_graph, f"__{one}__")}
         members["__bool__"] = lambda _: True
-    file = "".join(f"_{one.lower()}" if one.isupper() else one for one in label)
-    made = _derived(of_graph, label, f"{package}.{kind}.{file}", RCLPY, (_RclpyMessage,), members)
+    module = generated_module(f"{package}/{kind}/{label}")
+    made = _derived(of_graph, label, module, RCLPY, (_RclpyMessage,), members)
     made.__slots__ = [*(f"_{one.name}" for one in fields), "_check_fields"]
     for constant, value in _byte_constants(of_graph):
         setattr(made, constant, value)

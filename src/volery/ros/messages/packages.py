@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import Any
 
 from volery.base.errors import Location, ModelError, UsageError, choices, did_you_mean
-from volery.ros.messages.client_classes import RCLPY, Library, message_of, service_of
+from volery.ros.messages.client_classes import RCLPY, Library, generated_module, message_of, service_of
 from volery.ros.messages.store import (
     ROS1_SPELLING,
     action_types,
@@ -49,6 +49,9 @@ class _Definitions(ModuleType):
             if self._kind == "srv" and wanted.endswith(ending) and wanted not in self._known:
                 pair = getattr(self, wanted.removesuffix(ending).removesuffix("_"))
                 return getattr(pair, f"_{ending.lower()}_class")
+        for part in ("SendGoal", "GetResult", "FeedbackMessage", "Goal", "Result", "Feedback"):
+            if self._kind == "action" and wanted.endswith(f"_{part}") and wanted not in self._known:
+                return getattr(getattr(self, wanted.removesuffix(f"_{part}")), part)
         if wanted not in self._known and self._kind == "msg" and define_ros1_action(self._package, wanted):
             self._known.append(wanted)
         if wanted not in self._known:
@@ -66,6 +69,7 @@ def _action_class(full: str, library: Library) -> type:
     """Return the class of ``from package.action import Name``."""
     inner = full.replace("/action/", "/msg/")
     members = {
+        "__module__": generated_module(full),
         "_type": full,
         **{part: message_of(f"{inner}_{part}", library) for part in ("Goal", "Result", "Feedback")},
     }

@@ -304,7 +304,10 @@ def define_all(texts: Mapping[str, str]) -> None:
 _STATEMENT = re.compile(r"^[ \t]*([\w/]+(?:<=\d+)?)(\[[^]\n]*\])?[ \t]+(\w+)", re.MULTILINE)
 _KEPT = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration", "std_msgs/msg/Header")
 """Types whose definitions stay: their classes have arithmetic, or differ between ROS 1 and 2."""
-_OF_VEHICLES = ("geographic_msgs", "geometry_msgs", "mavros_msgs", "nav_msgs", "sensor_msgs", "std_msgs")
+_OF_VEHICLES = (
+    *("geographic_msgs", "geometry_msgs", "mavros_msgs", "nav_msgs", "sensor_msgs", "std_msgs"),
+    *("dji_osdk_ros", "dji_sdk", "pprzros_msgs", "roscopter"),
+)
 """Packages whose messages the nodes of vehicles publish: another definition must have the fields of these."""
 
 

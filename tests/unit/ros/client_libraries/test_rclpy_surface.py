@@ -327,6 +327,19 @@ out(n.declare_parameter("a-b", 3).value)
     assert said(stage, text) == [2.0, 3]
 
 
+def test_what_a_launch_file_states_is_declared_if_the_node_asks_for_it(stage: Stage) -> None:
+    stage.launched["n"] = Launch(parameters={"walk": {"axis": 1}, "walk.linear-x.scale": 0.5})
+    own = """
+import rclpy
+rclpy.init()
+n = rclpy.create_node("n", automatically_declare_parameters_from_overrides=True)
+out(sorted(n._parameters))
+out(n.get_parameter("walk.linear-x.scale").value)
+"""
+    stage.script("n", own)
+    assert stage.run(S) == [["use_sim_time", "walk.axis", "walk.linear-x.scale"], 0.5]
+
+
 def test_a_node_serves_the_levels_of_its_loggers(stage: Stage) -> None:
     text = """
 from rcl_interfaces.msg import LoggerLevel

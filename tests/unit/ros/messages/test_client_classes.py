@@ -71,6 +71,7 @@ def test_rospy_numbers_are_those_of_the_encoding(name: str, given: Any, arrives:
         ("Float64", np.int64(3), 1.5e-323),
         ("Float64", np.float32(1.5), 5.28426686e-315),
         ("Float32", 3, 0.0),
+        ("Float32", None, 0.0),
         ("Bool", 1, False),
         ("UInt8", 300, 44),
         ("Int8", 200, -56),
@@ -159,7 +160,7 @@ def test_a_known_package_gets_the_other_types_of_the_workspace(tmp_path: Path) -
     folder = tmp_path / "roscopter"
     (folder / "msg").mkdir(parents=True)
     (folder / "package.xml").write_text("<package><name>roscopter</name></package>")
-    (folder / "msg" / "RC.msg").write_text("int32 other\n")  # the vehicle's node has another one
+    (folder / "msg" / "RC.msg").write_text("int32 other\n")  # the vehicle's node fills another field
     (folder / "msg" / "ValuesTest.msg").write_text("int32 latitude\n")
     file = folder / "scripts" / "node.py"
     file.parent.mkdir()

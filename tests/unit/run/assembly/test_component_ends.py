@@ -5,6 +5,7 @@ import json
 import pytest
 
 from volery.base.errors import ModelError
+from volery.base.time import S
 from volery.run.result import Options
 from volery.run.simulate import simulate
 from volery.trace.events import Failure, Operation, Text
@@ -241,3 +242,27 @@ def test_what_a_thread_raises_ends_the_thread_alone_but_the_run_has_failed(runs)
     assert done.record.outcome.status == "failed"
     assert "ZeroDivisionError" in done.record.outcome.reason
     assert "speaker leaves at 1.0" in lines
+
+
+def test_what_the_main_flow_raises_is_told_before_its_threads_are_awaited(runs):
+    raising = """
+import rospy, threading
+rospy.init_node("raising")
+threading.Thread(target=rospy.spin).start()
+raise ValueError("lost")
+"""
+    done, _, events = runs(raising=raising, listener=LISTENER)
+    assert done.record.outcome.status == "failed"
+    first = next(one for one in events if isinstance(one, Failure))
+    assert first.what == "run raised ValueError: lost (raising.py:5)"
+    assert first.at < S
+
+
+def test_the_module_of_an_action_has_its_parts(runs):
+    text = """
+import inspect
+from example_interfaces.action import Fibonacci
+print(Fibonacci.__module__, inspect.getmodule(Fibonacci).Fibonacci_SendGoal is Fibonacci.Impl.SendGoalService)
+"""
+    _, lines, _ = runs({"asking": {"language": "rclpy"}}, asking=text)
+    assert lines == ["example_interfaces.action._fibonacci True"]

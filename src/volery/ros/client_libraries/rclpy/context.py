@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from functools import partial
@@ -284,6 +284,10 @@ class Context:
                 made.set_parameter(private_name(key), value)
         self._nodes.append(made)
         return made
+
+    def launched(self, node: Node) -> Mapping[str, Any]:
+        """Return the parameters that a node was launched with."""
+        return self._launch.parameters if self._launch is not None and node is self._nodes[0] else {}
 
     def first_node(self) -> Node:
         """Return the first node, which is charged for calls that name no node."""

@@ -94,8 +94,7 @@ class Node(NodeParameters):
         self._events: Publisher | None = None
         self._declared.declare_builtin("use_sim_time", False)
         if automatically_declare_parameters_from_overrides:
-            for override in parameter_overrides or ():
-                self._declared.declare(override.name, override.value)
+            self._declared.declare_overrides(self._context.launched(self.graph_node))
         if services.get("start_parameter_services", True) and isinstance(self.contexts.graph, EmbeddedGraph):
             serve_parameters(self, self.create_service)  # on real ROS the node of the transport serves them
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from enum import IntEnum
 from math import isclose
 from typing import Any
@@ -172,6 +172,16 @@ def _double_violation(one: Parameter, limits: Any) -> str:
     return ""
 
 
+def flat(values: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the parameters of a dictionary of dictionaries by their names, with dots."""
+    for key, value in values.items():
+        name = f"{above}.{key}" if above else str(key)
+        if isinstance(value, Mapping):
+            yield from flat(value, name)
+        else:
+            yield name, value
+
+
 # -- declared parameters of a node
 
 Validator = Callable[[list[Parameter]], Any]
@@ -200,6 +210,17 @@ class DeclaredParameters:
         """Functions that accept or refuse it."""
         self.after: list[Callable[[list[Parameter]], None]] = []
         """Functions that get what has been set."""
+
+    def declare_overrides(self, launched: Mapping[str, Any]) -> None:
+        """Declare what the file overrides, and what the model or a launch file states."""
+        stated = {name: list(value) if isinstance(value, tuple) else value for name, value in flat(launched)}
+        for name, value in {**stated, **self._overrides}.items():
+            if name not in self._parameters:
+                self.declare(name, value)
+
+    def all(self) -> dict[str, Parameter]:
+        """Return the declared parameters by name."""
+        return dict(self._parameters)
 
     def declare_builtin(self, name: str, value: Any) -> None:
         """Declare a parameter that every node has."""
@@ -348,6 +369,11 @@ class NodeParameters:
     """The methods of ``Node`` that concern parameters."""
 
     _declared: DeclaredParameters
+
+    @property
+    def _parameters(self) -> dict[str, Parameter]:
+        """The parameters by name, as files read them that look behind rclpy's interface."""
+        return self._declared.all()
 
     def declare_parameter(
         self, name: str, value: Any = None, descriptor: Any = None, ignore_override: bool = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from ruamel.yaml.error import YAMLError
 from volery.base.time import from_seconds
 from volery.ros.client_libraries.rclpy.executors import CallbackGroup, Future
 from volery.ros.client_libraries.rclpy.node import Node
-from volery.ros.client_libraries.rclpy.node_parameters import Parameter
+from volery.ros.client_libraries.rclpy.node_parameters import Parameter, flat
 from volery.ros.client_libraries.rclpy.qos import qos_profile_parameter_events
 from volery.ros.messages import message_class, new
 from volery.ros.messages.client_classes import service_of
@@ -69,18 +69,9 @@ def parameter_dict_from_yaml_file(
     for name in (*(["/**"] if use_wildcard and "/**" in content else []), *wanted):
         if "ros__parameters" not in (content[name] or {}):
             raise RuntimeError(f"YAML file is not a valid ROS parameter file for node {name}")
-        for key, value in _flat(content[name]["ros__parameters"], namespace):
+        for key, value in flat(content[name]["ros__parameters"], namespace):
             found[key] = Parameter(key, value=value).to_parameter_msg()
     return found
-
-
-def _flat(values: dict[str, Any], above: str) -> Iterable[tuple[str, Any]]:
-    for key, value in values.items():
-        name = f"{above}.{key}" if above else str(key)
-        if isinstance(value, dict):
-            yield from _flat(value, name)
-        else:
-            yield name, value
 
 
 PARAMETER_TEXTS: dict[str, Any] = {
