@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from volery.base.errors import UsageError, choices, did_you_mean
+from volery.components.cpp.sources import executables
 from volery.components.loader import SourceFile
 from volery.ros.messages.workspace import Package, Workspace
 
@@ -141,14 +142,17 @@ class Executable(NamedTuple):
     function: str
 
 
-def find_executable(workspace: Workspace, package: str, name: str, near: Path) -> Executable:
-    """Return the Python program *name* of a package, as ``rosrun`` and ``ros2 run`` find it.
+def find_executable(
+    workspace: Workspace, package: str, name: str, near: Path, *, cpp: bool = False
+) -> Executable:
+    """Return the program *name* of a package, as ``rosrun`` and ``ros2 run`` find it.
 
     Args:
         workspace: The packages that there are.
         package: Name of the package.
         name: Name of the program: an entry point, an installed file, or a file in the package's folder.
         near: File that names it, from which the package is searched.
+        cpp: Search for the source of a program in C++ in place of one in Python.
 
     Raises:
         UsageError: There is no such package or no such program.
@@ -160,6 +164,12 @@ def find_executable(workspace: Workspace, package: str, name: str, near: Path) -
             f"no package {package!r}{hint} beside the model or in ROS_PACKAGE_PATH or AMENT_PREFIX_PATH; "
             "source its workspace"
         )
+    if cpp:
+        built = executables(found)
+        if name in built:
+            return Executable(built[name], "")
+        hint = f"{did_you_mean(name, built)}; there is {choices(built)}"
+        raise UsageError(f"the sources in {found.folder} have no C++ executable {name!r}{hint}")
     points = [*entry_points(found.folder), *_installed_entry_points(found)]
     for point in points:
         if point.name == name:

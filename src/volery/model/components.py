@@ -476,7 +476,9 @@ class Component:
         str, TEXT, "ROS package of its program, in place of `path`: beside the model, or sourced."
     ] = ""
     executable: Annotated[
-        str, TEXT, "Python program of the `package`, as `ros2 run` and `rosrun` name it."
+        str,
+        TEXT,
+        "Program of the `package`, as `ros2 run` and `rosrun` name it; of C++ by `CMakeLists.txt`.",
     ] = ""
     main: Annotated[
         str,

@@ -7,6 +7,7 @@ import os
 import pytest
 
 from volery.base.errors import ComponentError, ModelError, UsageError
+from volery.base.time import S
 from volery.components.cpp import compiler
 from volery.run import simulate
 from volery.trace.events import Failure, Text
@@ -72,6 +73,19 @@ def test_a_crash_names_the_component_and_leaves_a_complete_trace(run_model, monk
     texts = [one.text for one in outcome.of(Text)]
     assert texts[:3] == ["at 0", "at 1", "at 2"]
     assert (outcome.run.folder / "report.html").exists()
+
+
+def test_a_program_that_fails_starts_again(run_model):
+    model = MODEL.replace("6 s", "9 s").replace(
+        "path: crash.cpp", "path: crash.cpp\n    on_failure: {{action: restart, max: 1, delay: 500 ms}}"
+    )
+    outcome = run_model(model.format(how="status"), "crash.cpp", other=OTHER)
+    assert outcome.run.record.outcome.status == "failed"
+    assert outcome.trace.complete
+    failures = [(one.at // S, one.what) for one in outcome.of(Failure)]
+    assert failures == [(at, "crash: ended with exit status 3") for at in (3, 7)]
+    said = [(one.at // S, one.text) for one in outcome.of(Text) if one.source == "crash"]
+    assert [at for at, text in said if text == "and now: status"] == [2, 6]
 
 
 def test_printed_text_goes_into_the_trace(run_model):

@@ -221,8 +221,9 @@ class CppProgram:
         kernel: The run's kernel.
         name: Name of the instance.
         compiled: The component, compiled for this instance.
-        client_library: Request handlers of a client library, added to those of every component.
-        on_exit: Called when ``main`` has returned, as the end of a process is noticed by others.
+        client_library: Begins to use a client library, each time that the component starts: returns request
+            handlers, which are added to those of every component, and what is called when ``main`` has
+            returned, as the end of a process is noticed by others.
         arguments: Command-line arguments of ``main``, after the name of the program.
     """
 
@@ -231,15 +232,14 @@ class CppProgram:
         kernel: Kernel,
         name: str,
         compiled: CompiledComponent,
-        client_library: RequestHandlers | None = None,
-        on_exit: Callable[[], None] | None = None,
+        client_library: Callable[[], tuple[RequestHandlers, Callable[[], None]]] | None = None,
         arguments: Sequence[str] = (),
     ) -> None:
         self._kernel = kernel
         self._name = name
         self._compiled = compiled
-        self._client_library = client_library or {}
-        self._on_exit = on_exit
+        self._client_library = client_library
+        self._on_exit: Callable[[], None] = lambda: None
         self._arguments = arguments
         self._meter: tuple[StepMeter, ToSteps] | None = None
         self._on_load: Callable[[LoadedLibrary], None] = lambda library: None
@@ -276,7 +276,9 @@ class CppProgram:
         if self._meter is not None:
             meter, to_steps = self._meter
             meter.read_from(library.counters, to_steps)
-        handlers.update(self._client_library)
+        if self._client_library is not None:
+            of_library, self._on_exit = self._client_library()
+            handlers.update(of_library)
         fibers = FiberPool(runtime, self._name, library.dispatch, handlers, self._record_output)
         fibers.call(MAKE)
         return CppObject(fibers, component.provided)
@@ -314,7 +316,6 @@ class CppProgram:
             if self._compiled.component.class_name:
                 raise
             raise ComponentError(self._name, f"main() raised {error}") from error
-        if self._on_exit is not None:
-            self._on_exit()
         if status:
             raise ComponentError(self._name, f"ended with exit status {status}")
+        self._on_exit()

@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from volery.base.errors import Location, ModelError
 from volery.ros.messages.workspace import Package, Workspace
@@ -19,7 +20,10 @@ _HEADER_SUFFIXES = (".h", ".hpp", ".hh", ".hxx")
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*[<"]([^>"\n]+)[>"]', re.MULTILINE)
 _COMMENT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
 _MAIN = re.compile(r"^\s*(?:extern\s+\"C\"\s+)?(?:auto|int)\s+main\s*\(", re.MULTILINE)
-_TARGET = re.compile(r"^[ \t]*(add_executable|add_library|target_link_libraries)\s*\(([^)]*)\)", re.M | re.I)
+_TARGET = re.compile(
+    r"^[ \t]*\w*?(add_executable|add_library|target_link_libraries)\s*\(([^)]*)\)", re.M | re.I
+)
+_VARIABLE = re.compile(r"^[ \t]*set\s*\(\s*(\w+)\s+([^)]*?)\s*\)", re.MULTILINE | re.IGNORECASE)
 _PROJECT = re.compile(r"^[ \t]*project\s*\(\s*([\w-]+)", re.MULTILINE | re.IGNORECASE)
 
 
@@ -143,24 +147,57 @@ class _HeaderSearch:
         return package.include / name
 
 
-def _built_with(path: Path, package: Package) -> Iterator[Path]:
-    """Yield the other sources of the executable that *path* is built into, by the package's CMake file."""
+class _Targets(NamedTuple):
+    """Targets of a package's ``CMakeLists.txt`` by name: their files, and what is linked with them."""
+
+    executables: dict[str, list[str]]
+    libraries: dict[str, list[str]]
+    links: dict[str, list[str]]
+
+
+def _targets(package: Package) -> _Targets:
+    found = _Targets({}, {}, {})
     lists = package.folder / "CMakeLists.txt"
     if not lists.is_file():
-        return
+        return found
     text = re.sub(r"#[^\n]*", "", _text(lists))
     project = _PROJECT.search(text)
-    text = re.sub(r"\$\{(?:PROJECT_NAME|CMAKE_PROJECT_NAME)\}", project.group(1) if project else "", text)
+    name = project.group(1) if project else ""
+    known = {"PROJECT_NAME": name, "CMAKE_PROJECT_NAME": name, **dict(_VARIABLE.findall(text))}
     text = re.sub(r"\$\{(?:PROJECT|CMAKE_CURRENT|CMAKE)_SOURCE_DIR\}/?", "", text)
-    executables: dict[str, list[str]] = {}
-    libraries: dict[str, list[str]] = {}
-    links: dict[str, list[str]] = {}
+    for _ in range(2):  # a variable may be of another one
+        text = re.sub(r"\$\{(\w+)\}", lambda one: known.get(one[1], one[0]), text)
     for command, words in _TARGET.findall(text):
-        kinds = {"add_executable": executables, "add_library": libraries}
-        name, *rest = words.replace('"', " ").split() or [""]
-        kinds.get(command.lower(), links).setdefault(name, []).extend(rest)
+        kinds = {"add_executable": found.executables, "add_library": found.libraries}
+        target, *rest = words.replace('"', " ").split() or [""]
+        kinds.get(command.lower(), found.links).setdefault(target, []).extend(rest)
+    return found
+
+
+def executables(package: Package) -> dict[str, Path]:
+    """Return the programs that a package builds of C++: the file with their ``main`` by name.
+
+    A file with a ``main`` that no target has makes a program of its own name.
+    """
+    found: dict[str, Path] = {}
+    listed = set[Path]()
+    for name, files in _targets(package).executables.items():
+        paths = [path for file in files if (path := package.folder / file).is_file()]
+        listed.update(paths)
+        programs = [path for path in paths if _MAIN.search(_code(path))]
+        if programs:
+            found[name] = programs[0]
+    for path in sorted(package.folder.rglob("*")):
+        if path.suffix in _SOURCE_SUFFIXES and path not in listed and _MAIN.search(_code(path)):
+            found.setdefault(path.stem, path)
+    return found
+
+
+def _built_with(path: Path, package: Package) -> Iterator[Path]:
+    """Yield the other sources of the executable that *path* is built into, by the package's CMake file."""
+    built = _targets(package)
     own = path.resolve()
-    for name, files in executables.items():
+    for name, files in built.executables.items():
         if own in [(package.folder / file).resolve() for file in files]:
             waiting, seen = [name], set[str]()
             while waiting:
@@ -168,11 +205,11 @@ def _built_with(path: Path, package: Package) -> Iterator[Path]:
                 if target in seen:
                     continue
                 seen.add(target)
-                for file in (*executables.get(target, ()), *libraries.get(target, ())):
+                for file in (*built.executables.get(target, ()), *built.libraries.get(target, ())):
                     found = (package.folder / file).resolve()
                     if found.suffix in _SOURCE_SUFFIXES and found.is_file() and found != own:
                         yield found
-                waiting += [one for one in links.get(target, ()) if one in libraries]
+                waiting += [one for one in built.links.get(target, ()) if one in built.libraries]
             return
 
 

@@ -29,7 +29,7 @@ from volery.cost import StepCounter, library_table
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.model.components import VEHICLE_INTERFACES, Component, Signature
+from volery.model.components import CPP_LANGUAGES, VEHICLE_INTERFACES, Component, Signature
 from volery.model.instances import Connection, TargetKind
 from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
@@ -482,7 +482,11 @@ def with_executables(system: System) -> System:
             raise ModelError(what, f"components.{component.name}", component.where)
         try:
             file, function = find_executable(
-                workspace, component.package, component.executable, system.folder / "model.yaml"
+                workspace,
+                component.package,
+                component.executable,
+                system.folder / "model.yaml",
+                cpp=component.language in CPP_LANGUAGES,
             )
         except UsageError as error:
             raise ModelError(str(error), f"components.{component.name}.package", component.where) from error

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -46,6 +46,7 @@ from volery.model.instances import Instance
 from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
 from volery.ros.client_libraries import roscpp
+from volery.ros.client_libraries.abi_codec import RequestHandlers
 from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import Node, RosGraph
 
@@ -336,24 +337,18 @@ class CppPrograms:
     def program(self, model: InstanceModel) -> CppProgram:
         """Return the program of an instance."""
         compiled, counting, tracing = self._ready[model.name]
-        if model.component.language == "roscpp":
-            launch = self._launches.get(model.name, Launch())
-            session = roscpp.Session(self._graph, model.name, launch, self._nodes)
-            made = CppProgram(
-                self._kernel,
-                model.name,
-                compiled,
-                roscpp.request_handlers(session),
-                session.end,
-                model.arguments,
-            )
-        else:
-            made = CppProgram(self._kernel, model.name, compiled, arguments=model.arguments)
+        library = partial(self._join, model) if model.component.language == "roscpp" else None
+        made = CppProgram(self._kernel, model.name, compiled, library, model.arguments)
         if counting is not None:
             made.count(self.meters[model.name], counting.to_steps())
         if tracing is not None and self._traces is not None:
             made.when_loaded(partial(self._trace, tracing, self._traces / model.name))
         return made
+
+    def _join(self, model: InstanceModel) -> tuple[RequestHandlers, Callable[[], None]]:
+        launch = self._launches.get(model.name, Launch())
+        session = roscpp.Session(self._graph, model.name, launch, self._nodes)
+        return roscpp.request_handlers(session), session.end
 
     def _trace(self, tracing: TracingCompiler, file: Path, library: LoadedLibrary) -> None:
         tracing.begin(library, file)

@@ -8,14 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from volery.base.errors import ModelError
+from volery.base.errors import ModelError, UsageError
 from volery.base.position import AboveHome, Position
 from volery.components.cpp import build, compiler
 from volery.components.cpp.build import RequiredPort, cpp_type, glue, interfaces_header, operation, operations
 from volery.components.cpp.framework import Crash, StepMeter, read_crash
-from volery.components.cpp.sources import find_sources
+from volery.components.cpp.sources import executables, find_sources
+from volery.components.entry_points import find_executable
 from volery.model.components import Argument, Interface, Signature
 from volery.ros.client_libraries.abi_codec import Reader, Writer
+from volery.ros.messages.workspace import Package, Workspace
 
 ROUTING = Interface(
     "Routing",
@@ -113,6 +115,13 @@ def test_what_a_package_builds_with_a_file_belongs_to_it(tmp_path, monkeypatch):
     assert {"std_msgs/String.h", "mavros_msgs/CommandTOL.h"} <= set(found.included)
     assert found.found == {"arm/arm.hpp", "hand/hand.h", "finger.h"}
     assert list(found.folders) == [tmp_path / "arm/include", tmp_path / "others/hand/include"]
+    programs = {"node": tmp_path / "arm/src/node.cpp", "test": tmp_path / "arm/src/test.cpp"}
+    (tmp_path / "arm/src/test.cpp").write_text("int main() {}")
+    assert executables(Package("arm", tmp_path / "arm")) == programs
+    near = tmp_path / "model.yaml"
+    assert find_executable(Workspace(tmp_path), "arm", "node", near, cpp=True) == (programs["node"], "")
+    with pytest.raises(UsageError, match=r"have no C\+\+ executable 'nod' .*'node'.*; there is node or test"):
+        find_executable(Workspace(tmp_path), "arm", "nod", near, cpp=True)
 
 
 def test_a_folder_without_sources(tmp_path):
