@@ -92,7 +92,7 @@ def _may_subscribe(system: System, instance: Instance, topic: str) -> bool:
     if any(full_topic(instance, name) == topic for name in component.subscribes if _ROS_NAME.match(name)):
         return True
     if component.subscribes or not component.path:
-        return False
+        return bool(component.package) and not component.subscribes
     names = _subscribed_in(system.file_of(component))
     return names is None or any(
         full_topic(instance, name) == topic for name in names if _ROS_NAME.match(name)

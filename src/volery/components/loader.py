@@ -207,6 +207,21 @@ def imported_files(path: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
+def imported_names(file: Path) -> set[str]:
+    """Return the top-level modules that a file imports by absolute names.
+
+    Raises:
+        ModelError: The file is not Python.
+    """
+    found: set[str] = set()
+    for node in ast.walk(parse(file).tree):
+        if isinstance(node, ast.Import):
+            found.update(one.name.partition(".")[0] for one in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            found.add(node.module.partition(".")[0])
+    return found
+
+
 def _imports_of(file: Path) -> Iterator[Path]:
     for node in ast.walk(parse(file).tree):
         if isinstance(node, ast.Import):

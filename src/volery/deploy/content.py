@@ -8,9 +8,10 @@ from pathlib import Path
 
 from volery.base.errors import UsageError
 from volery.components.cpp.sources import find_sources
-from volery.components.loader import imported_files
+from volery.components.loader import imported_files, imported_names
 from volery.model.instances import Instance
 from volery.model.system import Processor, System
+from volery.ros.messages import Workspace
 from volery.run.assembly.cpp import is_cpp
 from volery.run.assembly.vehicle_nodes import graph_access
 from volery.run.distributed.call_types import call_types, package_name
@@ -48,6 +49,8 @@ class Computer:
     package: str
     hosted: tuple[Hosted, ...]
     bridged: tuple[Bridged, ...]
+    packages: tuple[str, ...] = ()
+    """Packages of the workspace whose programs or modules its components use."""
 
 
 def computers(system: System) -> tuple[Computer, ...]:
@@ -92,14 +95,41 @@ def _computer(system: System, processor: Processor) -> Computer:
         for one in system.vehicles
         if one.processor == processor.name
     )
-    return Computer(processor, package_name(system.name, processor.name), hosted, bridged)
+    packages = workspace_packages(system, tuple(one.instance for one in hosted))
+    return Computer(processor, package_name(system.name, processor.name), hosted, bridged, packages)
+
+
+_DISTRIBUTIONS = (Path("/opt/ros"), Path("/usr"))
+"""Where packages of ROS are installed, not those of a user's workspace."""
+
+
+def workspace_packages(system: System, instances: tuple[Instance, ...]) -> tuple[str, ...]:
+    """Return the packages of the workspace that have programs of *instances* or modules that these import.
+
+    What these packages depend on is in their manifests.
+    """
+    workspace = Workspace(system.folder)
+    found: dict[str, None] = {}
+    for component in (one.component for one in instances):
+        if not component.path or is_cpp(component):
+            continue
+        start = system.file_of(component)
+        named = {component.package: start} if component.package else {}
+        used = {name: file for file in imported_files(start) for name in imported_names(file)}
+        for name, file in {**used, **named}.items():
+            package = workspace.find(name, file)
+            if package is None or any(package.folder.is_relative_to(one) for one in _DISTRIBUTIONS):
+                continue
+            found[package.name] = None
+    return tuple(sorted(found))
 
 
 def model_files(system: System, instances: tuple[Instance, ...]) -> Iterator[tuple[Path, Path]]:
     """Yield the files that hosts of *instances* read: each, and where it goes below the model's folder.
 
     The text of the model with all files that it includes, the code of each component with what it imports of
-    the files beside it, and the dataclasses that calls carry.
+    the files beside it, and the dataclasses that calls carry. What is in packages of the workspace is built
+    there.
 
     Raises:
         UsageError: A file is outside the model's folder.
@@ -107,7 +137,7 @@ def model_files(system: System, instances: tuple[Instance, ...]) -> Iterator[tup
     wanted = {system.folder / one.name: None for one in system.sources}
     wanted |= dict.fromkeys(sorted(system.folder.glob("*.yaml")))  # what other scenarios include
     for one in instances:
-        if one.component.path:
+        if one.component.path and not one.component.package:
             wanted |= dict.fromkeys(_code(system, one))
     wanted |= {file: None for record in call_types(system).files() for file in imported_files(record)}
     wanted |= dict.fromkeys(system.catalogues)

@@ -118,7 +118,7 @@ def _copy_model(system: System, instances: tuple[Instance, ...], package: Path, 
         path.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, path)
     for one in system.instances:
-        if one.component.path:
+        if one.component.path and not one.component.package:
             elsewhere = root / MODEL_FOLDER / one.component.path
             if not elsewhere.exists():  # the model names it; this computer does not execute it
                 elsewhere.parent.mkdir(parents=True, exist_ok=True)
@@ -153,6 +153,7 @@ def _readme(system: System, found: tuple[Computer, ...], verification: str, inte
         verification=verification,
         packages=" ".join((*(one.package for one in found), verification, interfaces)),
     )
+    used = sorted({name for one in found for name in one.packages})
     cpp = any(is_cpp(each.instance.component) for one in found for each in one.hosted)
     return "\n".join(
         [
@@ -167,6 +168,7 @@ def _readme(system: System, found: tuple[Computer, ...], verification: str, inte
             "",
             _VOLERY,
             *([_COMPILED, ""] if cpp else []),
+            *([_WORKSPACE.format(packages=", ".join(f"`{one}`" for one in used)), ""] if used else []),
             f"Calls between components are services `/<component>/<operation>` of the types in `{interfaces}`, "
             "topics are topics. Components need no built package of types; other nodes that call them do.",
             "",
@@ -189,6 +191,11 @@ ssh COMPUTER "python3 -m pip install \\$(echo volery-*.whl)[simulation]"
 
 _COMPILED = """Components in C++ are compiled when they are started for the first time: a computer that hosts them needs
 a C++ compiler (`apt-get install g++`)."""
+
+_WORKSPACE = """## Packages of your workspace
+
+Programs of components, and modules and messages that they import, are in {packages}. These packages are not
+copied here. Build them, and what they depend on, in the workspace of each computer below."""
 
 _ROS1 = """## Build and start
 

@@ -28,7 +28,9 @@ def computer_files(computer: Computer, system: System) -> Iterator[tuple[Path, s
     name, model = computer.package, model_expression(1)
     what = f"{system.name}: what {computer.processor.name} executes"
     interfaces = package_name(system.name, INTERFACES)
-    packages = dict.fromkeys(("rospy", "std_msgs", interfaces, *message_packages(computer)))
+    packages = dict.fromkeys(
+        ("rospy", "std_msgs", interfaces, *message_packages(computer), *computer.packages)
+    )
     depends = [f"<exec_depend>{one}</exec_depend>" for one in packages]
     yield Path("package.xml"), package_xml(name, system, what, _TOOLS, depends)
     scripts = {one.executable: host_script(one, system, GRAPH, model) for one in computer.hosted}

@@ -29,7 +29,9 @@ def computer_files(computer: Computer, system: System) -> Iterator[tuple[Path, s
     name = computer.package
     what = f"{system.name}: what {computer.processor.name} executes"
     interfaces = package_name(system.name, INTERFACES)
-    packages = dict.fromkeys(("rclpy", "std_msgs", interfaces, *message_packages(computer)))
+    packages = dict.fromkeys(
+        ("rclpy", "std_msgs", interfaces, *message_packages(computer), *computer.packages)
+    )
     yield from _frame(name, system, what, packages, [
         *(one.executable for one in computer.hosted), *(one.executable for one in computer.bridged)
     ])  # fmt: skip

@@ -49,6 +49,8 @@ def host_script(hosted: Hosted, system: System, graph: str, model: str) -> str:
     """Return the entry point that hosts a component. *model* is the expression of its model's path."""
     one = hosted.instance
     code = one.component.path or "stub"
+    if one.component.package:
+        code = f"{one.component.package}/{one.component.executable}"
     what = (
         f"Hosts {one.name}, a {one.component.name} in {one.component.language}, from the unmodified {code}."
     )

@@ -72,7 +72,7 @@ def gaps(system: System, fidelity: str, vocabulary: Vocabulary) -> Iterator[Mode
     yield from _unwritten(system)
     used = {instance.component.name: instance.component for instance in system.instances}
     for component in used.values():
-        if fidelity == "code" and not component.path:
+        if fidelity == "code" and not (component.path or component.package):
             what = "it has no code: fidelity `code` needs a `path`; `times` runs without"
             yield ModelError(what, f"components.{component.name}", component.where, rules.NO_CODE.code)
     yield from _foreign(system, vocabulary.languages)

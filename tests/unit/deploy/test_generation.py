@@ -18,6 +18,7 @@ from volery.base.files import write_text
 from volery.deploy import generation
 from volery.deploy.generation import MARK, deploy
 from volery.model.system_loader import load
+from volery.run.assembly.component_builder import with_executables
 from volery.run.assembly.model_checks import vocabulary
 from volery.run.distributed.call_types import package_name
 
@@ -63,6 +64,47 @@ def test_components_are_unmodified_and_the_copied_model_is_the_model(delivery, t
         assert (model / file).read_bytes() == (DELIVERY / file).read_bytes()
     again = load(model, vocabulary(), allocation="slow", scenario="pocket")
     assert [one.parameters for one in again.instances] == [one.parameters for one in delivery.instances]
+
+
+def in_a_workspace(folder):
+    """A workspace with two packages, of which a model runs one's program and a file that uses the other."""
+    texts = {
+        "talker/package.xml": "<package><name>talker</name></package>",
+        "talker/scripts/talk": "#!/usr/bin/env python3\nimport rospy\n",
+        "words/package.xml": "<package><name>words</name></package>",
+        "words/src/words/__init__.py": "",
+        "model/beside.py": "import rospy\nfrom words import all_of_them\nimport json\n",
+        "model/model.yaml": """
+volery: 1
+name: two
+components:
+  Talker: {language: rospy, package: talker, executable: talk, active: true}
+  Beside: {language: rospy, path: beside.py, active: true}
+application: {talker: {is: Talker}, beside: {is: Beside}}
+platform: {processors: {pc: {is: intel-i5-3470, frequency: 3000 MHz}}}
+allocations: {all: {talker: pc, beside: pc}}
+""",
+    }
+    for name, text in texts.items():
+        file = folder / "src" / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_text(file, text)
+    (folder / "src/talker/scripts/talk").chmod(0o755)
+    return with_executables(load(folder / "src" / "model", vocabulary()))
+
+
+@pytest.mark.parametrize("ros", [1, 2])
+def test_packages_of_a_workspace_are_depended_on_and_named(tmp_path, monkeypatch, ros):
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "src"))
+    made = deploy(in_a_workspace(tmp_path), tmp_path / "out", ros)
+    package = made.folder / made.packages["pc"]
+    depends = {one.text for one in etree.parse(package / "package.xml").iterfind("exec_depend")}
+    assert {"talker", "words"} <= depends
+    assert "are in `talker`, `words`" in (made.folder / "README.md").read_text()
+    assert [one.name for one in package.rglob("*.py") if "model" in one.parts] == ["beside.py"]
+    assert not list(package.rglob("talk"))
+    entry = package / ("scripts/talker" if ros == 1 else f"{package.name}/talker.py")
+    assert "unmodified talker/talk" in entry.read_text()
 
 
 def test_a_deployment_replaces_an_earlier_one_and_nothing_else(delivery, tmp_path):

@@ -193,10 +193,11 @@ def profile(
     from volery.calibration.component_profile import profile_components
     from volery.cli.run_display import run_progress
     from volery.model.system_loader import load
+    from volery.run.assembly.component_builder import with_executables
     from volery.run.assembly.model_checks import vocabulary
     from volery.run.result import Options
 
-    system = load(model, vocabulary(), scenario, allocation, overrides or ())
+    system = with_executables(load(model, vocabulary(), scenario, allocation, overrides or ()))
     with run_progress(output, f"{system.name}, traced") as show:
         profiles, run = profile_components(system, Options(seed=seed, show=show, tell=output.note))
     output.show(_profile_table(profiles))
@@ -250,13 +251,14 @@ def validate(
         prepare_nodes,
     )
     from volery.model.system_loader import load
+    from volery.run.assembly.component_builder import with_executables
     from volery.run.assembly.model_checks import vocabulary
 
     if runs < 1:
         raise UsageError(f"--runs {runs}: give at least 1")
     if seconds is not None and not seconds > 0.0:
         raise UsageError(f"--seconds {seconds:g}: give a number above 0")
-    system = load(model, vocabulary(), scenario, allocation, overrides or ())
+    system = with_executables(load(model, vocabulary(), scenario, allocation, overrides or ()))
     if seconds is not None:
         limits = replace(system.limits, duration_ns=from_seconds(seconds), until=None)
         system = replace(system, limits=limits)

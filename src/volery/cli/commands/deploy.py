@@ -33,9 +33,10 @@ def deploy(
     """
     from volery.deploy.generation import deploy as write_packages
     from volery.model.system_loader import load
+    from volery.run.assembly.component_builder import with_executables
     from volery.run.assembly.model_checks import vocabulary
 
-    system = load(model, vocabulary(), scenario, allocation, overrides or ())
+    system = with_executables(load(model, vocabulary(), scenario, allocation, overrides or ()))
     made = write_packages(system, to, ros)
     table = make_table("computer", "package")
     for computer, package in made.packages.items():

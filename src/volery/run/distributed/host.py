@@ -28,7 +28,7 @@ from volery.model.system import System
 from volery.model.system_loader import load
 from volery.model.text import parse
 from volery.ros.graph.interface import full_node_name
-from volery.run.assembly.component_builder import BuiltComponents
+from volery.run.assembly.component_builder import BuiltComponents, with_executables
 from volery.run.assembly.model_checks import vocabulary
 from volery.run.distributed import pipe, plan
 from volery.run.distributed.call_types import CallTypes, call_types
@@ -214,6 +214,7 @@ def main(model: Path, name: str, *, graph: str, allocation: str = "", scenario: 
     given, _ = parser.parse_known_args()
     try:
         system = load(model, vocabulary(), given.scenario or None, allocation or None)
+        system = with_executables(system)
         if given.parameters is not None:
             system = with_parameters(system, name, given.parameters)
         system, _ = plan.without_computers(system)
