@@ -305,6 +305,14 @@ class CppProgram:
         """See ``Program``."""
         assert isinstance(thing, CppObject)
         try:
+            self._run_to_end(thing)
+        except Exception:  # the node leaves once it is known what it has flown
+            self._kernel.call_at(self._kernel.now(), self._on_exit)
+            raise
+        self._on_exit()
+
+    def _run_to_end(self, thing: CppObject) -> None:
+        try:
             given = Writer().integer(1 + len(self._arguments))
             for argument in (self._name, *self._arguments):
                 given.text(argument)
@@ -318,4 +326,3 @@ class CppProgram:
             raise ComponentError(self._name, f"main() raised {error}") from error
         if status:
             raise ComponentError(self._name, f"ended with exit status {status}")
-        self._on_exit()

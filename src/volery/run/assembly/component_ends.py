@@ -104,7 +104,6 @@ class ComponentEnds(Host):
 
     def _stop(self, component: str) -> None:
         vehicles = self._flown.pop(component, None) or list(self._commanded_alone(component))
-        self._close_nodes(component)
         self._kernel.call_at(self._kernel.now(), partial(self._remove, component, "it has failed"))
         for vehicle in vehicles:
             self._ending.land(vehicle)
