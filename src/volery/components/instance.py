@@ -279,6 +279,8 @@ def describe(error: BaseException) -> str:
     if isinstance(error, ForeignError):
         return str(error)
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    if type(error).__module__ == "termios":
+        text = f"termios.{text}: the file reads keys of a terminal, and a component has none; {_NO_KEYS}"
     return f"{text}{place_of(error)}"
 
 
@@ -296,6 +298,7 @@ def place_of(error: BaseException) -> str:
 
 
 _FRAMEWORK = "volery."
+_NO_KEYS = "let another component publish what its keys would"
 
 
 def _is_component_code(frame: FrameType) -> bool:

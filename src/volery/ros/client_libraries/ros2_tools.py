@@ -20,6 +20,7 @@ from volery.ros.messages import Workspace
 from volery.ros.messages.client_classes import RCLPY, message_of
 from volery.ros.messages.packages import define_packages
 from volery.ros.messages.packages import modules as interface_modules
+from volery.ros.messages.slot_types import DEFINITION
 from volery.ros.messages.store import action_types, service_types, types
 from volery.ros.messages.workspace import Package, entries
 
@@ -403,8 +404,11 @@ def modules() -> dict[str, ModuleType]:
     point_cloud2 = library_module("sensor_msgs_py.point_cloud2", clouds)
     inside = library_module("rosidl_runtime_py.utilities", utilities)
     top = {**written, **listed, "set_message_fields": set_message_fields, "utilities": inside}
+    definition = library_module("rosidl_parser.definition", DEFINITION)
     return {
         **_ament_modules(Workspace()),
+        "rosidl_parser": library_module("rosidl_parser", {"definition": definition}),
+        "rosidl_parser.definition": definition,
         "sensor_msgs_py": library_module("sensor_msgs_py", {"point_cloud2": point_cloud2}),
         "sensor_msgs_py.point_cloud2": point_cloud2,
         "rosidl_runtime_py": library_module("rosidl_runtime_py", top),

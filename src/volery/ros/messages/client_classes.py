@@ -37,6 +37,7 @@ from volery.ros.messages.message import (
     set_written,
     slot_of,
 )
+from volery.ros.messages.slot_types import slot_types
 from volery.ros.messages.store import idl_fields, message_class, service
 
 Library = Literal["", "rospy", "rclpy"]
@@ -775,6 +776,7 @@ def _rclpy_class(of_graph: Any) -> Any:
         members |= {f"__{one}__": None for one in operators if hasattr(of_graph, f"__{one}__")}
         members["__bool__"] = lambda _: True
     module = generated_module(f"{package}/{kind}/{label}")
+    members["SLOT_TYPES"] = _Lazy(lambda _: slot_types(of_graph.__msgtype__))
     made = _derived(of_graph, label, module, RCLPY, (_RclpyMessage,), members)
     made.__slots__ = [*(f"_{one.name}" for one in fields), "_check_fields"]
     for constant, value in _byte_constants(of_graph):

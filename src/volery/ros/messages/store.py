@@ -332,7 +332,7 @@ def replace_known(name: str, text: str) -> bool:
             [(constants, fields)] = parse_messages(read_as, one).values()
         except rosbags.TypesysError:
             return True  # defining it says what is wrong
-        ours = [field for field in known[full][1] if field[0] != _FILLER]
+        ours = [field for field in known[full][1] if field[0] != FILLER]
         noetic = types_of_noetic().fielddefs.get(full)
         if noetic is not None and list(noetic[1]) == fields:
             continue
@@ -363,7 +363,7 @@ def _outline(full: str, text: str) -> set[str]:
 def _known_outline(full: str) -> set[str]:
     constants, fields = store().fielddefs[full]
     found = {f"{kind} {label}" for label, kind, _ in constants}
-    return found | {f"{_stated(what)} {label}" for label, what in fields if label != _FILLER}
+    return found | {f"{_stated(what)} {label}" for label, what in fields if label != FILLER}
 
 
 def _stated(what: Any) -> str:
@@ -445,7 +445,7 @@ def message_class(name: str) -> type[Message]:
     if full not in _classes:
         constants, fields = store().fielddefs[full]
         described = [
-            _describe(rosbags.normalize_fieldname(key), what) for key, what in fields if key != _FILLER
+            _describe(rosbags.normalize_fieldname(key), what) for key, what in fields if key != FILLER
         ]
         named = [(rosbags.normalize_fieldname(label), kind, value) for label, kind, value in constants]
         made = make_class(full, _BASES.get(full, Message if described else Nothing), named, described)
@@ -463,7 +463,8 @@ _BASES: dict[str, type[Message]] = {
     _DURATION: DurationValue,
     "std_msgs/msg/Header": Header,
 }
-_FILLER = "structure_needs_at_least_one_member"
+FILLER = "structure_needs_at_least_one_member"
+"""Field that an empty message has in ROS 2."""
 
 
 def _introduce(made: Any) -> None:
@@ -537,7 +538,8 @@ def definition(name: str) -> str:
     return store().generate_msgdef(message_name(name), ros_version=2)[0]
 
 
-_SPELLED = {"float32": "float", "float64": "double", "bool": "boolean", "byte": "octet", "char": "uint8"}
+SPELLED = {"float32": "float", "float64": "double", "bool": "boolean", "byte": "octet", "char": "uint8"}
+"""Names of basic types in IDL, where they differ."""
 
 
 @cache
@@ -567,7 +569,7 @@ def _spell(what: Any) -> str:
         return str(detail).replace("/msg/", "/")
     if kind == rosbags.Nodetype.BASE:
         base, bound = detail
-        return f"{base}<{bound}>" if bound else _SPELLED.get(base, base)
+        return f"{base}<{bound}>" if bound else SPELLED.get(base, base)
     inner, count = detail
     if kind == rosbags.Nodetype.ARRAY:
         return f"{_spell(inner)}[{count}]"

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from volery.ros.client_libraries import ros2_tools
+from volery.ros.messages.client_classes import RCLPY, message_of
 
 
 @pytest.fixture
@@ -66,3 +67,27 @@ def test_messages_are_made_of_dictionaries_and_read_as_such(tools: dict[str, Any
     assert "frame_id: map" in runtime.message_to_yaml(path)
     with pytest.raises(AttributeError):
         runtime.set_message_fields(path, {"nothing": 1})
+
+
+def test_the_types_of_fields_are_those_of_rosidl(tools: dict[str, Any]) -> None:
+    kinds = tools["rosidl_parser.definition"]
+    scan: Any = message_of("sensor_msgs/msg/LaserScan", RCLPY)
+    header, *numbers, ranges, _ = scan.SLOT_TYPES
+    assert header == kinds.NamespacedType(["std_msgs", "msg"], "Header")
+    assert {one.typename for one in numbers} == {"float"}
+    assert ranges == kinds.UnboundedSequence(kinds.BasicType("float"))
+    pose: Any = message_of("geometry_msgs/msg/PoseWithCovariance", RCLPY)
+    assert pose.SLOT_TYPES[1] == kinds.Array(kinds.BasicType("double"), 36)
+    described: Any = message_of("rcl_interfaces/msg/ParameterDescriptor", RCLPY)
+    assert isinstance(described.SLOT_TYPES[0], kinds.UnboundedString)
+    assert described.SLOT_TYPES[-1].maximum_size == 1
+
+
+def test_the_interfaces_of_a_package_are_listed(tools: dict[str, Any]) -> None:
+    listed = tools["rosidl_runtime_py"]
+    assert listed.get_service_interfaces(["std_srvs"]) == {
+        "std_srvs": ["srv/Empty", "srv/SetBool", "srv/Trigger"]
+    }
+    assert "action/Fibonacci" in listed.get_interfaces(["example_interfaces"])["example_interfaces"]
+    with pytest.raises(LookupError, match="Unknown package 'std_srv'"):
+        listed.get_message_interfaces(["std_srv"])

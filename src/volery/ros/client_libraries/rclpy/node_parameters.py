@@ -266,7 +266,9 @@ class DeclaredParameters:
     def _override(self, name: str, private: str, default: Any) -> Any:
         if name in self._overrides:
             return self._overrides[name]
-        found = self._node.get_parameter(private) if self._node.has_parameter(private) else default
+        if not self._node.has_parameter(private):
+            return default
+        found = self._node.get_parameter(private)
         if isinstance(found, dict):
             return default  # others are below this name
         return list(found) if isinstance(found, tuple) else found
