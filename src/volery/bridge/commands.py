@@ -77,14 +77,19 @@ class CommandServices:
         fields.update({f"param{number}": value for number, value in enumerate(padded, start=1)})
         with self._one_at_a_time, self._link.subscribe("COMMAND_ACK") as acknowledgements:
             self._link.send_to_autopilot("COMMAND_LONG", fields)
+            kernel = self._link.kernel
+            until = kernel.now() + ACK_TIMEOUT  # other commands are acknowledged meanwhile
             while True:
-                answer = acknowledgements.next(ACK_TIMEOUT)
+                answer = acknowledgements.next(max(0, until - kernel.now()))
                 if answer is None:
                     self._warn(f"command {command}: no acknowledgement within {ACK_TIMEOUT // S} s")
                     return False, FAILED
                 result = answer.fields["result"]
-                if answer.fields["command"] == command and result != IN_PROGRESS:
+                if answer.fields["command"] != command:
+                    continue
+                if result != IN_PROGRESS:
                     return result == ACCEPTED, result
+                until = kernel.now() + ACK_TIMEOUT
 
     def set_mode(self, request: Any) -> Any:
         """Handle ``set_mode``. The command is not acknowledged; ``state`` shows its effect."""

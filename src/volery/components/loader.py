@@ -304,7 +304,10 @@ class Loader:
 
     def add_interfaces(self, package: str) -> None:
         """Make the interfaces of a package, which have been defined, importable."""
-        self.replacements.update(modules(package))
+        made = modules(package)
+        self.replacements.update(
+            {name: one for name, one in made.items() if not _is_library(name, self.replacements.get(name))}
+        )
         for library, known in self._interfaces.items():
             known.update(modules(package, library))
 
@@ -650,6 +653,12 @@ def _python_path() -> list[Path]:
     return [Path(one) for one in os.environ.get("PYTHONPATH", "").split(os.pathsep) if one]
 
 
+def _is_library(name: str, module: ModuleType | None) -> bool:
+    """Return whether a package has more than interfaces, as ``actionlib``, a client library with messages."""
+    names = () if module is None or _interface_kind(name) else vars(module)
+    return any(not one.startswith("_") and one not in KINDS for one in names)
+
+
 def _interface_kind(name: str) -> bool:
     """Return whether a dotted name is that of interfaces, such as ``std_msgs.msg``."""
     return name.partition(".")[2].partition(".")[0] in KINDS
@@ -692,7 +701,7 @@ class _Import:
         ours = self._loader.interfaces(self._library).get(name)
         if ours is None or found is None:
             return found
-        if found is self._space.replaced(name):
+        if found is self._space.replaced(name) and not _is_library(name, found):
             return ours
         vars(found).update({kind: one for kind, one in vars(ours).items() if kind in KINDS})
         return found
