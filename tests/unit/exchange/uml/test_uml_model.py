@@ -14,6 +14,7 @@ from volery.exchange.convert import export_model, import_model, read_uml
 from volery.exchange.uml.uml_model import export_uml, import_uml
 from volery.exchange.uml.xmi import MOST_BYTES, xmi_id
 from volery.model.assembly import read_tree
+from volery.model.document import schema
 from volery.model.text import parse
 from volery.model.writing import model_text
 from volery.run.assembly.model_checks import vocabulary
@@ -186,6 +187,83 @@ def test_a_model_of_volery_is_the_same_after_uml(name):
 
 def test_a_model_with_every_section_is_the_same_after_uml(tmp_path):
     tree = read_tree(write_watch_model(tmp_path / "watch")).plain()
+    text, notes = export_uml(tree, "m.uml")
+    assert notes == ()
+    imported = read("m", text.encode())
+    assert said(imported) == []
+    assert imported.tree == tree
+
+
+EVERY_KEY = """
+volery: 1
+name: every-key
+interfaces: {Talk: {say: {args: {words: string}, returns: int}}}
+components:
+  Packaged:
+    language: rclpy
+    package: talker
+    executable: talk
+    main: start
+    arguments: [--verbose, "a:=b"]
+    on_failure: {action: restart, max: 3, delay: 2 s}
+    requires: {other: Talk}
+  Written:
+    language: c++
+    path: src/written
+    class: Writer
+    build: {flags: [-O2], libraries: [z]}
+    files: {python: written.py}
+    provides: {voice: Talk}
+    parameters: {loud: true}
+    active: {period: 100 ms, deadline: 80 ms, priority: 7, start: 1 s, jitter: 2 ms}
+    at: {processor: intel-i5-3470, frequency: 3000 MHz}
+    operations:
+      say:
+        time: 2 ms
+        at: {processor: rpi4-cortex-a72, frequency: 1.5 GHz}
+        energy: 3 mJ
+        provenance: measured
+        best: 1 ms
+        worst: 4 ms
+        uncertainty: 5 %
+    activation: {time: 1 ms}
+    queues: {voice: {size: 2, full: remove-first, timeout: 50 ms, retries: 1}}
+    calls: {activation: {publish: 2}}
+    publishes: {words: {type: std_msgs/String, on: activation, count: 2, size: 40 B}}
+    subscribes: {orders: {type: std_msgs/String}}
+    memory: 20 MB
+application:
+  talker:
+    is: Packaged
+    other: written.voice
+    parameters: {loud: false}
+    active: true
+    arguments: [--quiet]
+    namespace: /one
+    node_name: other_name
+    remap: {words: /words}
+  written: {is: Written}
+memory_spaces: {space: {memory: 100 MB, description: shared}}
+"""
+
+
+def test_every_key_of_components_and_instances_is_the_same_after_uml():
+    tree = parse(EVERY_KEY, "every.yaml").plain()
+    known = schema()["$defs"]
+    components, instances = tree["components"].values(), tree["application"].values()
+    written = tree["components"]["Written"]
+    stated = {
+        "Component": {key for one in components for key in one},
+        "OnFailure": set(tree["components"]["Packaged"]["on_failure"]),
+        "Activity": set(written["active"]),
+        "Figure": set(written["operations"]["say"]),
+        "Queue": set(written["queues"]["voice"]),
+        "Publication": set(written["publishes"]["words"]),
+        "Build": set(written["build"]),
+        "Instance": {key for one in instances for key in one} - {"other"},
+        "MemorySpace": set(tree["memory_spaces"]["space"]),
+    }
+    assert stated == {name: set(known[name]["properties"]) for name in stated}
     text, notes = export_uml(tree, "m.uml")
     assert notes == ()
     imported = read("m", text.encode())
