@@ -108,7 +108,7 @@ def adopt(message: Any, library: Library) -> Any:
 
 def receiving(cls: Any) -> Callable[[Any], Any] | None:
     """Return what makes a received message one of *cls*, or None if the graph's messages are."""
-    return getattr(cls, "_adopt", None)
+    return _adoption(cls) if hasattr(cls, "_adopt") else None
 
 
 class _Lazy:
@@ -139,7 +139,7 @@ def _derived(
 ) -> Any:
     namespace = {"__slots__": (), "__module__": module, "client_library": library, **members}
     made: Any = type(name, (*bases, of_graph), namespace)
-    made._adopt = _adopting(made, library)
+    made._adopt = _adopting(made)
     return made
 
 
@@ -167,16 +167,23 @@ class _Source:
         return self.names["function"]
 
 
-def _adopting(cls: Any, library: Library) -> Callable[[Any], Any]:
-    """Return what makes a message of the graph one of *cls*; it is written at its first use."""
+def _adopting(cls: Any) -> Callable[[Any], Any]:
+    """Return ``_adoption`` of *cls*, which is made at the first use."""
 
     def first(message: Any) -> Any:
-        writing = _Source()
-        _write_adoption(writing, cls, "message", library)
-        cls._adopt = writing.function("message", f"reception of {cls.__msgtype__}")
+        cls._adopt = _adoption(cls)
         return cls._adopt(message)
 
     return first
+
+
+@cache
+def _adoption(cls: Any) -> Callable[[Any], Any]:
+    """Return what makes a message of the graph one of *cls*, a class of a client library."""
+    writing = _Source()
+    _write_adoption(writing, cls, "message", cls.client_library)
+    made: Callable[[Any], Any] = writing.function("message", f"reception of {cls.__msgtype__}")
+    return made
 
 
 def _write_adoption(writing: _Source, cls: Any, of: str, library: Library) -> None:
@@ -303,9 +310,10 @@ def numpy_class(cls: Any) -> Any:
         if one.length is not None and one.nested is None and one.base not in ("string", "uint8", "char")
     }
     label = f"Numpy_{cls._type.replace('/', '__')}"
-    made: Any = type(label, (cls,), {"__slots__": (), "__module__": "rospy.numpy_msg", **members})
+    namespace = {"__slots__": (), "__module__": "rospy.numpy_msg", "client_library": ROSPY, **members}
+    made: Any = type(label, (cls,), namespace)
     made.__slots__ = cls.__slots__
-    made._adopt = _adopting(made, ROSPY)
+    made._adopt = _adopting(made)
     return made
 
 

@@ -10,8 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from volery.ros.messages import define, define_imported, modules, types
-from volery.ros.messages.client_classes import RCLPY, ROSPY, Library, adopt, message_of, take_odd_values
+from volery.ros.messages import client_classes, define, define_imported, modules, new, types
+from volery.ros.messages.client_classes import (
+    RCLPY,
+    ROSPY,
+    Library,
+    adopt,
+    message_of,
+    receiving,
+    take_odd_values,
+)
 
 
 def received(name: str, library: Library, /, **fields: Any) -> Any:
@@ -32,6 +40,18 @@ def test_lists_of_numbers_arrive_as_rospy_gives_them() -> None:
     assert mine.ranges == []
     mine.ranges = given = np.zeros(2)
     assert mine.ranges is given  # as assigned
+
+
+def test_what_receives_a_class_is_written_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    take = {library: receiving(message_of("nav_msgs/msg/Odometry", library)) for library in (ROSPY, RCLPY)}
+    written: list[str] = []
+    monkeypatch.setattr(client_classes, "compile", lambda *_: written.append("again"), raising=False)
+    for library, adopted in take.items():
+        assert adopted is not None
+        for _ in range(2):
+            message = adopted(new("nav_msgs/msg/Odometry"))
+            assert type(message) is message_of("nav_msgs/msg/Odometry", library)
+    assert not written
 
 
 def test_lists_of_numbers_are_arrays_in_rclpy() -> None:

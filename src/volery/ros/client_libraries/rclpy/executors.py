@@ -446,10 +446,12 @@ class Executor:
         self, within: Ns | None, ends: Callable[[], bool] = lambda: False, nodes: list[Any] | None = None
     ) -> Run | None:
         """Return what to run next, or None after a time-out or when *ends* holds."""
+        found: Ready | None = None
 
         def ready() -> bool:
-            over = self._is_shutdown or not self._context.running
-            return over or ends() or self._next(nodes) is not None
+            nonlocal found
+            found = self._next(nodes)
+            return found is not None or self._is_shutdown or not self._context.running or ends()
 
         if within == 0 and not ready():
             poll(self._kernel, EMPTY_SPIN, executed=True)
@@ -458,7 +460,8 @@ class Executor:
                 if within != 0:
                     end_activation(kernel)
                     self._changed.wait_for(ready, within)
-                found = self._next(nodes)
+                else:
+                    found = self._next(nodes)
                 arrived = kernel.now() if found is None else found.since
                 run = None
                 if found is not None:
