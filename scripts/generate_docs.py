@@ -56,6 +56,11 @@ _LIBRARIES = {
     "message_filters": "message_filters 1.15.15 (ROS 1 Noetic)",
     "tf": "tf 1.13.2 (ROS 1 Noetic)",
     "tf2_ros": "tf2_ros 0.7.6 (ROS 1 Noetic)",
+    "cpp/roscpp": "roscpp 1.15.15 with roscpp_core, rosconsole and xmlrpcpp, in C++ (ROS 1 Noetic)",
+    "cpp/message_filters": "message_filters 1.15.15, in C++ (ROS 1 Noetic)",
+    "cpp/tf": "tf 1.13.2 with its conversions to Eigen, and angles, in C++ (ROS 1 Noetic)",
+    "cpp/tf2": "tf2 and tf2_ros 0.7.6, in C++ (ROS 1 Noetic)",
+    "cpp/actionlib": "actionlib 1.14.0 and dynamic_reconfigure 1.7.3, in C++ (ROS 1 Noetic)",
 }
 """Client libraries whose names are listed, with their titles."""
 

@@ -1,7 +1,8 @@
 """The page of the ROS client libraries: each public name of the original, and whether it is there.
 
 The names of the originals are the lists in ``ros_surface/``. What there is of them is found by asking the
-modules that files import in a run.
+modules that files import in a run. The lists of C++ say it themselves; a test compiles all names that are
+there.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from volery.ros.client_libraries.importable_modules import importable_modules
 from volery.ros.graph import EmbeddedGraph
 
 LISTS = Path(__file__).parent / "ros_surface"
+CPP = "cpp/"
+"""Beginning of the names of lists of libraries in C++; a line that begins with - has what is not there."""
 
 
 class Name(NamedTuple):
@@ -43,9 +46,14 @@ def surface(library: str, modules: dict[str, ModuleType]) -> list[Name]:
     """Return all names of a library."""
     names = []
     for line in (LISTS / f"{library}.txt").read_text(encoding="utf-8").splitlines():
-        if not line.startswith("#"):
-            owner, _, inside = line.partition(":")
-            names += [Name(owner, one, _refused(owner, one, modules)) for one in inside.split() or [""]]
+        if line.startswith("#"):
+            continue
+        owner, _, inside = line.partition(": " if library.startswith(CPP) else ":")
+        for one in inside.split() or [""]:
+            if library.startswith(CPP):
+                names.append(Name(owner.removeprefix("-"), one, "-" if owner.startswith("-") else ""))
+            else:
+                names.append(Name(owner, one, _refused(owner, one, modules)))
     return names
 
 
@@ -97,7 +105,8 @@ def page(libraries: dict[str, str]) -> str:
         "# Names of the ROS client libraries\n",
         "Each public name of the original libraries, and whether files of a run have it. A name that is not",
         "there raises an error that names it, with the file and line of its use and what to do instead; a",
-        "member of a class that is not there is an AttributeError of Python.",
+        "member of a class that is not there is an AttributeError of Python. In C++ a name that is not there",
+        "does not compile; the error has file and line.",
     ]
     for library, title in libraries.items():
         names = surface(library, modules)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -184,6 +185,70 @@ def test_it_compiles_with_the_real_roscpp():
     flags = subprocess.run(["pkg-config", "--cflags", "roscpp"], capture_output=True, text=True, check=True)
     _check("pose_keeper.cpp", *flags.stdout.split())
     _check("queues.cpp", *flags.stdout.split())
+
+
+ARGUMENTS = {
+    "ros::DurationBase": "ros::Duration",
+    "ros::TimeBase": "ros::Time, ros::Duration",
+    "ros::MessageEvent": "Point const",
+    "tf::Stamped": "tf::Vector3",
+    "tf2::Stamped": "tf2::Vector3",
+    "dynamic_reconfigure::Server": "Config",
+    "message_filters::Synchronizer": "message_filters::sync_policies::ExactTime<Point, Point>",
+    "message_filters::TimeSynchronizer": "Point, Point",
+    "message_filters::sync_policies::": "Point, Point",
+    "message_filters::": "Point",
+    "ros::message_traits::": "Point",
+    "tf::MessageFilter": "Point",
+    "tf2_ros::MessageFilter": "Point",
+    "actionlib::SimpleActionClient": "robot_msgs::CountAction",
+    "actionlib::SimpleActionServer": "robot_msgs::CountAction",
+}
+PLAIN = ("message_filters::SubscriberBase", "tf::MessageFilterBase", "tf2_ros::MessageFilterBase")
+"""Arguments of templates, by their names, or the namespaces that they are in."""
+
+
+def test_all_names_that_are_listed_as_there_compile(tmp_path):
+    lines = [f"#include <{name}>" for name in _every_header()]
+    lines += ["#include <robot_msgs/CountAction.h>", "using Point = geometry_msgs::PointStamped;"]
+    lines += ["struct Config : dynamic_reconfigure::ConfigBase<Config> {"]
+    lines += ["    template <class V> static void each_(V&&) {}", "};"]
+    numbers = count()
+    for file in sorted((Path(__file__).parents[3] / "scripts/ros_surface/cpp").glob("*.txt")):
+        for line in file.read_text().splitlines():
+            owner, _, names = line.partition(": ")
+            if not line.startswith(("#", "-")):
+                lines += [_use(owner, name, next(numbers)) for name in names.split()]
+    program = tmp_path / "program.cpp"
+    program.write_text("\n".join(lines))
+    shutil.copytree(FILES / "robot_msgs", tmp_path / "robot_msgs")
+    included = [line.split("<")[1].rstrip(">") for line in lines if line.startswith("#include")]
+    for name, text in roscpp.generate_headers(included, program).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    folders = [f"-I{one}" for one in (tmp_path, roscpp.INCLUDE, *INCLUDE, *roscpp.FALLBACK[1:])]
+    command = ["g++", "-std=c++17", "-fsyntax-only", *folders, str(program)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]
+
+
+def _every_header() -> list[str]:
+    """Return the names of all headers that come with volery; those for Eigen where it is installed."""
+    eigen = any((folder / "Eigen").is_dir() for folder in roscpp.FALLBACK)
+    names = sorted(str(file.relative_to(roscpp.INCLUDE)) for file in roscpp.INCLUDE.rglob("*.h"))
+    return [name for name in names if eigen or "eigen" not in name]
+
+
+def _use(owner: str, name: str, number: int) -> str:
+    """Return a line that compiles if there is such a name."""
+    if owner == "macros":
+        return f"\n#ifndef {name}\n#error {name}\n#endif"
+    if owner == "XmlRpc" or owner.rpartition("::")[2].islower():
+        return f"namespace names_{number} {{ using {owner}::{name}; }}"
+    inside = owner[: owner.rfind("::") + 2]
+    given = ARGUMENTS.get(owner, ARGUMENTS.get(inside, ""))
+    base = f"{owner}<{given}>" if given and owner not in PLAIN else owner
+    return f"struct Names_{number} : {base} {{ using Base = {base}; using Base::{name}; }};"
 
 
 def _includes(name: str) -> list[str]:
