@@ -297,6 +297,12 @@ def place_of(error: BaseException) -> str:
     return f" ({frame.f_code.co_filename.rpartition('/')[2]}:{line})"
 
 
+def place_of_call() -> str:
+    """Return the line of the component's code that called the framework, as `` (part.py:41)``, or ""."""
+    own = next((one for one in walk_stack(None) if _is_component_code(one[0])), None)
+    return "" if own is None else f" ({own[0].f_code.co_filename.rpartition('/')[2]}:{own[1]})"
+
+
 _FRAMEWORK = "volery."
 _NO_KEYS = "let another component publish what its keys would"
 

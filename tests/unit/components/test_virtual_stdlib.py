@@ -13,7 +13,7 @@ from volery.components.loader import Loader
 from volery.components.programs import load_program, start
 from volery.components.virtual_stdlib import EPOCH, virtual_modules
 from volery.kernel.virtual import VirtualKernel
-from volery.trace.events import Activation, Failure
+from volery.trace.events import Activation, Failure, Text
 
 
 @pytest.fixture
@@ -222,6 +222,20 @@ def test_the_end_of_a_run_unwinds_threads_that_hold_and_wait(run):
         """
     )
     assert reported == ["unwound"]
+
+
+def test_a_thread_that_waits_for_its_own_lock_is_named(run):
+    run(
+        """
+        threading.Thread(target=lambda: time.sleep(1000)).start()
+        lock = threading.Lock()
+        with lock:
+            lock.acquire(timeout=1.0)
+            lock.acquire()
+        """
+    )
+    (warning,) = (event.text for event in run.events if isinstance(event, Text))
+    assert warning.startswith("waits for a lock that the same thread holds (user.py:11)")
 
 
 def test_a_missing_name_states_the_reason(run):

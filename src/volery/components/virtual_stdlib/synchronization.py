@@ -16,10 +16,14 @@ from typing import Any, ClassVar
 from volery.base.errors import UsageError
 from volery.base.time import Ns, from_seconds, to_seconds
 from volery.components.component_api import component_of
+from volery.components.instance import place_of_call
 from volery.components.virtual_stdlib.process_environment import make_module
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
 from volery.kernel.task import Task
+from volery.trace.events import Text
+
+_WARNING = 4
 
 
 class KernelBound:
@@ -162,6 +166,8 @@ class Lock(ContextManaged):
         """Acquire the lock; return False if it was not free in time."""
         longest = longest_wait(blocking, timeout)
         with self.kernel as kernel:
+            if longest is None and self._owner is not None and self._owner is kernel.current():
+                self._warn_of_deadlock(kernel)
             if not self._free.wait_for(lambda: self._owner is None, longest, ends_activation=blocking):
                 return False
             self._owner = waiting.current_task(kernel)
@@ -181,6 +187,12 @@ class Lock(ContextManaged):
         """Return whether the lock is held."""
         with self.kernel:
             return self._owner is not None
+
+    @staticmethod
+    def _warn_of_deadlock(kernel: Kernel) -> None:
+        component, where = waiting.current_task(kernel).context.component, place_of_call()
+        what = f"waits for a lock that the same thread holds{where}: only another one can release it"
+        kernel.record(Text(kernel.now(), component, _WARNING, what))
 
 
 class RLock(Lock):
