@@ -424,7 +424,11 @@ class Environment:
     roads: Annotated[Ways, WAYS, "Roads, for rovers."] = Ways()
     corridors: Annotated[Ways, WAYS, "Air corridors, for drones."] = Ways()
     no_fly_zones: Annotated[tuple[Prism, ...], PRISMS, "Volumes that drones must not enter."] = ()
-    buildings: Annotated[tuple[Prism, ...], PRISMS, "Buildings."] = ()
+    buildings: Annotated[
+        tuple[Prism, ...],
+        PRISMS,
+        "What stands in the world and can be hit: buildings, walls, bridges (with a floor).",
+    ] = ()
     wind: Annotated[Wind, Shorter(Record(Wind), key="speed"), "Wind over all of the world."] = Wind()
     vehicles: Annotated[
         tuple[Vehicle, ...], MapOf(Record(Vehicle), values_only=True), "Drones and rovers, by name."

@@ -25,6 +25,7 @@ from volery.trace.attachments import RunSetup, Scenery
 from volery.trace.events import (
     NONE,
     Activation,
+    Collision,
     Event,
     Failure,
     LinkState,
@@ -143,6 +144,7 @@ class Digest:
         self._processor_of = {one.name: one.processor for one in setup.components}
         self._parcels: dict[str, list[Milestone]] = {}
         self._remarks: list[Json] = []
+        self._collisions: list[Json] = []
         self._left_out = 0
         self._deliveries: set[tuple[str, str]] = set()
         self._subscriptions: dict[str, set[str]] = {}
@@ -154,7 +156,7 @@ class Digest:
             Activation: self._activation,
             Milestone: self._milestone,
             Message: self._message,
-            **dict.fromkeys((Failure, Operation, LinkState, Text), self._remark),
+            **dict.fromkeys((Collision, Failure, Operation, LinkState, Text), self._remark),
         }
         """What adds an event of each kind that matters."""
 
@@ -210,6 +212,11 @@ class Digest:
 
     def _remark(self, event: Event) -> None:
         match event:
+            case Collision():
+                self._note(event.at, "failure", event.vehicle, str(event))
+                self._collisions.append(
+                    {"t": _seconds(event.at), "x": round(event.x, 2), "y": round(event.y, 2)}
+                )
             case Failure():
                 self._note(event.at, "failure", event.who, event.what)
             case Operation() if event.outcome != "ok":
@@ -243,6 +250,7 @@ class Digest:
             "vehicles": [_vehicle(name, track) for name, track in self._tracks.items()],
             "processors": [self._processor(name) for name in self._load],
             "parcels": [{"name": name, "steps": self._steps(steps)} for name, steps in self._parcels.items()],
+            "collisions": self._collisions,
             "remarks": sorted(self._remarks, key=lambda remark: float(remark["t"])),
             "left_out": self._left_out,
             "messages": [

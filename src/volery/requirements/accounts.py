@@ -41,6 +41,7 @@ from volery.trace.events import (
     Activation,
     Call,
     Charge,
+    Collision,
     Event,
     Failure,
     Message,
@@ -114,6 +115,7 @@ class Accounts:
             Operation: self._operation,
             Milestone: self._milestone,
             Failure: self._failure,
+            Collision: self._collision,
             Verdict: self._verdict,
             Text: self._text,
             Unserved: self._unserved_want,
@@ -200,6 +202,9 @@ class Accounts:
     def _failure(self, event: Failure) -> None:
         self._failures.append(event)
         self._other(event)
+
+    def _collision(self, event: Collision) -> None:
+        self._failure(Failure(event.at, event.vehicle, str(event)))
 
     def _verdict(self, event: Verdict) -> None:
         self._verdicts[event.requirement] = event

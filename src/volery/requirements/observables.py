@@ -33,6 +33,7 @@ from volery.trace.events import (
     Activation,
     Call,
     Charge,
+    Collision,
     Event,
     Failure,
     Message,
@@ -324,6 +325,10 @@ def _worst(names: tuple[str, ...], error: Callable[[Operation], float]) -> Make:
     return make
 
 
+def _collisions(vehicle: str, setup: RunSetup) -> Observer:
+    return _count(Collision, lambda event: event.vehicle == vehicle)
+
+
 def _larger(one: float, other: float) -> float:
     """Return the larger number; NaN only if both are."""
     return other if isnan(one) or other > one else one
@@ -556,6 +561,7 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
         "energy drawn from the battery",
         _vehicle(lambda ledger: ledger.joules if ledger.metered else nan),
     ),
+    ("vehicle", "collisions", "", "how often it hit what stands in the world", _collisions),
     ("vehicle", "failures", "", "operations that did not succeed", _failed_operations),
     ("chain", "latency", "s", "greatest age of data at the end of a chain of topics", _latency(_largest)),
     ("chain", "latency_mean", "s", "mean age", _latency(Distribution.mean)),

@@ -22,7 +22,7 @@ from volery.base.time import MINUTE, Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext, Scope
 from volery.requirements.record import Status
-from volery.trace.events import Failure
+from volery.trace.events import Collision, Failure
 
 FOREVER: Ns = 2**63 - 1
 
@@ -74,6 +74,10 @@ class Ending:
         """Let the run's outcome be failed because component *who* has; the others go on."""
         self._keep(error)
         self._failures.append(_reason(who, error))
+
+    def vehicle_hit(self, event: Collision) -> None:
+        """Let the run's outcome be failed because a vehicle has hit something; the run goes on."""
+        self._failures.append(f"{event.vehicle} {event}")
 
     def check_over(self) -> None:
         """End the run if a component has failed and none is left that runs."""

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns, clock
-from volery.trace.events import Event, Failure, LinkState, Milestone, Operation, Text, Verdict
+from volery.trace.events import Collision, Event, Failure, LinkState, Milestone, Operation, Text, Verdict
 
 LEVELS = {"error": 3, "warning": 4, "info": 6, "debug": 7}
 """Levels and the syslog severity up to which each shows lines."""
@@ -102,6 +102,8 @@ def entry_of(event: Event) -> Entry | None:
             entry = event.at, event.severity, event.source, event.text
         case Failure():
             entry = event.at, error, event.who, event.what
+        case Collision():
+            entry = event.at, error, event.vehicle, str(event)
         case Operation():
             good = event.outcome == "ok"
             text = f"{event.asked}: done" if good else f"{event.asked}: {event.outcome}: {event.said}"

@@ -16,7 +16,7 @@ from volery.base.time import MS, Ns, S, clock
 from volery.kernel.api import Kernel
 from volery.run.event_log import LEVELS, LogOptions
 from volery.run.vehicle_arrays import INDEX, vehicle_arrays
-from volery.trace.events import Event, Failure, Milestone, Text
+from volery.trace.events import Collision, Event, Failure, Milestone, Text
 from volery.vehicles.driver import LINK_LOSS_ACTIONS, LinkLossAction
 from volery.vehicles.observed_vehicle import ON_LINK_LOSS
 
@@ -93,7 +93,7 @@ class ComponentLogReporter:
         self._unshown = dict.fromkeys(components, 0)
 
     def __call__(self, event: Event) -> None:
-        """Show and count the lines of severity warning and above, and failures."""
+        """Show and count the lines of severity warning and above, and failures; show collisions."""
         if isinstance(event, Text) and event.severity <= LEVELS["warning"] and event.source in self._errors:
             self._take(event.at, event.source, event.severity, event.text)
         elif (
@@ -102,6 +102,8 @@ class ComponentLogReporter:
             and not self._last.get(event.who, "").endswith(event.what)  # a client library has logged it
         ):
             self._take(event.at, event.who, LEVELS["error"], event.what)
+        elif isinstance(event, Collision) and self._tell is not None:
+            self._tell(f"{clock(event.at)} error   {event.vehicle}: {event}")
 
     def _take(self, at: Ns, who: str, severity: int, text: str) -> None:
         line = " ".join(text.split())

@@ -22,7 +22,7 @@ from volery.run.assembly.computers import Platform, PowerFeed
 from volery.run.assembly.cpp import compile_all, has_cpp
 from volery.run.assembly.fault_effects import Affected, FleetLinks, inject, with_faulty_links
 from volery.run.assembly.model_checks import vocabulary
-from volery.run.assembly.simulated_fleet import SimulatedFleet
+from volery.run.assembly.simulated_fleet import SimulatedFleet, surroundings_of
 from volery.run.distributed import (
     DistributedRun,
     GraphSettings,
@@ -159,11 +159,11 @@ class _Simulation:
         self._fleet = SimulatedFleet(
             kernel,
             system.vehicles,
-            environment.origin,
-            environment.wind,
+            surroundings_of(environment),
             options.seed,
             through_bytes=with_faulty_links(environment),
         )
+        self._fleet.on_collision = self._ending.vehicle_hit
         self._built = self._build(platform)
         self._recording = Recording(setup, options.folder, attachments_of(system), traced=options.traced)
         kernel.record = self._recording.stream

@@ -32,6 +32,7 @@ from volery.trace.events import (
     Activation,
     Call,
     Charge,
+    Collision,
     ControlSample,
     Event,
     Failure,
@@ -320,6 +321,7 @@ def _story(journey: list[tuple[Ns, float, float, float]]) -> Iterator[Event]:
     yield LinkState(500 * MS, "drone_1", "up", "")
     figures = 0.3, 0.2, 0.1, 0.1, 0.0, 0.0, 0.1
     yield ControlSample(600 * MS, "drone_1", "altitude", "P", "m", 0.0, *figures)
+    yield Collision(21 * S, "drone_2", "depot", 3.4, 20.0, 10.0, 5.0)
     yield Failure(21 * S, "drone_2", "takeoff refused: Arm: Battery below minimum")
 
 

@@ -148,6 +148,25 @@ class VehicleState(NamedTuple):
         return self.estimated_x, self.estimated_y, self.estimated_z
 
 
+class Collision(NamedTuple):
+    """A vehicle hit something that stands in the world.
+
+    ``solid`` is its name in the model, ``speed`` that into its surface [m/s]; position of the vehicle in ENU
+    metres about the world's origin.
+    """
+
+    at: Ns
+    vehicle: str
+    solid: str
+    speed: float
+    x: float
+    y: float
+    z: float
+
+    def __str__(self) -> str:
+        return f"hit {self.solid} at {self.speed:.1f} m/s, {round(self.z, 1) + 0.0:.1f} m up"  # no -0.0
+
+
 class Operation(NamedTuple):
     """A vehicle operation (take-off, goto, ...) from its call to its end, with its error at the end.
 
@@ -272,6 +291,7 @@ Event = (
     | Transmission
     | Published
     | VehicleState
+    | Collision
     | Operation
     | Milestone
     | Text

@@ -20,6 +20,7 @@ from volery.base.time import Ns
 from volery.trace.events import (
     Activation,
     Call,
+    Collision,
     Event,
     Failure,
     LinkState,
@@ -73,6 +74,7 @@ class TimelineWriter:
             Milestone: self._milestone,
             LinkState: self._link_state,
             Failure: self._failure,
+            Collision: self._collision,
             Verdict: self._verdict,
         }
 
@@ -145,6 +147,9 @@ class TimelineWriter:
 
     def _failure(self, event: Failure) -> None:
         self._instant(event.at, f"failure of {event.who}", event.what)
+
+    def _collision(self, event: Collision) -> None:
+        self._instant(event.at, f"{event.vehicle} {event}", "")
 
     def _verdict(self, event: Verdict) -> None:
         self._instant(event.at, f"{event.requirement} {'met' if event.met else 'NOT met'}", event.observable)

@@ -225,6 +225,20 @@
     return null;
   }
 
+  function drawCollisions(context, time) {
+    context.strokeStyle = colour("bad");
+    context.lineWidth = 3;
+    for (const { t, x, y } of data.collisions) {
+      if (t > time) continue;
+      context.beginPath();
+      for (const side of [-1, 1]) {
+        context.moveTo(toX(x) - 8, toY(y) - 8 * side);
+        context.lineTo(toX(x) + 8, toY(y) + 8 * side);
+      }
+      context.stroke();
+    }
+  }
+
   function drawParcels(context, time) {
     const stacked = {};
     for (const parcel of data.parcels) {
@@ -281,6 +295,7 @@
     drawPlaces(context, taken);
     data.vehicles.forEach((vehicle, index) => drawVehicle(context, vehicle, colour(series(index)), time));
     drawParcels(context, time);
+    drawCollisions(context, time);
     data.vehicles.forEach((vehicle) => {
       if (!vehicle.t.length) return;
       const spot = where(vehicle, time);

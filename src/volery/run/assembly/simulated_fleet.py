@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle
 from math import pi, radians
+from typing import NamedTuple
 
 from volery.base.elementary import cos, sin
 from volery.base.errors import UsageError
@@ -22,6 +23,7 @@ from volery.links.in_process_link import in_process_pair
 from volery.links.link import Codec, Link
 from volery.links.wire_faults import FaultyLink, WireFaults, faulty_pair
 from volery.model.environment import Battery as BatteryModel
+from volery.model.environment import Environment, Prism
 from volery.model.environment import Vehicle as VehicleModel
 from volery.model.environment import Wind as WindModel
 from volery.run.assembly.simulated_vehicles import LINK_DELAY, SimulatedVehicle
@@ -30,9 +32,19 @@ from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily, fi
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
 from volery.simulation.world.body_specs import Battery, BodySpec, Multirotor, Rover
 from volery.simulation.world.environment_models import Wind
+from volery.simulation.world.scene import Scene, Solid
 from volery.simulation.world.world import World
+from volery.trace.events import Collision, ignore
 
 CELL_NOMINAL_VOLTS = 3.7
+
+
+class Surroundings(NamedTuple):
+    """The world that the vehicles share: its frame, its wind and what stands in it."""
+
+    frame: LocalFrame
+    wind: WindModel
+    scene: Scene | None = None
 
 
 class SimulatedFleet:
@@ -47,8 +59,7 @@ class SimulatedFleet:
         self,
         kernel: Kernel,
         vehicles: Sequence[VehicleModel],
-        frame: LocalFrame,
-        wind: WindModel,
+        surroundings: Surroundings,
         seed: int,
         *,
         systems: Mapping[str, int] | None = None,
@@ -58,12 +69,22 @@ class SimulatedFleet:
         self._kernel = kernel
         self._seed = seed
         self._faulty: dict[str, list[FaultyLink]] = {vehicle: [] for vehicle in through_bytes}
-        self.frame = frame
+        self.frame = surroundings.frame
         specs = [body_of(vehicle) for vehicle in vehicles]
         self._world: World | None = None
         flights: list[Flight] = []
         if specs:  # a model of computers alone has no world
-            self._world, flights = make_world(kernel.now, specs, seed=seed, frame=frame, wind=wind_of(wind))
+            self._world, flights = make_world(
+                kernel.now,
+                specs,
+                seed=seed,
+                frame=surroundings.frame,
+                wind=wind_of(surroundings.wind),
+                scene=surroundings.scene,
+            )
+        self._collisions = dict.fromkeys((vehicle.name for vehicle in vehicles), 0)
+        self.on_collision: Callable[[Collision], object] = ignore
+        """Called with each collision, when it is recorded."""
         self.flights: dict[str, Flight] = {}
         self.autopilots: dict[str, Autopilot] = {}
         self._families: dict[str, FirmwareFamily] = {}
@@ -182,8 +203,14 @@ class SimulatedFleet:
 
     def record_states(self) -> None:
         """Record the present state of every vehicle."""
-        for autopilot in self.autopilots.values():
+        for name, autopilot in self.autopilots.items():
             self._kernel.record(autopilot.state())
+            hit = self.flights[name].last_collision()
+            if hit is not None and hit.collisions > self._collisions[name]:
+                self._collisions[name] = hit.collisions
+                event = Collision(self._kernel.now(), name, hit.solid, hit.speed, *hit.position)
+                self._kernel.record(event)
+                self.on_collision(event)
 
 
 def _ids(names: Sequence[str], stated: Mapping[str, int]) -> dict[str, int]:
@@ -197,6 +224,16 @@ def _ids(names: Sequence[str], stated: Mapping[str, int]) -> dict[str, int]:
         raise UsageError(f"system ids {sorted(taken)}: each vehicle needs its own")
     free = cycle([number for number in range(1, 256) if number not in taken] or range(1, 256))
     return {name: stated[name] if name in stated else next(free) for name in names}
+
+
+def surroundings_of(environment: Environment) -> Surroundings:
+    """Return the world of a model's environment."""
+    scene = Scene(_solids(environment.buildings), _solids(environment.no_fly_zones))
+    return Surroundings(environment.origin, environment.wind, scene)
+
+
+def _solids(prisms: Sequence[Prism]) -> list[Solid]:
+    return [Solid(one.name, one.corners, one.floor_m, one.ceiling_m) for one in prisms]
 
 
 def wind_of(model: WindModel) -> Wind:
@@ -230,7 +267,8 @@ def fleet_of(kernel: Kernel, wanted: Sequence[SimulatedVehicle], seed: int) -> S
     first = wanted[0]
     vehicles = [_placed(one.vehicle, first.frame) for one in wanted]
     systems = {one.vehicle.name: one.system for one in wanted if one.system is not None}
-    fleet = SimulatedFleet(kernel, vehicles, first.frame, first.wind, seed, systems=systems, logging=True)
+    around = Surroundings(first.frame, first.wind)
+    fleet = SimulatedFleet(kernel, vehicles, around, seed, systems=systems, logging=True)
     for one in wanted:
         for at, channel, pulse in one.transmitter:
             fleet.move_transmitter(one.vehicle.name, at, channel, pulse)

@@ -16,7 +16,7 @@ from volery.base.elementary import exp, sine_cosine
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.simulation.world.dynamics import CELL_FULL_VOLTS, battery_current
-from volery.simulation.world.environment_models import GUST_EVERY, Terrain, Wind, magnetic_field
+from volery.simulation.world.environment_models import GUST_EVERY, Wind, magnetic_field
 from volery.simulation.world.sensors import fill_sensor_parameters, sensor_suite
 from volery.simulation.world.state_layout import (
     MULTIROTOR,
@@ -45,6 +45,7 @@ from volery.simulation.world.state_layout import (
     P_MAX_SPEED,
     P_MAX_STEERING,
     P_MAX_TURN_RATE,
+    P_REACH,
     P_RESISTANCE,
     P_ROLLING,
     P_ROTOR_DECAY,
@@ -209,6 +210,12 @@ class Multirotor:
         _above_zero("multirotor", self, _MULTIROTOR_POSITIVE)
 
     @property
+    def reach(self) -> float:
+        """Distance of the rotors' tips from the centre [m]."""
+        arm = max(sqrt(one.forward * one.forward + one.left * one.left) for one in self.rotors)
+        return arm + 0.5 * self.propeller_diameter
+
+    @property
     def torque_coefficient(self) -> float:
         """k_Q = k_T^1.5 / (FM sqrt(2 rho A)) [N m s^2]: see ``dynamics``."""
         disc = pi * self.propeller_diameter * self.propeller_diameter / 4.0
@@ -288,6 +295,11 @@ class Rover:
     def __post_init__(self) -> None:
         _above_zero("rover", self, _ROVER_POSITIVE)
 
+    @property
+    def reach(self) -> float:
+        """Half of the length [m]: the wheels reach beyond the axles."""
+        return 0.75 * self.wheelbase
+
 
 BodySpec = Multirotor | Rover
 
@@ -344,6 +356,7 @@ def fill_parameters(row: Array, spec: BodySpec, frame: LocalFrame, wind: Wind) -
         wind: The wind, which gives the correlation time of gusts.
     """
     row[P_MASS] = spec.mass
+    row[P_REACH] = spec.reach
     row[P_DRAG_LINEAR] = spec.drag_linear
     row[P_DRAG_QUADRATIC] = spec.drag_quadratic
     row[P_CAPACITY] = spec.battery.capacity_ah * 3600.0
@@ -363,9 +376,14 @@ def fill_parameters(row: Array, spec: BodySpec, frame: LocalFrame, wind: Wind) -
     fill_sensor_parameters(row, sensor_suite(spec.sensors))
 
 
-def fill_state(row: Array, spec: BodySpec, terrain: Terrain) -> None:
-    """Write the initial state: at rest on the ground at ``spec.at``, with the spec's heading."""
-    ground = terrain.height(spec.at[0], spec.at[1])
+def fill_state(row: Array, spec: BodySpec, ground: float) -> None:
+    """Write the initial state: at rest at ``spec.at``, with the spec's heading.
+
+    Args:
+        row: The body's row.
+        spec: The body.
+        ground: Height of what it stands on, about the world's origin, up [m].
+    """
     depth = spec.feet[2] - 0.005 if isinstance(spec, Multirotor) else 0.0
     row[S_POSITION : S_POSITION + 3] = spec.at[0], spec.at[1], ground + depth
     half = (pi / 2.0 - radians(spec.heading_deg)) / 2.0

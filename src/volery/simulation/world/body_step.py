@@ -25,6 +25,7 @@ from volery.simulation.world.dynamics import (
     volts_amps,
 )
 from volery.simulation.world.environment_models import GUST_EVERY, advance_gust, ground_height
+from volery.simulation.world.scene import Cylinder, SceneArrays, contact, top_below
 from volery.simulation.world.sensors import sample_sensors
 from volery.simulation.world.state_layout import (
     ACTIVE_STEPS,
@@ -37,9 +38,12 @@ from volery.simulation.world.state_layout import (
     P_IDLE_POWER,
     P_KIND,
     P_MASS,
+    P_REACH,
     S_AMPS,
     S_ATTITUDE,
     S_CHARGE,
+    S_COLLISION,
+    S_COLLISIONS,
     S_CONTACT_SPEED,
     S_CONTACTS,
     S_DISTANCE,
@@ -80,6 +84,9 @@ def world_sources() -> list[Path]:
 _STILL_SPEED = 0.02  # [m/s]
 _STILL_RATE = 0.05  # [rad/s]
 _LIGHT = 0.7  # fraction of the weight: with less thrust a landed body stays where it is
+_STEP_UP = 0.02  # [m] a body sunk into a top by less still stands on it
+_BREAKS = 0.3  # [m/s] into a solid that breaks blades; with less a body is only held off
+_REBOUND = 0.2  # coefficient of restitution of an airframe on a wall
 _STANDING_ROTOR = 1e-6  # [rad/s] below which a rotor stands: it would slow down for ever, in denormal numbers
 
 
@@ -228,6 +235,43 @@ def _rover_power(row: Array) -> float:
 
 
 @numeric
+def _collide(scene: SceneArrays, row: Array, flying: bool, k: int) -> None:
+    """Hold a body off the solids of the scene; a multirotor that flies into one breaks its blades.
+
+    A rover stops, and can go on in another direction.
+    """
+    east, north, up = row[S_POSITION], row[S_POSITION + 1], row[S_POSITION + 2]
+    tall = row[P_FEET + 2] if flying else row[P_REACH]
+    low = up - tall if flying else up
+    centre = up if flying else up + 0.5 * tall
+    body = Cylinder(east, north, low, centre, up + tall, row[P_REACH])
+    solid, depth, out_east, out_north, out_up = contact(scene, body)
+    if solid < 0:
+        return
+    row[S_POSITION] += depth * out_east
+    row[S_POSITION + 1] += depth * out_north
+    row[S_POSITION + 2] += depth * out_up
+    into = -(out_east * row[S_VELOCITY] + out_north * row[S_VELOCITY + 1] + out_up * row[S_VELOCITY + 2])
+    if into <= 0.0:
+        return
+    if flying:
+        back = (1.0 + _REBOUND) * into
+        row[S_VELOCITY] += back * out_east
+        row[S_VELOCITY + 1] += back * out_north
+        row[S_VELOCITY + 2] += back * out_up
+    else:
+        row[S_SPEED] = 0.0
+    if into > _BREAKS and not (flying and row[S_COLLISIONS] > 0.0):
+        row[S_COLLISIONS] += 1.0
+        row[S_COLLISION] = k
+        row[S_COLLISION + 1] = solid
+        row[S_COLLISION + 2] = into
+        row[S_COLLISION + 3] = east
+        row[S_COLLISION + 4] = north
+        row[S_COLLISION + 5] = up
+
+
+@numeric
 def step_body(bodies: Bodies, body: int, row: Array) -> None:
     """Advance one body to its next grid step under the commands in ``W_THROTTLE``, and take its samples.
 
@@ -237,14 +281,22 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
         row: The body's row.
     """
     key = bodies.keys[body]
+    scene = SceneArrays(bodies.solids, bodies.edges, bodies.cells, bodies.lattice)
     flying = row[P_KIND] == MULTIROTOR
+    if flying and row[S_COLLISIONS] > 0.0:  # its blades are broken
+        for i in range(4):
+            row[W_THROTTLE + i] = 0.0
     for axis in range(3):
         row[W_LAST_VELOCITY + axis] = row[S_VELOCITY + axis]
         row[W_AIR_VELOCITY + axis] = row[U_WIND + axis] + row[S_GUST + axis]
     row[W_GROUND] = row[S_GROUND]
     _advance(row, flying)
+    _collide(scene, row, flying, bodies.reached[body] + 1)
     height_before = row[S_POSITION + 2]
-    row[S_GROUND] = ground_height(bodies.heights, bodies.grid, row[S_POSITION], row[S_POSITION + 1])
+    row[S_GROUND] = max(
+        ground_height(bodies.heights, bodies.grid, row[S_POSITION], row[S_POSITION + 1]),
+        top_below(scene, row[S_POSITION], row[S_POSITION + 1], row[S_POSITION + 2] + _STEP_UP),
+    )
     if flying:
         if row[S_RESTING] == 0.0:
             _normalise(row)
@@ -290,11 +342,12 @@ def is_finite(row: Array) -> bool:
 
 
 def _compose(digest: str) -> Callable[..., int]:
-    def advance_bodies(  # noqa: PLR0917  # the arrays of Bodies
+    def advance_bodies(  # noqa: PLR0913, PLR0917  # the arrays of Bodies
         rows: Array, keys: NDArray[np.uint64], reached: NDArray[np.int64], heights: Array, grid: Array,
-        read: NDArray[np.int64], span: NDArray[np.int64],
+        read: NDArray[np.int64], span: NDArray[np.int64], solids: Array, edges: Array,
+        cells: NDArray[np.int64], lattice: Array,
     ) -> int:  # fmt: skip
-        bodies = Bodies(rows, keys, reached, heights, grid, read, span)
+        bodies = Bodies(rows, keys, reached, heights, grid, read, span, solids, edges, cells, lattice)
         finite = True
         for body in range(span[0], span[1]):
             row = rows[body]

@@ -99,6 +99,10 @@ S_GUST = _add("S_GUST", "m/s", "gust velocity at the body", 3, ENU)
 S_GROUND = _add("S_GROUND", "m", "height of the ground straight below, up")
 S_PAYLOAD_ENERGY = _add("S_PAYLOAD_ENERGY", "J", "part of S_ENERGY that the on-board computers used")
 S_DISTANCE = _add("S_DISTANCE", "m", "length of the path flown or driven")
+S_COLLISIONS = _add("S_COLLISIONS", "1", "number of collisions with a solid of the scene")
+S_COLLISION = _add(
+    "S_COLLISION", "mixed", "the last one", 6, "grid step, solid, speed into it [m/s], east, north, up [m]"
+)
 S_STARTED = _add("S_STARTED", "1", "1 once the first samples are taken")
 STATE = WORLD_LAYOUT.end
 """Number of columns of the state; they come before all others."""
@@ -161,6 +165,7 @@ P_INFLOW = _add(
 )
 P_DRAG_QUADRATIC = _add("P_DRAG_QUADRATIC", "N s^2/m^2", "quadratic drag coefficient")
 P_SPIN_DAMPING = _add("P_SPIN_DAMPING", "N m s/rad", "damping of body rates")
+P_REACH = _add("P_REACH", "m", "radius of the upright cylinder that a body collides with")
 P_FEET = _add("P_FEET", "m", "position of the feet", 3, "half length, half width, depth below the centre")
 P_STIFFNESS = _add("P_STIFFNESS", "N/m", "spring of one foot")
 P_DAMPING = _add("P_DAMPING", "N s/m", "damper of one foot")
@@ -240,7 +245,8 @@ class Bodies(NamedTuple):
     ``rows`` (bodies, WORLD + the flight stack's columns); ``keys`` (bodies) of the noise; ``reached``
     (bodies): grid step of each row; ``heights`` (posts north, posts east) and ``grid`` (west edge, south
     edge, spacing) of the terrain, in metres; ``read`` (bodies): grid step at which each was last read;
-    ``span``: first body to advance, the body after the last one, and the grid step to advance to.
+    ``span``: first body to advance, the body after the last one, and the grid step to advance to. ``solids``,
+    ``edges``, ``cells`` and ``lattice`` are the scene's, see ``SceneArrays``.
     """
 
     rows: Array
@@ -250,10 +256,14 @@ class Bodies(NamedTuple):
     grid: Array
     read: NDArray[np.int64]
     span: NDArray[np.int64]
+    solids: Array
+    edges: Array
+    cells: NDArray[np.int64]
+    lattice: Array
 
 
 BODIES_ARGUMENTS = (
     "float64[:,::1]", "uint64[::1]", "int64[::1]", "float64[:,::1]", "float64[::1]",
-    "int64[::1]", "int64[::1]",
+    "int64[::1]", "int64[::1]", "float64[:,::1]", "float64[:,::1]", "int64[::1]", "float64[::1]",
 )  # fmt: skip
 """Types of the arguments of a compiled step: the arrays of ``Bodies``."""

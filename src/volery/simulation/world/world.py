@@ -21,7 +21,8 @@ from volery.base.seeds import key
 from volery.base.time import MS, Ns
 from volery.simulation.world.body_specs import BodySpec, fill_parameters, fill_state
 from volery.simulation.world.body_step import advance_bodies
-from volery.simulation.world.environment_models import Terrain, Wind
+from volery.simulation.world.environment_models import Wind
+from volery.simulation.world.scene import Scene
 from volery.simulation.world.sensors import Measurement, MountedSensor, SensorInput, added_sensor
 from volery.simulation.world.state_layout import (
     ACTIVE_STEPS,
@@ -30,6 +31,8 @@ from volery.simulation.world.state_layout import (
     S_AMPS,
     S_ATTITUDE,
     S_CHARGE,
+    S_COLLISION,
+    S_COLLISIONS,
     S_CONTACT_SPEED,
     S_CONTACTS,
     S_DISTANCE,
@@ -101,6 +104,24 @@ class Truth(NamedTuple):
     distance: float
 
 
+class Collision(NamedTuple):
+    """How a body hit something that stands in the world.
+
+    Args:
+        time: Time of the grid step [ns].
+        solid: Name of what it hit.
+        speed: Speed into its surface [m/s].
+        position: Position of the body: east, north, up about the world's origin [m].
+        collisions: Number of collisions of the body so far.
+    """
+
+    time: Ns
+    solid: str
+    speed: float
+    position: Vector
+    collisions: int
+
+
 class _PendingInput:
     """Values for the columns of a row from *column* on, with effect from a grid step."""
 
@@ -111,14 +132,14 @@ class _PendingInput:
 
 
 def _initial_arrays(
-    specs: Sequence[BodySpec], seed: int, frame: LocalFrame, wind: Wind, terrain: Terrain, columns: int
+    specs: Sequence[BodySpec], seed: int, frame: LocalFrame, wind: Wind, scene: Scene, columns: int
 ) -> Bodies:
     """Return the arrays of a world at step 0, with *columns* more columns than the world's own."""
-    heights, grid = terrain.arrays()
+    heights, grid = scene.terrain.arrays()
     rows: Array = np.zeros((len(specs), WORLD + columns))
     for row, spec in zip(rows, specs, strict=True):
         fill_parameters(row, spec, frame, wind)
-        fill_state(row, spec, terrain)
+        fill_state(row, spec, scene.standing_height(spec.at[0], spec.at[1]))
         row[U_MOTOR_HEALTH : U_MOTOR_HEALTH + 4] = 1.0
         row[U_WIND : U_WIND + 3] = wind.east, wind.north, wind.up
         row[U_GUST] = wind.gust
@@ -131,6 +152,7 @@ def _initial_arrays(
         grid=grid,
         read=np.full(len(specs), -ACTIVE_STEPS, dtype=np.int64),
         span=np.array((0, len(specs), 0), dtype=np.int64),
+        **scene.arrays._asdict(),
     )
 
 
@@ -144,7 +166,8 @@ class World:
         seed: Seed of all noise.
         frame: Local frame whose origin is the world's.
         wind: Wind; ``None``: still air.
-        terrain: Terrain; ``None``: level ground.
+        scene: The ground and what stands in the world; ``None``: level ground. A body that begins where a
+            building stands begins on its top.
         columns: Number of columns that *advance* adds to each row.
 
     Raises:
@@ -160,7 +183,7 @@ class World:
         seed: int = 0,
         frame: LocalFrame,
         wind: Wind | None = None,
-        terrain: Terrain | None = None,
+        scene: Scene | None = None,
         columns: int = 0,
     ) -> None:
         self.now = now
@@ -170,7 +193,9 @@ class World:
         count = len(self.specs)
         if not count:
             raise UsageError("a world without bodies; give at least one")
-        self.arrays = _initial_arrays(self.specs, seed, frame, wind or Wind(), terrain or Terrain(), columns)
+        self.scene = scene or Scene()
+        """The ground and what stands in the world."""
+        self.arrays = _initial_arrays(self.specs, seed, frame, wind or Wind(), self.scene, columns)
         self._octets = self.arrays.rows.data.cast("B")
         self._row_octets = self.arrays.rows.strides[0]
         self._reached = self.arrays.reached.data
@@ -242,6 +267,16 @@ class World:
             row[S_GROUND],
             row[S_DISTANCE],
         )
+
+    def last_collision(self, body: int) -> Collision | None:
+        """Return the last collision of *body* so far; ``None``: it has hit nothing."""
+        self.advance_to_now(body)
+        row = self.arrays.rows[body, : S_COLLISION + 6].tolist()
+        if not row[S_COLLISIONS]:
+            return None
+        step, solid, speed, east, north, up = row[S_COLLISION:]
+        name = self.scene.solids[int(solid)].name
+        return Collision(int(step) * STEP, name, speed, (east, north, up), int(row[S_COLLISIONS]))
 
     def measurement(self, body: int, sensor: str) -> Measurement:
         """Return the last sample of an added sensor of *body*.

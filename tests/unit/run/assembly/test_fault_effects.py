@@ -31,7 +31,7 @@ from volery.model.faults import (
     WindChange,
 )
 from volery.run.assembly.fault_effects import EFFECTS, Affected, FleetLinks, inject, with_faulty_links
-from volery.run.assembly.simulated_fleet import SimulatedFleet
+from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings
 from volery.simulation.world.state_layout import M_BARO, M_GPS, M_GPS_FIX, M_MAG, U_MOTOR_HEALTH, U_WIND
 from volery.trace.events import Slice, Text
 
@@ -51,8 +51,7 @@ class Run:
         self.fleet = SimulatedFleet(
             self.kernel,
             [DRONE],
-            LocalFrame(47.0, 8.0),
-            Wind(),
+            Surroundings(LocalFrame(47.0, 8.0), Wind()),
             1,
             through_bytes=with_faulty_links(environment),
         )

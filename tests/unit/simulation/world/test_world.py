@@ -10,6 +10,7 @@ from volery.base.frames import LocalFrame
 from volery.base.time import MS
 from volery.simulation.world.body_specs import Multirotor, Rover
 from volery.simulation.world.environment_models import Terrain, Wind, magnetic_field
+from volery.simulation.world.scene import Scene
 from volery.simulation.world.sensors import declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
     S_GUST,
@@ -147,7 +148,9 @@ def test_terrain_is_bilinear_between_its_posts_and_level_beyond(clock, frame):
     assert terrain.height(5.0, 5.0) == pytest.approx(15.0, abs=1e-5)
     assert terrain.height(-50.0, 0.0) == pytest.approx(0.0, abs=1e-3)
     assert terrain.height(50.0, 50.0) == pytest.approx(30.0, abs=1e-3)
-    world = World(clock, [Rover(at=(0.0, 5.0, 0.0), heading_deg=90.0)], frame=frame, terrain=terrain)
+    world = World(
+        clock, [Rover(at=(0.0, 5.0, 0.0), heading_deg=90.0)], frame=frame, scene=Scene(terrain=terrain)
+    )
     world.set_input(0, U_THROTTLE, 0.0, 0.1)
     clock.wait(4)
     east, _, up = world.truth(0).position

@@ -41,7 +41,8 @@ from volery.simulation.autopilots.flight_stack.flight_step import advance_flight
 from volery.simulation.world.arithmetic import FIRMWARE_STREAM, gaussian
 from volery.simulation.world.body_specs import BodySpec, Multirotor
 from volery.simulation.world.dynamics import cell_voltage
-from volery.simulation.world.environment_models import Terrain, Wind
+from volery.simulation.world.environment_models import Wind
+from volery.simulation.world.scene import Scene
 from volery.simulation.world.sensors import Measurement, Sigma, declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
     P_CELLS,
@@ -59,7 +60,7 @@ from volery.simulation.world.state_layout import (
     U_WIND,
     W_ROTATION,
 )
-from volery.simulation.world.world import STEP, Truth, World
+from volery.simulation.world.world import STEP, Collision, Truth, World
 
 __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
@@ -263,6 +264,10 @@ class Flight:
             self._driven = row
             self._world.set_input(self._body, C_CONTROL, *row)
 
+    def last_collision(self) -> Collision | None:
+        """Return how the body last hit something that stands in the world; ``None``: it has not."""
+        return self._world.last_collision(self._body)
+
     def truth(self) -> Truth:
         """Return the true state, for recorders and requirements; an autopilot must not use it."""
         return self._world.truth(self._body)
@@ -460,7 +465,7 @@ def make_world(
     seed: int,
     frame: LocalFrame,
     wind: Wind | None = None,
-    terrain: Terrain | None = None,
+    scene: Scene | None = None,
 ) -> tuple[World, list[Flight]]:
     """Return a world whose bodies have an estimator and inner loops, and a handle on each.
 
@@ -470,7 +475,7 @@ def make_world(
         seed: Seed of all noise.
         frame: Local frame whose origin is the world's.
         wind: Wind; ``None``: still air.
-        terrain: Terrain; ``None``: level ground.
+        scene: The ground and what stands in the world; ``None``: level ground.
     """
     world = World(
         now,
@@ -479,7 +484,7 @@ def make_world(
         seed=seed,
         frame=frame,
         wind=wind,
-        terrain=terrain,
+        scene=scene,
         columns=FLIGHT,
     )
     return world, [Flight(world, body) for body in range(len(specs))]

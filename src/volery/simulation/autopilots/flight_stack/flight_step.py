@@ -79,11 +79,12 @@ def _control(row: Array, k: int) -> None:
 
 
 def _compose(digest: str) -> Callable[..., int]:
-    def advance_flights(  # noqa: PLR0917  # the arrays of Bodies
+    def advance_flights(  # noqa: PLR0913, PLR0917  # the arrays of Bodies
         rows: Array, keys: NDArray[np.uint64], reached: NDArray[np.int64], heights: Array, grid: Array,
-        read: NDArray[np.int64], span: NDArray[np.int64],
+        read: NDArray[np.int64], span: NDArray[np.int64], solids: Array, edges: Array,
+        cells: NDArray[np.int64], lattice: Array,
     ) -> int:  # fmt: skip
-        bodies = Bodies(rows, keys, reached, heights, grid, read, span)
+        bodies = Bodies(rows, keys, reached, heights, grid, read, span, solids, edges, cells, lattice)
         finite = True
         for body in range(span[0], span[1]):
             row = rows[body]

@@ -9,6 +9,7 @@ import pytest
 from rigs import station as rigs_station
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.environment_models import Terrain
+from volery.simulation.world.scene import Scene
 
 ARM, MODE, TAKEOFF, AUX = 400, 176, 22, 218
 GUIDED, LOITER, LAND = 4, 5, 9
@@ -24,7 +25,7 @@ def hilly(station: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
     hill = Terrain([[height, height] for height in rows], west_edge=-500.0, south_edge=0.0, spacing=10.0)
 
     def world(*arguments: Any, **options: Any) -> Any:
-        return make_world(*arguments, **options, terrain=hill)
+        return make_world(*arguments, **options, scene=Scene(terrain=hill))
 
     monkeypatch.setattr(rigs_station, "make_world", world)
 
