@@ -147,6 +147,29 @@ def _fields(of_graph: Any) -> list[Field]:
     return list(of_graph.fields_of)
 
 
+@cache
+def bounded_fields(cls: Any) -> tuple[Field, ...]:
+    """Return the fields of a message class that are sequences with a bound, or contain some."""
+    return tuple(one for one in _fields(cls) if one.bound or (one.nested and bounded_fields(one.nested)))
+
+
+def beyond_bound(message: Any, fields: tuple[Field, ...]) -> str:
+    """Return which sequence of a message is longer than its definition allows, or an empty string.
+
+    Fast DDS of Jazzy and Kilted refuses such a message; a string may be longer than its bound.
+    """
+    for one in fields:
+        value = getattr(message, one.name)
+        if one.bound and len(value) > one.bound:
+            return f"{one.name} has {len(value)} items, at most {one.bound} are allowed"
+        inner = bounded_fields(one.nested) if one.nested else ()
+        for item in () if not inner else value if one.length is not None else (value,):
+            found = beyond_bound(item, inner)
+            if found:
+                return f"{one.name}.{found}"
+    return ""
+
+
 class _Source:
     """Source of a function with its names."""
 

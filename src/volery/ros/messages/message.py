@@ -304,13 +304,15 @@ DEFAULTS: dict[tuple[str, str], Any] = {("geometry_msgs/msg/Quaternion", "w"): 1
 class Field(NamedTuple):
     """A field of a type: exactly one of ``base`` (a number, bool or string) and ``nested`` is given.
 
-    ``length`` is ``None`` for a single value, 0 for a sequence, else the length of an array.
+    ``length`` is ``None`` for a single value, 0 for a sequence, else the length of an array. ``bound`` is the
+    greatest length of a sequence, 0 without.
     """
 
     name: str
     base: str
     nested: type[Message] | None
     length: int | None
+    bound: int = 0
 
 
 def make_class(

@@ -484,11 +484,12 @@ def _describe(name: str, what: Any) -> Field:
     if kind == rosbags.Nodetype.NAME:
         return Field(name, "", message_class(detail), None)
     (inner_kind, inner), count = detail
+    bound = 0
     if kind == rosbags.Nodetype.SEQUENCE:
-        count = 0  # a bound, if the definition states one, is not kept
+        count, bound = 0, count or 0
     if inner_kind == rosbags.Nodetype.BASE:
-        return Field(name, inner[0], None, count)
-    return Field(name, "", message_class(inner), count)
+        return Field(name, inner[0], None, count, bound)
+    return Field(name, "", message_class(inner), count, bound)
 
 
 def service(name: str) -> ServiceType:

@@ -375,6 +375,29 @@ def test_a_parameter_is_not_converted_to_the_type_that_is_declared(stage: Stage)
     ]
 
 
+def test_a_sequence_beyond_its_bound_is_not_published(stage: Stage) -> None:
+    """Observed with Jazzy and Kilted on Fast DDS; a string may be longer than its bound."""
+    stage.script(
+        "bound",
+        """
+import rclpy
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+rclpy.init()
+node = rclpy.create_node("bound")
+node.create_subscription(ParameterDescriptor, "ranges", lambda one: out(len(one.floating_point_range)), 10)
+ranges = node.create_publisher(ParameterDescriptor, "ranges", 10)
+for length in (1, 2, 0):
+    try:
+        ranges.publish(ParameterDescriptor(floating_point_range=[FloatingPointRange()] * length))
+    except RuntimeError as error:
+        out(str(error))
+    rclpy.spin_once(node, timeout_sec=0.1)
+""",
+    )
+    why = "floating_point_range has 2 items, at most 1 are allowed"
+    assert stage.run(2 * S) == [1, f"Failed to publish: cannot publish data: {why}", 0]
+
+
 def test_time(stage: Stage) -> None:
     stage.script(
         "clock",

@@ -22,7 +22,16 @@ from volery.ros.client_libraries.rclpy.ros_time import Clock
 from volery.ros.graph import CallFailedError, EmbeddedGraph, RosGraph, ServiceError, Work
 from volery.ros.graph import Node as GraphNode
 from volery.ros.messages import Message, from_cdr, to_cdr
-from volery.ros.messages.client_classes import Odd, adopt, library_of, odd_values, receiving, take_odd_values
+from volery.ros.messages.client_classes import (
+    Odd,
+    adopt,
+    beyond_bound,
+    bounded_fields,
+    library_of,
+    odd_values,
+    receiving,
+    take_odd_values,
+)
 
 
 class EntityNode(Protocol):
@@ -90,17 +99,27 @@ class Publisher:
         kind = type_name("create_publisher", msg_type)
         self._node = node
         self._warned: set[str] = set()
+        self._bounded = bounded_fields(msg_type)
         self._made = node.graph_node.advertise(name, kind, graph_qos(self.qos_profile))
         self.topic = self.topic_name = self._made.topic
         if events is not None and events[0] is not None:
             watch(node.context, node.graph, self._made, events[0], events[1])
 
     def publish(self, msg: Any) -> None:
-        """Publish a message, or the bytes of one; raise ``TypeError`` if it is of another type."""
+        """Publish a message, or the bytes of one.
+
+        Raises:
+            TypeError: It is of another type.
+            RCLError: A sequence is longer than its bound.
+        """
         if isinstance(msg, bytes):
             msg = adopt(from_cdr(self.msg_type.__msgtype__, msg), library_of(self.msg_type))
         if not isinstance(msg, self.msg_type.of_graph):
             raise TypeError(f"Expected {self.msg_type}, got {type(msg)}")
+        if self._bounded:
+            wrong = beyond_bound(msg, self._bounded)
+            if wrong:
+                raise RCLError(f"Failed to publish: cannot publish data: {wrong}")
         self._made.publish(msg)
         if odd_values:
             for one in take_odd_values(msg):
