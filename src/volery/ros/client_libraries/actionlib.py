@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Any, ClassVar
 
 from volery.base.time import MS, Ns
-from volery.kernel.waiting import Signal
+from volery.kernel.waiting import Lock, Signal
 from volery.ros.client_libraries.library_base import library_module
 from volery.ros.client_libraries.rospy.session import ROSInterruptException, as_ns
 from volery.ros.messages.client_classes import ROSPY, message_of
@@ -507,10 +507,14 @@ class ServerGoalHandle:
     def __hash__(self) -> int:
         return hash(self.get_goal_id().id)
 
+    @property
+    def goal(self) -> Any:
+        """The message that brought the goal, or None."""
+        return None if self._tracker is None else self._tracker.goal
+
     def get_goal(self) -> Any:
         """Return the goal, or None."""
-        sent = None if self._tracker is None else self._tracker.goal
-        return None if sent is None else sent.goal
+        return None if self.goal is None else self.goal.goal
 
     def get_goal_id(self) -> Any:
         """Return the id of the goal with the time at which it was sent."""
@@ -606,6 +610,8 @@ class ActionServer(_UsesRospy):
         self.goal_callback, self.cancel_callback = goal_cb or _nothing, cancel_cb or _nothing
         self.started = False
         self.status_list: list[_Tracker] = []
+        self.lock = Lock(self.rospy.Publisher.sessions.kernel, f"{ns} (goals)")
+        """Held while a goal or a cancellation is taken."""
         self._last_cancel: Ns = 0
         self._ends: list[Any] = []
         self._ids = _made(self, GoalIDGenerator)()
@@ -637,8 +643,8 @@ class ActionServer(_UsesRospy):
         self._feedback = rospy.Publisher(f"{ns}/feedback", self.kinds.action_feedback, queue_size=depth)
         self.started = True
         self._ends = [
-            rospy.Subscriber(f"{ns}/goal", self.kinds.action_goal, self._on_goal),
-            rospy.Subscriber(f"{ns}/cancel", GoalID, self._on_cancel),
+            rospy.Subscriber(f"{ns}/goal", self.kinds.action_goal, self._locked(self._on_goal)),
+            rospy.Subscriber(f"{ns}/cancel", GoalID, self._locked(self._on_cancel)),
         ]
         self._timer = None
         if frequency > 0.0:
@@ -653,6 +659,13 @@ class ActionServer(_UsesRospy):
                 self._timer.shutdown()
             for one in (*self._ends, self._status, self._result, self._feedback):
                 one.unregister()
+
+    def _locked(self, call: Callable[[Any], None]) -> Callable[[Any], None]:
+        def run(message: Any) -> None:
+            with self.lock:
+                call(message)
+
+        return run
 
     def _on_goal(self, message: Any) -> None:
         if not self.started:
@@ -754,15 +767,16 @@ class SimpleActionServer(_UsesRospy):
 
     def accept_new_goal(self) -> Any:
         """Return the goal that has arrived and end the one before; None, with an error, if there is none."""
-        if not self.new_goal or self.next_goal.get_goal() is None:
-            self.rospy.logerr("accept_new_goal: there is no new goal")
-            return None
-        if self.is_active() and self.current_goal != self.next_goal:
-            self.current_goal.set_canceled(None, _REPLACED)
-        self.current_goal, self.new_goal = self.next_goal, False
-        self.preempt_request, self.new_goal_preempt_request = self.new_goal_preempt_request, False
-        self.current_goal.set_accepted(_TAKEN)
-        return self.current_goal.get_goal()
+        with self.action_server.lock:
+            if not self.new_goal or self.next_goal.get_goal() is None:
+                self.rospy.logerr("accept_new_goal: there is no new goal")
+                return None
+            if self.is_active() and self.current_goal != self.next_goal:
+                self.current_goal.set_canceled(None, _REPLACED)
+            self.current_goal, self.new_goal = self.next_goal, False
+            self.preempt_request, self.new_goal_preempt_request = self.new_goal_preempt_request, False
+            self.current_goal.set_accepted(_TAKEN)
+            return self.current_goal.get_goal()
 
     def is_new_goal_available(self) -> bool:
         """Return whether a goal has arrived that was not accepted yet."""

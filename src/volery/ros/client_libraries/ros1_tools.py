@@ -197,6 +197,12 @@ class _Commands:
         """Return whether a node is there."""
         return self._rospy.resolve_name(node_name) in self.get_node_names()
 
+    def kill_nodes(self, node_names: Iterable[str]) -> tuple[list[str], list[str]]:
+        """Shut nodes of rospy down; return the names of those, and of the others."""
+        wanted = list(node_names)
+        ended = [name for name in wanted if self._sessions.shut_down(self._rospy.resolve_name(name))]
+        return ended, [name for name in wanted if name not in ended]
+
     def get_param(self, param: str) -> Any:
         """Return a parameter; raise ``MasterError`` if there is none."""
         return self._rospy.get_master().getParam(param)[2]
@@ -274,7 +280,7 @@ class _Commands:
     def modules(self) -> dict[str, ModuleType]:
         """Return the four modules by name."""
         found: dict[str, tuple[Any, ...]] = {
-            "rosnode": (self.get_node_names, self.rosnode_ping),
+            "rosnode": (self.get_node_names, self.kill_nodes, self.rosnode_ping),
             "rosparam": (
                 *(self.get_param, self.set_param, self.delete_param, self.list_params, self.upload_params),
                 RosParamException,
@@ -292,7 +298,6 @@ class _Commands:
 
 
 _REFUSED = {
-    "rosnode.kill_nodes": "a model's faults end nodes",
     "rosparam.load_file": "read the file by yaml.safe_load, then use rosparam.upload_params",
     "rosservice.call_service": "use rospy.ServiceProxy",
     "rostopic.ROSTopicHz": "the report states the rates of topics",

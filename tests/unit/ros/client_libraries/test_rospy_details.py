@@ -378,3 +378,49 @@ except rosbag.ROSBagException as error:
         ("992ce8a1687cec8c8bd883ec73ca41d1", 1),
         True,
     ]
+
+
+def test_the_command_line_tools_as_modules(stage: Any) -> None:
+    stage.component(
+        "other",
+        """
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+rospy.init_node("other")
+rospy.on_shutdown(lambda: out("other ends"))
+rospy.Publisher("chatter", String, queue_size=1, latch=True).publish("hi")
+rospy.Service("tell", Trigger, lambda request: (True, ""))
+rospy.spin()
+""",
+    )
+    stage.component(
+        "node",
+        """
+import rosnode
+import rosparam
+import rosservice
+import rostopic
+from roslib.message import get_message_class
+rospy.init_node("node")
+rospy.sleep(0.1)
+out(rosnode.get_node_names())
+out((rosservice.get_service_type("tell"), rosservice.get_service_list(), rosservice.get_service_type("no")))
+out((rostopic.get_topic_type("chatter"), rostopic.get_topic_class("chatter")[0]._type))
+out((rostopic.find_by_type("std_msgs/String"), rostopic.get_topic_type("no")))
+out(get_message_class("std_msgs/String") is rostopic.get_topic_class("chatter")[0])
+rosparam.upload_params("/a", {"b": 1, "c": {"d": 2}})
+rosparam.set_param("/a/e", "[1, 2]")
+out((rosparam.list_params("/a"), rosparam.get_param("/a/e")))
+out((rosnode.kill_nodes(["other", "nobody"]), rosnode.rosnode_ping("other")))
+""",
+    )
+    assert stage.run(2 * S) == [
+        ["/node", "/other"],
+        ("std_srvs/Trigger", ["/tell"], None),
+        (("std_msgs/String", "/chatter", None), "std_msgs/String"),
+        (["/chatter"], (None, None, None)),
+        True,
+        (["/a/b", "/a/c/d", "/a/e"], [1, 2]),
+        "other ends",
+        ((["other"], ["nobody"]), False),
+    ]

@@ -255,6 +255,13 @@ class Sessions(LaunchedComponents):
         )
         return made
 
+    def shut_down(self, name: str) -> bool:
+        """Shut the node *name* down, as another node may; return whether there is one."""
+        found = [one for one in self._open.values() if one.node.name == name and not one.shutdown]
+        for session in found:
+            session.end("shutdown by another node")
+        return bool(found)
+
     def initialised(self) -> Session:
         """Return the session of the current component; raise ``ROSInitException`` before ``init_node``."""
         task = self.kernel.current()
