@@ -1,7 +1,8 @@
-"""Files written for rospy say the same on the embedded graph, in virtual time, and on a real roscore."""
+"""Files written for rospy say the same on the embedded graph and on a real roscore, and meet Debian's."""
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -9,10 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from rigs.requirements import lacking
 from volery.ros.transports.ros1 import Roscore
 from volery.ros.transports.ros1.master import environment
 
-from .conftest import HERE
+from .conftest import HERE, LIMIT_S
 from .files_on_ros import Case, compare, embedded, observed, running
 
 pytestmark = pytest.mark.integration
@@ -78,3 +80,40 @@ def test_the_same_messages(name: str, roscore: Roscore, tutorial_msgs: Path, tmp
     ):
         real = said()
     compare(case, embedded(case, "rospy", FILES, tmp_path / "embedded"), real)
+
+
+VOLERY = (sys.executable, "-c", "from volery.cli.main import main; main()")
+ACTIONS = HERE / "ros_files" / "actions"
+ACTIONS_MODEL = """
+volery: 1
+name: actions
+files_from: {folder}
+components: {{Base: {{language: rospy, path: {folder}/base.py, active: true}}}}
+application: {{base: {{is: Base}}}}
+platform: {{processors: {{pc: {{is: intel-i5-3470, frequency: 3000 MHz}}}}}}
+allocations: {{only: {{base: pc}}}}
+run: {{duration: 90 s}}
+"""
+
+
+def test_an_action_server_of_a_component_serves_a_client_of_debian(roscore: Roscore, tmp_path: Path) -> None:
+    if not Path("/usr/lib/python3/dist-packages/actionlib").is_dir():
+        lacking("no actionlib here (scripts/debian-packages ros1)")
+    model = tmp_path / "model.yaml"
+    model.write_text(ACTIONS_MODEL.format(folder=ACTIONS))
+    options = ["--graph", "ros1", "--quiet", "--out", str(tmp_path / "run")]
+    env = {**os.environ, "ROS_MASTER_URI": roscore.uri, "ROS_IP": "127.0.0.1"}
+    with running([[*VOLERY, "simulate", str(model), *options]], env):
+        done = subprocess.run(
+            ["/usr/bin/python3", str(ACTIONS / "driver.py")],
+            env=environment(roscore.uri),
+            capture_output=True,
+            text=True,
+            timeout=LIMIT_S,
+            check=False,
+        )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout) == [
+        ["SUCCEEDED", "arrived", [1.0, 2.0, 3.0]],
+        ["PREEMPTED", "stopped on the way", [1.0, 2.0, 3.0]],
+    ]
