@@ -224,6 +224,19 @@ def test_the_end_of_a_run_unwinds_threads_that_hold_and_wait(run):
     assert reported == ["unwound"]
 
 
+def test_the_threads_of_a_component_are_counted(run):
+    reported = run(
+        """
+        tell((threading.active_count(), threading.current_thread() is threading.main_thread()))
+        threading.Thread(target=lambda: tell(threading.current_thread() is threading.main_thread())).start()
+        tell(threading.active_count())
+        time.sleep(1.0)
+        """,
+        names=("user", "other"),
+    )
+    assert reported == [(1, True), 2, (1, True), 2, False, False]
+
+
 def test_a_thread_that_waits_for_its_own_lock_is_named(run):
     run(
         """

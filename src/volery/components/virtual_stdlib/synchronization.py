@@ -52,7 +52,19 @@ def threading_module(kernel: Kernel) -> ModuleType:
     names = bind(kernel, (Thread, Timer, Lock, RLock, Event, Semaphore, BoundedSemaphore, Condition))
     names["current_thread"] = lambda: waiting.current_task(kernel)
     names["get_ident"] = lambda: waiting.current_task(kernel).name
+    names["main_thread"] = lambda: _flows(kernel)[0]
+    names["active_count"] = lambda: len(_flows(kernel))
+    names["ThreadError"] = RuntimeError
     return make_module("threading", names)
+
+
+def _flows(kernel: Kernel) -> list[Task]:
+    """Return the tasks of the current component, the first of which runs its main flow."""
+    task = waiting.current_task(kernel)
+    instance = component_of(task)
+    if instance is None or instance.scope is None:
+        return [task]
+    return [one for one in instance.scope.all_tasks() if one.contexts[0].component == instance.name]
 
 
 class Thread(KernelBound):
