@@ -105,6 +105,25 @@ def test_a_compiler_error_names_the_source_line(run_model, tmp_path):
     assert caught.value.where.line == 3
     assert "getPublisherName is not offered" in str(caught.value)
 
+    unused = "#include <cv_bridge/cv_bridge.h>\n#include <nodelet/nodelet.h>\n"
+    for line, words in (
+        (
+            "cv_bridge::CvImage image;",
+            "<cv_bridge/cv_bridge.h> is not offered: read sensor_msgs::Image::data",
+        ),
+        (
+            "#include <move_base_msgs/None.h>",
+            "source the workspace of package move_base_msgs (ROS_PACKAGE_PATH)",
+        ),
+    ):
+        (tmp_path / "crash.cpp").write_text(f"{unused}{line}\nint main() {{}}\n")
+        with pytest.raises(ModelError) as caught:
+            run_model(MODEL.format(how="not"), other=OTHER)
+        assert caught.value.where is not None
+        assert caught.value.where.line == 3
+        assert words in str(caught.value)
+        assert len(str(caught.value).splitlines()) <= 6
+
 
 def test_no_compiler(run_model, monkeypatch):
     compiler.compiler.cache_clear()

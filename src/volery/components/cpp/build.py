@@ -327,6 +327,7 @@ def _include_flags(flags: Sequence[str]) -> tuple[Path, ...]:
 
 
 _REFUSALS = 3
+_ABSENT = re.compile(r"(?:fatal error: |')(\w+)/[\w./]+(?:: No such file|' file not found)")
 _NO_MEMBER = re.compile(r"has no member named '(\w+)'|no member named '(\w+)' in")
 
 
@@ -345,13 +346,18 @@ def _of_the_class(component: CppComponent, sources: Sources, error: ModelError) 
 
 
 def _with_missing_headers(sources: Sources, headers: Path, not_offered: str, error: ModelError) -> ModelError:
-    """Return an error of the compiler with the headers that are not offered, those that it names first."""
+    """Return an error of the compiler with what is said of the headers that are missing, or not offered."""
     refused = {}
     for name in sources.included:
         file = headers / name
         text = file.read_text(encoding="utf-8") if file.is_file() else ""
         if text.startswith(not_offered) and "\n" not in text.rstrip():
             refused[name] = text.removeprefix(not_offered).strip()
+    absent = _ABSENT.search(error.what)
+    if absent:
+        package = absent.group(1)
+        remedy = f"source the workspace of package {package} (ROS_PACKAGE_PATH) if <{package}/...> is of one"
+        refused = {package: f"{remedy}, or name the folder in the component's build: {{flags: -I...}}"}
     named = [why for name, why in refused.items() if name.partition("/")[0] in error.what]
     shown = (named or list(refused.values()))[:_REFUSALS]
     return ModelError("\n".join((error.what, *shown)), error.path, error.where) if shown else error

@@ -1,5 +1,15 @@
 // roscpp on the embedded graph: the content of <ros/ros.h> in virtual time.
 #pragma once
+// The files that include roscpp's use what these define.
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+#include <deque>
+#include <fstream>
+#include <list>
+#include <set>
+#include <sstream>
+
 #include "ros/callback_queue.h"
 #include "ros/console.h"
 #include "ros/init.h"

@@ -34,6 +34,7 @@ public:
     using MessagePtr = boost::shared_ptr<Message>;
 
     MessageEvent() = default;
+    MessageEvent(const ConstMessagePtr& message) : MessageEvent(message, Time::now()) {}
     MessageEvent(const ConstMessagePtr& message, Time received) : message_(message), received_(received) {}
     template <class Other>
     MessageEvent(const MessageEvent<Other>& other)

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <iostream>  // as in roscpp: files use std::cout without it
 #include <limits>
-#include <ostream>
 #include <stdexcept>
 
 #include "volery/abi.h"

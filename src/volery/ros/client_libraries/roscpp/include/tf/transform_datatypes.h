@@ -2,9 +2,13 @@
 #pragma once
 #include "tf2/exceptions.h"
 #include "tf2_geometry_msgs/tf2_geometry_msgs.h"
+#include "tf2_msgs/TFMessage.h"
 
 namespace tf {
 
+using tfMessage = tf2_msgs::TFMessage;
+using tfMessagePtr = tfMessage::Ptr;
+using tfMessageConstPtr = tfMessage::ConstPtr;
 using tf2::ConnectivityException;
 using tf2::ExtrapolationException;
 using InvalidArgument = tf2::InvalidArgumentException;

@@ -1,0 +1,2 @@
+#pragma once
+#include "tf/transform_datatypes.h"
