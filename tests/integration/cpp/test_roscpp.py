@@ -55,7 +55,7 @@ def test_two_nodes_talk(run_model):
     said = [(one.source, one.text) for one in outcome.of(Text)]
     assert ("plant", "enabled: go on") in said
     assert ("keeper", "gps at 43.5, status -1") in said
-    assert ("keeper", "/robot/keeper has arrived") in said
+    assert ("keeper", "/robot/pose_keeper_1 has arrived") in said
     [stopped] = [text for source, text in said if source == "plant" and text.startswith("stopped after")]
     assert not [text for _, text in said if "no server of" in text]
 
