@@ -7,6 +7,7 @@ Figures are of the kind that data sheets give for MS4525DO class differential pr
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from volery.base.frames import world_to_body
 from volery.simulation.world.sensors import ErrorModel, Sensor, SensorInput
@@ -31,6 +32,8 @@ class AirspeedSensor(Sensor):
     rate: float = 10.0
     max_speed: float = 60.0
 
+    type = "geometry_msgs/msg/TwistStamped"
+
     def ideal(self, state: SensorInput) -> tuple[float]:
         """Return the airspeed along the forward axis [m/s]."""
         east, north, up = (v - air for v, air in zip(state.velocity, state.air_velocity, strict=True))
@@ -40,6 +43,10 @@ class AirspeedSensor(Sensor):
     def output(self, values: tuple[float, ...]) -> tuple[float, ...]:
         """Return the reading within the range of the sensor [m/s]."""
         return (min(max(values[0], 0.0), self.max_speed),)
+
+    def fill(self, message: Any, values: tuple[float, ...]) -> None:
+        """Write the airspeed into the twist: forward is x."""
+        message.twist.linear.x = values[0]
 
 
 SENSOR = AirspeedSensor()

@@ -84,6 +84,12 @@ def world_to_body(attitude: Quaternion, v: Vector) -> Vector:
     return bx, by, bz
 
 
+def body_to_world(attitude: Quaternion, v: Vector) -> Vector:
+    """Rotate *v* from the body's axes to the world's, by the quaternion from body to world."""
+    w, x, y, z = attitude
+    return world_to_body((w, -x, -y, -z), v)
+
+
 def attitude_ned_to_enu(q: Quaternion) -> Quaternion:
     """Convert the attitude of a FRD body in NED to that of the FLU body in ENU. Its own inverse."""
     world: Quaternion = (0.0, _HALF, _HALF, 0.0)

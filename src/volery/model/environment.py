@@ -20,6 +20,7 @@ from volery.base.position import AMSL, Position
 from volery.base.time import Ns
 from volery.model.faults import FAULT, Fault
 from volery.model.fields import (
+    ADDED_SENSOR,
     AUTOPILOT,
     CHARGE,
     DISTANCE,
@@ -352,7 +353,7 @@ class Vehicle:
     ] = "consumer"
     added_sensors: Annotated[
         tuple[str, ...],
-        ListOf(TEXT, bare=True),
+        ListOf(ADDED_SENSOR, bare=True),
         "Sensors of installed packages that it carries as well, by their names.",
     ] = ()
     started: Annotated[

@@ -71,6 +71,7 @@ class Vocabulary:
     autopilots: frozenset[str]
     observables: tuple[Observable, ...] = ()
     read_catalogue: Callable[[FilePath], Kinds] = _no_catalogue
+    sensors: frozenset[str] = frozenset()
 
 
 PROVENANCES = ("estimated", "measured", "calculated", "required")

@@ -35,12 +35,15 @@ from volery.run.assembly.component_builder import (
 from volery.run.assembly.cpp import compile_all, describe_component, is_cpp
 from volery.run.ending import Ending
 from volery.simulation.autopilots.autopilot import firmwares
+from volery.simulation.world.sensors import sensors
 
 
 def vocabulary() -> Vocabulary:
     """Return the names that a model is checked against."""
     autopilots = frozenset(firmwares.names())
-    return Vocabulary(_kinds(), frozenset(RUNNING_LANGUAGES), autopilots, OBSERVABLES, _kinds)
+    return Vocabulary(
+        _kinds(), frozenset(RUNNING_LANGUAGES), autopilots, OBSERVABLES, _kinds, frozenset(sensors.names())
+    )
 
 
 def _kinds(*more: Path) -> dict[str, ProcessorKind]:

@@ -37,6 +37,8 @@ from volery.simulation.world.world import World
 from volery.trace.events import Collision, ignore
 
 CELL_NOMINAL_VOLTS = 3.7
+FOUNDATION = 100.0
+"""Depth [m] to which a solid on the ground goes on below it: the ground follows the globe."""
 
 
 class Surroundings(NamedTuple):
@@ -233,7 +235,7 @@ def surroundings_of(environment: Environment) -> Surroundings:
 
 
 def _solids(prisms: Sequence[Prism]) -> list[Solid]:
-    return [Solid(one.name, one.corners, one.floor_m, one.ceiling_m) for one in prisms]
+    return [Solid(one.name, one.corners, one.floor_m or -FOUNDATION, one.ceiling_m) for one in prisms]
 
 
 def wind_of(model: WindModel) -> Wind:

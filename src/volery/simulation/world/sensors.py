@@ -16,7 +16,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from math import sqrt
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from volery.base.numeric_code import numeric
 from volery.base.seeds import key
 from volery.base.time import Ns
 from volery.simulation.world.arithmetic import gaussian
+from volery.simulation.world.scene import Scene
 from volery.simulation.world.state_layout import (
     BIAS_DECAY,
     BIAS_GAIN,
@@ -286,6 +287,7 @@ class SensorInput(NamedTuple):
         specific_force: Forward, left, up [m/s^2].
         air_velocity: Velocity of the air, east, north, up [m/s]: mean wind and gust.
         ground: Height of the ground straight below, up [m].
+        scene: What stands in the world; ``scene.cast`` tells how far rays go.
     """
 
     time: Ns
@@ -296,11 +298,15 @@ class SensorInput(NamedTuple):
     specific_force: Vector
     air_velocity: Vector
     ground: float
+    scene: Scene
 
 
 @dataclass(frozen=True)
 class Sensor(ABC):
     """A sensor that a package adds: derive from it, and name an instance in the group ``volery.sensors``.
+
+    With a ``type`` of messages, each sample is published on the topic ``/VEHICLE/NAME`` by a node on the
+    vehicle's computer, where components read it.
 
     Args:
         name: Name by which the sensor is mounted and read.
@@ -311,6 +317,9 @@ class Sensor(ABC):
     name: str
     error: ErrorModel
     rate: float
+
+    type: ClassVar[str] = ""
+    """ROS type of its messages, such as ``sensor_msgs/msg/Range``; empty: no node publishes it."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.rate * STEP_S <= 1.0:
@@ -326,6 +335,10 @@ class Sensor(ABC):
         """Return the reading for *values* with errors: override it to saturate or to quantise."""
         return values
 
+    def fill(self, message: Any, values: tuple[float, ...]) -> None:
+        """Write a reading into a new message of ``type``. Its header is there already."""
+        raise NotImplementedError(f"sensor {self.name}: a sensor with a type of messages fills them")
+
 
 class Measurement(NamedTuple):
     """One sample of an added sensor: time of its grid step [ns], and its components."""
@@ -338,7 +351,7 @@ class MountedSensor:
     """One added sensor on one body: takes its samples in order and keeps the last."""
 
     def __init__(self, sensor: Sensor, seed: int, body: int) -> None:
-        self._sensor = sensor
+        self.sensor = sensor
         self._key = np.uint64(key(seed, f"world/body/{body}/sensor/{sensor.name}"))
         self._every = round(1.0 / (sensor.rate * STEP_S))
         self._decay = sensor.error.decay(self._every * STEP_S)
@@ -349,8 +362,8 @@ class MountedSensor:
 
     def sample(self, state: SensorInput) -> None:
         """Take the sample of ``next_step``, at which *state* is the body's."""
-        k, error = self.next_step, self._sensor.error
-        ideal = self._sensor.ideal(state)
+        k, error = self.next_step, self.sensor.error
+        ideal = self.sensor.ideal(state)
         gain = error.bias_sigma * (sqrt(1.0 - self._decay * self._decay) if self._bias else 1.0)
         before = self._bias or [0.0] * len(ideal)
         with np.errstate(over="ignore"):  # hashes wrap around
@@ -360,7 +373,7 @@ class MountedSensor:
             value + bias + error.white_sigma * draw
             for value, bias, draw in zip(ideal, self._bias, draws[1::2], strict=True)
         )
-        self.last = Measurement(state.time, self._sensor.output(noisy))
+        self.last = Measurement(state.time, self.sensor.output(noisy))
         self.next_step = k + self._every
 
 

@@ -23,7 +23,7 @@ from volery.simulation.world.body_specs import BodySpec, fill_parameters, fill_s
 from volery.simulation.world.body_step import advance_bodies
 from volery.simulation.world.environment_models import Wind
 from volery.simulation.world.scene import Scene
-from volery.simulation.world.sensors import Measurement, MountedSensor, SensorInput, added_sensor
+from volery.simulation.world.sensors import Measurement, MountedSensor, Sensor, SensorInput, added_sensor
 from volery.simulation.world.state_layout import (
     ACTIVE_STEPS,
     OCTETS,
@@ -295,6 +295,10 @@ class World:
         self.advance_to_now(body)
         return mounted[sensor].last
 
+    def added_sensors(self, body: int) -> tuple[Sensor, ...]:
+        """Return the sensors that packages have added to *body*."""
+        return tuple(mounted.sensor for mounted in self._mounted.get(body, {}).values())
+
     def _catch_up(self, step: int) -> None:
         """Advance every active body to *step*: those with stops one by one, then all in one call."""
         if self._pending or self._mounted:
@@ -352,4 +356,5 @@ class World:
             specific_force=tuple(row[S_SPECIFIC_FORCE : S_SPECIFIC_FORCE + 3]),
             air_velocity=(wind[0] + gust[0], wind[1] + gust[1], wind[2] + gust[2]),
             ground=row[S_GROUND],
+            scene=self.scene,
         )

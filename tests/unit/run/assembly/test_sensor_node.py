@@ -1,0 +1,103 @@
+"""A sensor that a package adds is read by components: typed messages on a topic, of the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from volery import Options, simulate
+from volery.base.errors import ModelError
+from volery.base.frames import body_to_world
+from volery.run.event_log import LogOptions
+from volery.simulation.world import sensors
+from volery.simulation.world.sensors import ErrorModel, Sensor
+
+MODEL = """
+volery: 1
+name: seen
+components: {{Watch: {{language: {language}, path: watch.py, active: true}}}}
+application: {{watch: {{is: Watch}}}}
+platform: {{processors: {{onboard: {{is: rpi4-cortex-a72, frequency: 1500 MHz, carried_by: rover_1}}}}}}
+allocations: {{only: {{watch: onboard, rover_1: onboard}}}}
+environment:
+  origin: {{latitude: 47, longitude: 8}}
+  places: {{here: {{east: 0 m, north: 0 m}}}}
+  buildings: {{tank: {{centre: {{east: 25 m, north: 0 m}}, radius: 5 m, ceiling: 9 m}}}}
+  vehicles:
+    rover_1: {{kind: rover, autopilot: ardupilot, at: here, heading: 90 deg, added_sensors: {sensor}}}
+run: {{duration: 2 s}}
+"""
+WATCH = {
+    "rospy": """
+import rospy
+from sensor_msgs.msg import Range
+def hear(message):
+    rospy.loginfo("%s %.2f %.2f", message.header.frame_id, message.header.stamp.to_sec(), message.range)
+if __name__ == "__main__":
+    rospy.init_node("watch")
+    rospy.Subscriber("/rover_1/ahead", Range, hear)
+    rospy.spin()
+""",
+    "rclpy": """
+import rclpy
+from sensor_msgs.msg import Range
+def hear(message):
+    stamp = message.header.stamp.sec + message.header.stamp.nanosec / 1e9
+    node.get_logger().info(f"{message.header.frame_id} {stamp:.2f} {message.range:.2f}")
+if __name__ == "__main__":
+    rclpy.init()
+    node = rclpy.create_node("watch")
+    node.create_subscription(Range, "/rover_1/ahead", hear, 10)
+    rclpy.spin(node)
+""",
+}
+EXACT = ErrorModel()
+
+
+@dataclass(frozen=True)
+class RangeAhead(Sensor):
+    """Distance to what stands ahead, up to 30 m."""
+
+    name: str = "ahead"
+    error: ErrorModel = EXACT
+    rate: float = 5.0
+
+    type = "sensor_msgs/msg/Range"
+
+    def ideal(self, state):
+        ahead = body_to_world(state.attitude, (1.0, 0.0, 0.0))
+        return tuple(state.scene.cast(np.array([state.position]), np.array([ahead]), 30.0))
+
+    def fill(self, message, values):
+        message.range, message.max_range = values[0], 30.0
+
+
+@pytest.fixture(autouse=True)
+def registered(monkeypatch):
+    monkeypatch.setitem(sensors.sensors._added, "ahead", RangeAhead())
+
+
+@pytest.mark.parametrize("language", ["rospy", "rclpy"])
+def test_a_component_reads_an_added_sensor(language, tmp_path):
+    (tmp_path / "watch.py").write_text(WATCH[language])
+    (tmp_path / "model.yaml").write_text(MODEL.format(language=language, sensor="ahead"))
+    run = simulate(
+        tmp_path / "model.yaml", Options(out=tmp_path / "run", log=LogOptions(tmp_path / "log.txt"))
+    )
+    assert run.ok, run.record.outcome
+    heard = [
+        line.split("watch: ")[1]
+        for line in (tmp_path / "log.txt").read_text().splitlines()
+        if "watch: " in line
+    ]
+    assert len(heard) == pytest.approx(9, abs=1)
+    assert heard[0].split() == ["ahead", "0.20", "19.98"]  # a circle is inside its polygon
+
+
+def test_a_sensor_that_no_package_provides_is_an_error_of_the_model(tmp_path):
+    (tmp_path / "watch.py").write_text(WATCH["rospy"])
+    (tmp_path / "model.yaml").write_text(MODEL.format(language="rospy", sensor="ahaed"))
+    with pytest.raises(ModelError, match=r"model\.yaml:\d+.*ahaed.*did you mean 'ahead'"):
+        simulate(tmp_path / "model.yaml", Options(out=None))
