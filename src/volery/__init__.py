@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from volery.run.fly import fly as fly
     from volery.run.result import Options as Options
     from volery.run.result import Run as Run
+    from volery.run.run_session import RunSession as RunSession
     from volery.run.simulate import simulate as simulate
     from volery.vehicles import Drone as Drone
     from volery.vehicles import Escalation as Escalation

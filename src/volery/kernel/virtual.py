@@ -47,7 +47,7 @@ class Pacer:
     def __init__(self, pace: float) -> None:
         if pace <= 0.0:
             raise UsageError(f"a pace of {pace}: give seconds per second on the wall, above 0")
-        self._pace = pace
+        self.pace = pace
         self._anchor: tuple[int, Ns] | None = None  # one instant in wall time and in virtual time
         self._wake_up = AutoResetEvent()
 
@@ -64,11 +64,11 @@ class Pacer:
         if self._anchor is None:
             self._anchor = (monotonic_ns(), now)
         wall, virtual = self._anchor
-        ahead = to_seconds(when - virtual) / self._pace - to_seconds(monotonic_ns() - wall)
+        ahead = to_seconds(when - virtual) / self.pace - to_seconds(monotonic_ns() - wall)
         if ahead <= 0.0:
             return None
         self._wake_up.wait(min(ahead, LONGEST_WAIT_S))
-        passed = int((monotonic_ns() - wall) * self._pace)
+        passed = int((monotonic_ns() - wall) * self.pace)
         return max(now, min(virtual + passed, when))
 
 
@@ -127,13 +127,22 @@ class VirtualKernel:
         self._current: Task | None = None
         self._adopted: Task | None = None
         self._inbox: deque[Action] = deque()
-        self._pacer = None if pace is None else Pacer(pace)
+        self.pacer = None if pace is None else Pacer(pace)
         self._hub: Any = None
         self._owner: Any = None  # the flow that the hub returns to
         self._interrupts = Interrupts(self)
         self._watchdog = None if watchdog_s is None else Watchdog(self, self._interrupts, watchdog_s)
 
     # -- without blocking
+
+    @property
+    def pace(self) -> float | None:
+        """Greatest number of virtual seconds per second of wall time; it may be set while no time passes."""
+        return None if self.pacer is None else self.pacer.pace
+
+    @pace.setter
+    def pace(self, pace: float | None) -> None:
+        self.pacer = None if pace is None else Pacer(pace)
 
     def now(self) -> Ns:
         """Return the time since the start of the run, ns."""
@@ -163,8 +172,8 @@ class VirtualKernel:
         """Execute a framework callback as soon as possible; from any thread, and from signal handlers."""
         self._inbox.append(action)
         self._horizon = NEVER
-        if self._pacer is not None:
-            self._pacer.wake_up()
+        if self.pacer is not None:
+            self.pacer.wake_up()
 
     def spawn(self, body: Action, name: str, context: ExecutionContext, scope: Scope | None = None) -> Task:
         """Start a task at this instant, after what is already due."""
@@ -352,8 +361,8 @@ class VirtualKernel:
     def _resume(self, task: Task) -> None:
         self._current = task
         task.flow.switch()
-        if self._pacer is not None and task.adopted:
-            self._pacer.rest()  # time stood still while the script ran
+        if self.pacer is not None and task.adopted:
+            self.pacer.rest()  # time stood still while the script ran
 
     # -- the hub
 
@@ -386,8 +395,8 @@ class VirtualKernel:
             error = self._error_of_loop()
             self._horizon = NEVER
             self._current = self._adopted
-            if self._pacer is not None:
-                self._pacer.rest()
+            if self.pacer is not None:
+                self.pacer.rest()
             if error is None:
                 self._owner.switch()
             else:
@@ -403,7 +412,7 @@ class VirtualKernel:
         return None
 
     def _loop(self) -> None:
-        heap, inbox, pacer = self._heap, self._inbox, self._pacer
+        heap, inbox, pacer = self._heap, self._inbox, self.pacer
         while True:
             self._current = None
             self._horizon = self._until if pacer is None else NEVER
@@ -433,7 +442,7 @@ class VirtualKernel:
         heap = self._heap
         while heap[0][2].ticket != heap[0][1]:
             heappop(heap)
-        if len(heap) > 1 or self._pacer is not None:
+        if len(heap) > 1 or self.pacer is not None:
             self._now = max(self._now, self._until)
             return
         waiting = [f"{task.name} for {task.waiting_for}" for task in self.root.all_tasks()]

@@ -64,6 +64,7 @@ class Ending:
         self._failures: list[str] = []
         self._landing: set[str] = set()
         self._pending = 0
+        self._broken = False
 
     def failed(self, who: str, error: Exception) -> None:
         """End the run because a task of *who* has raised *error*."""
@@ -190,15 +191,29 @@ class Ending:
         """Execute the run to its end. Return the names of tasks that did not end."""
         gc.freeze()  # what exists now stays until the end: collections need not look at it
         try:
-            self._kernel.run(FOREVER)
-        except VoleryError as error:  # a deadlock, or code that froze time: the vehicles still land
-            self.failed("run", error)
-            self._kernel.run(FOREVER)
-        except KeyboardInterrupt:
-            self.stop_hard("interrupted", "stopped at once by a second signal")
+            while self.advance(FOREVER):
+                pass  # it goes on after an error
         finally:
             gc.unfreeze()
         return self._kernel.close(self.reason)
+
+    def advance(self, until: Ns) -> bool:
+        """Execute the run up to *until*, ns; return whether it goes on.
+
+        The first error of the run itself ends it in order; a second one is raised.
+        """
+        try:
+            self._kernel.run(until)
+        except VoleryError as error:  # a deadlock, or code that froze time: the vehicles still land
+            if self._broken:
+                raise
+            self._broken = True
+            self.failed("run", error)
+            return True
+        except KeyboardInterrupt:
+            self.stop_hard("interrupted", "stopped at once by a second signal")
+            return False
+        return not self._kernel.root.cancelled and self._kernel.now() >= until
 
     def stop_hard(self, status: Status, reason: str) -> None:
         """Stop at once; vehicles are left where they are."""
