@@ -23,7 +23,7 @@ from typing import Any
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.geoid import EGM96, Geoid
-from volery.base.time import MS, Ns, S
+from volery.base.time import MS, US, Ns, S
 from volery.bridge.autopilot_link import (
     AUTOPILOT_NAMES,
     AutopilotLink,
@@ -34,16 +34,19 @@ from volery.bridge.autopilot_link import (
 from volery.bridge.naming_schemes import MAVROS
 from volery.bridge.node_interface import InterfaceContext, NamingScheme, NodeInterface, Subscription
 from volery.kernel.task import ExecutionContext, Scope, Task
+from volery.kernel.waiting import sleep
 from volery.links.frame import Frame
 from volery.links.link import Link
 from volery.links.pprzlink_codec import FROM_ROS, PPRZROS_TYPE, TO_ROS, to_frame, to_message
-from volery.ros.graph import DEFAULT, INVALID_VALUES, SENSOR_DATA, Node, Publisher, RosGraph, Work
+from volery.ros.graph import DEFAULT, INVALID_VALUES, SENSOR_DATA, Group, Node, Publisher, RosGraph, Work
 from volery.trace.events import Text
 
 ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4
 SAFETY_ARMED = 128
 """MAV_MODE_FLAG."""
 WARNING = 4
+LOOK_AGAIN: Ns = 10 * US
+"""Period at which a request looks whether the set-points before it are through."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,8 @@ class VehicleNode:
         """For each message of the batch the name of the frame that it was made of."""
         self._source = ""
         self._next_heartbeat: Ns = 0
+        self._forwarding = False
+        """Whether a set-point has arrived and is not forwarded yet."""
         self.connected = False
         self._component = ""
 
@@ -196,16 +201,23 @@ class VehicleNode:
         self, node: Node, interface: NodeInterface, context: ExecutionContext, scope: Scope
     ) -> None:
         group = node.group()
+        group.on_ready = self._expect_setpoint
         self._create_all(
             "subscriptions",
             (
-                partial(node.subscribe, one.name, one.type, partial(self._forward, node, one), group=group)
+                partial(
+                    node.subscribe, one.name, one.type, partial(self._forward, node, one, group), group=group
+                )
                 for one in interface.subscriptions
             ),
         )
         self._kernel.spawn(group.spin, f"{context.component} (set-points)", context, scope)
 
-    def _forward(self, node: Node, subscription: Subscription, message: Any) -> None:
+    def _expect_setpoint(self) -> None:
+        """Hold requests until the set-point that has arrived is forwarded: it was published before them."""
+        self._forwarding = True
+
+    def _forward(self, node: Node, subscription: Subscription, group: Group, message: Any) -> None:
         """Send a set-point to the autopilot; an invalid one is dropped with a warning."""
         try:
             translated = subscription.translate(message, self._kernel.now())
@@ -219,10 +231,14 @@ class VehicleNode:
                     self.link.send_to_autopilot(name, fields)
         except INVALID_VALUES as error:
             self._warn(f"{node.resolve(subscription.name)}: message dropped: {error}")
+        finally:
+            self._forwarding = len(group) > 0
 
     def _serve(self, node: Node, interface: NodeInterface, context: ExecutionContext, scope: Scope) -> None:
         def run(work: Work) -> None:
             try:
+                while self._forwarding and not node.closed:
+                    sleep(self._kernel, LOOK_AGAIN)
                 work.run()
             except INVALID_VALUES as error:
                 self._warn(f"service request refused: {error}")

@@ -39,6 +39,25 @@ node.create_timer(4.0, lambda: print(sorted(received)))
 rclpy.spin(node)
 """
 
+TAKES_OFF = """
+import rospy
+from geometry_msgs.msg import PoseStamped
+from mavros_msgs.srv import CommandBool, CommandTOL, SetMode
+rospy.init_node("pilot")
+goals = rospy.Publisher("setpoint_position/local", PoseStamped, queue_size=10)
+goal = PoseStamped()
+goal.pose.position.z = 3.0
+goal.pose.orientation.w = 1
+rospy.sleep(8)
+rospy.ServiceProxy("set_mode", SetMode)(custom_mode="GUIDED")
+arm, takeoff = rospy.ServiceProxy("cmd/arming", CommandBool), rospy.ServiceProxy("cmd/takeoff", CommandTOL)
+arm(True)
+goals.publish(goal)
+takeoff(altitude=3.0)
+rospy.sleep(12)
+print("height %.0f" % rospy.wait_for_message("local_position/pose", PoseStamped).pose.position.z)
+"""
+
 
 @pytest.fixture
 def model(tmp_path):
@@ -91,3 +110,9 @@ def test_sensors_are_best_effort_for_rclpy_as_mavros_2_s_are(model, capsys):
     assert simulate(model("mavros", WATCHES, "rclpy")).completed
     said = capsys.readouterr().err
     assert "[('local_position/pose', False), ('state', False), ('state', True)]" in said
+
+
+def test_a_setpoint_that_was_published_before_a_request_is_sent_before_it(model, capfd):
+    """The other way round the take-off would be given up for a goal of a copter that still stands."""
+    simulate(model("mavros", TAKES_OFF), Options(out=None), overrides=["run.duration=25 s"])
+    assert "height 3" in capfd.readouterr().err
