@@ -1,4 +1,4 @@
-"""``volery bridge`` beside a plain loop of pymavlink and rospy: their processor time, and their delays.
+"""``volery ros bridge`` beside a plain loop of pymavlink and rospy: their processor time, and their delays.
 
 A source sends both the same MAVLink frames over UDP at the same instants: the 20 messages of all of
 ArduPilot's streams, each at the rate, and heartbeats. Both publish roscopter's six topics of them on one
@@ -66,7 +66,7 @@ def measure(
     """Return for each way the share of a core, the delays and the number of messages."""
     ports = {way: free_port() for way in WAYS}
     script = "from volery.cli.main import main; main()"
-    bridge = ("-c", script, "bridge", f"ardupilot+udp://:{ports['volery']}", "--rate", "0", "--quiet")
+    bridge = ("-c", script, "ros", "bridge", f"ardupilot+udp://:{ports['volery']}", "--rate", "0", "--quiet")
     named = ("--names", "roscopter", "--namespace", "/volery", "--enable-control")
     plain = [(PEERS / "plain.py", way, ports[way]) for way in WAYS[1:]]
     with (

@@ -4,7 +4,8 @@ The kernels in bench/kernels were fixed before anything was calibrated. Block co
 kernel's first input; they are judged on its fourth one, other data of another size and mix, which was written
 when the model was finished. (The second and the third were looked at while it was made.)
 
-  model     estimate by the core's figures alone (`volery calibrate processor`), nothing fitted to the kernel
+  model     estimate by the core's figures alone (`volery cost calibrate processor`), nothing fitted to the
+            kernel
   error     the same, times what the first input took here over what the model says it takes: one factor a
             kernel, from the calibration input; this is what is to stay below 10 % (mean) and 20 % (worst)
   slowdown  counting code over plain code

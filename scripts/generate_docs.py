@@ -20,6 +20,7 @@ from package_map import package_map
 from ros_surface import page as ros_surface
 from typer.main import get_command
 
+from volery.cli.command import Noun
 from volery.cli.main import application
 from volery.cost import load_catalogue
 from volery.drawing.deployment import deployment_svg
@@ -135,6 +136,7 @@ def command_line() -> str:
     lines = ["# The command line\n"]
 
     def describe(command: Any, path: str) -> None:
+        command = command.described() if isinstance(command, Noun) else command
         usage = " ".join(command.collect_usage_pieces(command.context_class(command)))
         lines.append(f"\n## {path}\n\n`{path} {usage}`\n\n{command.help or ''}\n")
         for kind in ("argument", "option"):
@@ -240,8 +242,8 @@ def conformance() -> str:
     outcomes = {name: {one["check"]: one for one in of["checks"]} for name, of in found.items()}
     lines = [
         "# Conformance of the drivers\n",
-        "What `volery conformance sim:AUTOPILOT` finds, check by check; run it over your own vehicle or",
-        "driver. `scripts/gather_trials.py` flies them anew.\n",
+        "What `volery vehicle conformance sim:AUTOPILOT` finds, check by check; run it over your own vehicle",
+        "or driver. `scripts/gather_trials.py` flies them anew.\n",
         "✓ passed, ✗ failed, – declared missing before anything moves, · not possible there (see below).",
     ]
     for group in GROUPS:
@@ -371,7 +373,7 @@ def versions() -> str:
         "\nThe five-line mission is `examples/mission.py`; single operations are those of the",
         "[vehicle API](../vehicle-api.md); attitude set-points are `set_attitude` without a heading;",
         "plans are missions, fences and rally points, up and down; conformance is",
-        "`volery conformance --fly`. Figures:",
+        "`volery vehicle conformance --fly`. Figures:",
         "[tried on real firmware](../real-firmware.md).",
     ]
     return "\n".join(lines) + "\n"

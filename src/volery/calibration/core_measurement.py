@@ -381,7 +381,7 @@ def core_law(machine: Machine, isa: str, taken: Mapping[str, Timing], queues: Qu
         isa=isa,
         cpu="x86-64" if isa == "x86_64" else "generic",
         provenance="measured",
-        source=f"volery calibrate processor on {machine.description}",
+        source=f"volery cost calibrate processor on {machine.description}",
         validity=f"assumed: {', '.join((*queues.assumed(), 'the prediction of branches'))}",
         least_mhz=mhz * 0.5,
         greatest_mhz=mhz,

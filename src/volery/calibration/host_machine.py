@@ -175,7 +175,7 @@ def put_law(
 def _new_entry(machine: Machine) -> dict[str, Any]:
     return {
         "description": machine.description,
-        "source": "measured by volery calibrate on the machine itself",
+        "source": "measured by volery cost calibrate on the machine itself",
         "cores": machine.cores,
         "least_mhz": machine.frequency_mhz,
         "greatest_mhz": machine.frequency_mhz,

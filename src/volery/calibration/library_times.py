@@ -567,7 +567,7 @@ def measure_table(
     slowdown = median(one.median / one.counted_ns(operation_table().nanoseconds) for one in own)
     table = LibraryTable(
         provenance="measured",
-        source=f"volery calibrate libraries: least CPU time of {BATCHES} batches of each call",
+        source=f"volery cost calibrate libraries: least CPU time of {BATCHES} batches of each call",
         validity=f"float64 arrays in row order; numpy {np.__version__}",
         machine=machine,
         programs=0,

@@ -1,4 +1,4 @@
-"""Fit of the costs of Python's operations to measured times: ``volery calibrate python``.
+"""Fit of the costs of Python's operations to measured times: ``volery cost calibrate python``.
 
 Many statements are timed in a loop, each with a few operations, and the costs are found that explain all of
 them. Then whole programs are timed. They take longer than the sum of their operations in loops, since a
@@ -119,7 +119,7 @@ class Calibration:
 
     def law(self, machine: str, frequency_mhz: float) -> CodeLaw:
         """Return the law of the measured processor, which ran at ``frequency_mhz``."""
-        source = f"volery calibrate python: CPU time of {len(self.programs)} programs on {machine}"
+        source = f"volery cost calibrate python: CPU time of {len(self.programs)} programs on {machine}"
         slowdown = Figure(
             value=round(self.slowdown, 3),
             error=round(self.slowdown_spread, 3),
@@ -140,7 +140,7 @@ class Calibration:
         errors = [abs(error) for error in self.programs.values()]
         return OperationTable(
             provenance="measured",
-            source=f"volery calibrate python: CPU time of {len(self.statements)} statements and "
+            source=f"volery cost calibrate python: CPU time of {len(self.statements)} statements and "
             f"{len(errors)} programs, medians of {self.rounds} rounds",
             validity=f"pure Python with warm caches, {interpreter()}",
             interpreter=interpreter(),

@@ -1,9 +1,10 @@
 """How a command is declared, called and ended.
 
-A file in ``volery.cli.commands`` declares its commands with a ``Commands`` object, and one more for each
-group such as ``volery bag``. ``volery.cli.main`` finds all of them, so a new command changes one file. They
-import the library inside their functions: ``volery --help`` imports all of them and must stay quick. A file
-with the name of its command or group, such as ``fly.py``, is the only one that this command imports.
+The first word of a command line is a noun or one of a few verbs, and the words below a noun are its verbs:
+``volery vehicle params get``. A file in ``volery.cli.commands`` declares its commands with a ``Commands``
+object for each noun. ``volery.cli.main`` finds all of them, so a new command changes one file. They import
+the library inside their functions: ``volery --help`` imports all of them and must stay quick. A command
+imports the files that begin with its first word, such as ``cost.py`` and ``cost_calibrate.py``, and no other.
 
 A command is a function of an ``Output`` and of its options, and returns its exit status. The options that
 control the output (``--quiet``, ``--json``, ``--debug``) are added here. Options that several commands share
@@ -19,12 +20,22 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import is_dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import typer
+from typer.core import TyperGroup
 
-from volery.base.errors import CapabilityError, EstimateError, ModelError, UsageError, VoleryError
+from volery.base.errors import (
+    CapabilityError,
+    EstimateError,
+    ModelError,
+    UsageError,
+    VoleryError,
+    did_you_mean,
+)
 from volery.base.installed import missing_extra
 from volery.base.process import interrupted_by_signals
 from volery.cli.console import Output
@@ -42,8 +53,11 @@ NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 BAD_INPUT_ERRORS = (ModelError, UsageError, EstimateError, CapabilityError)
 """Errors that the user corrects in a file or in the call."""
 
-SECTIONS = ("First steps", "Simulate", "Fly", "ROS", "Cost of computing")
-"""Headings of ``volery --help``, in order."""
+FIRST_HOUR = ("demo", "simulate", "fly")
+"""What ``volery --help`` shows first, under a heading of its own."""
+HEADINGS = "The first hour", "More"
+
+HELP = ("-h", "--help")
 
 OutputOption = Literal["quiet", "json", "debug"]
 _OUTPUT_OPTIONS: dict[OutputOption, Any] = {"quiet": Quiet, "json": Json, "debug": Debug}
@@ -51,11 +65,58 @@ _OUTPUT_OPTIONS: dict[OutputOption, Any] = {"quiet": Quiet, "json": Json, "debug
 Command = TypeVar("Command", bound=Callable[..., int])
 
 
-class Commands:
-    """Commands of one file, at the top level or in a *group* such as ``volery bag``."""
+class Noun(TyperGroup):
+    """Commands below a noun. One with the noun's own name is what the noun does without a verb.
 
-    def __init__(self, section: str, *, group: str = "", summary: str = "") -> None:
-        self.section, self.group, self.summary = section, group, summary
+    ``volery cost FILE`` is the command ``cost`` of the noun ``cost``, and ``volery cost profile`` another.
+    """
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        self.own = self.commands.pop(self.name or "", None)
+
+    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        """Parse *args* as those of the noun's own command, unless a verb or the wish for help begins them."""
+        completing = bool(extra.get("resilient_parsing"))
+        if self.own is not None and self._are_of(self.own, args, completing=completing):
+            return self.own.make_context(info_name, args, parent, **extra)
+        return super().make_context(info_name, args, parent, **extra)
+
+    def _are_of(self, own: Any, args: list[str], *, completing: bool) -> bool:
+        if not args:
+            return not completing and not any(one.required for one in own.params)
+        word = args[0]
+        misspelt = word.isalpha() and did_you_mean(word, self.commands) and not Path(word).exists()
+        return not misspelt and word not in {*self.commands, *HELP}
+
+    def described(self) -> Noun:
+        """Return the noun as help shows it: with the arguments and options of its own command."""
+        if self.own is None:
+            return self
+        shown = copy(self)
+        shown.params, shown.help = [*self.own.params, *self.params], self.own.help
+        shown.subcommand_metavar = "| COMMAND [ARGS]..."
+        return shown
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Show the noun's own command above the others."""
+        TyperGroup.format_help(self.described(), ctx, formatter)
+
+    def shell_complete(self, ctx: Any, incomplete: str) -> Any:
+        """Offer the verbs, and the options of the noun's own command."""
+        return TyperGroup.shell_complete(self.described(), ctx, incomplete)
+
+
+class Commands:
+    """Commands of one file, at the top level or below a noun.
+
+    Args:
+        noun: Words before the command, such as ``ros bag``; empty at the top level.
+        summary: What the commands of the noun do. One of its files states it.
+    """
+
+    def __init__(self, noun: str = "", summary: str = "") -> None:
+        self.noun, self.summary = noun, summary
         self.members: list[tuple[str, Callable[..., None]]] = []
 
     def add(self, *options: OutputOption, name: str | None = None) -> Callable[[Command], Command]:
@@ -63,7 +124,8 @@ class Commands:
 
         Args:
             options: Which of ``quiet``, ``json`` and ``debug`` the command takes.
-            name: Name of the command, by default that of the function.
+            name: Name of the command, by default that of the function. That of the noun stands for what
+                the noun does without a verb.
         """
 
         def register(function: Command) -> Command:
@@ -75,20 +137,28 @@ class Commands:
         return register
 
     def has(self, word: str) -> bool:
-        """Return whether *word* is the name of the group, or of a command at the top level."""
-        return word == self.group or (not self.group and word in dict(self.members))
+        """Return whether *word* is the first word of the commands."""
+        return word in (self.noun.split()[:1] or dict(self.members))
 
     def add_to(self, app: typer.Typer) -> None:
         """Add the commands to *app*."""
-        target = app
-        if self.group:
-            known = (one.typer_instance for one in app.registered_groups if one.name == self.group)
-            target = next(known, None) or typer.Typer(help=self.summary, no_args_is_help=True)
-            if target not in [one.typer_instance for one in app.registered_groups]:
-                app.add_typer(target, name=self.group, rich_help_panel=self.section)
-            target.info.help = self.summary or target.info.help  # one of the group's files has the summary
+        for noun in self.noun.split():
+            app = _below(app, noun)
+        if self.summary:
+            app.info.help = self.summary
         for name, function in self.members:
-            target.command(name, rich_help_panel=None if self.group else self.section)(function)
+            heading = None if self.noun else HEADINGS[name not in FIRST_HOUR]
+            app.command(name, rich_help_panel=heading)(function)
+
+
+def _below(app: typer.Typer, noun: str) -> typer.Typer:
+    """Return the part of *app* for what stands below *noun*, a new one if there is none."""
+    for one in app.registered_groups:
+        if one.name == noun and one.typer_instance is not None:
+            return one.typer_instance
+    made = typer.Typer(cls=Noun, no_args_is_help=True)
+    app.add_typer(made, name=noun, rich_help_panel=HEADINGS[1] if app.info.callback else None)
+    return made
 
 
 def _command_line_function(

@@ -2,8 +2,8 @@
 
 The nearest file counts, from the current folder upwards; files are not merged. It has a table for each
 command, with the names of its options without dashes in front: ``[simulate]`` with ``seed = 3``, and
-``[calibrate.ros]`` for a command of a group. What stands on the command line wins. Unknown names are refused,
-since a misspelt default would have no effect without a word.
+``[cost.calibrate.ros]`` for a command below nouns. What stands on the command line wins. Unknown names are
+refused, since a misspelt default would have no effect without a word.
 
 A folder may come from another person. So the values that a command takes from a file are printed, options of
 ``NEVER`` are refused, and a file that another user owns or can replace is ignored.
@@ -24,6 +24,8 @@ from typer.core import TyperGroup, TyperOption
 
 from volery.base.errors import UsageError, did_you_mean
 from volery.base.files import read_text
+from volery.cli.command import Noun
+from volery.cli.old_names import current_tables
 
 OWN_FILE, SHARED_FILE = "volery.toml", "pyproject.toml"
 
@@ -37,7 +39,7 @@ NEVER = {
     ),
     **dict.fromkeys(("switch", "on-rc-loss", "on-telemetry-loss", "emergency"), PROTECTS),
     **dict.fromkeys(("enable-control", "signing", "fly"), PROTECTS),
-    **dict.fromkeys(("replace", "remove"), "it overwrites or removes files"),
+    **dict.fromkeys(("replace",), "it overwrites files"),
 }
 """Options that no file states, with the reason: who writes the folder would decide for who types there."""
 
@@ -50,14 +52,17 @@ class Configuration:
     defaults: dict[str, Any] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     _tables: dict[str, Any] = field(default_factory=dict)
+    _group: TyperGroup | None = None
 
     def said(self, words: Sequence[str]) -> list[str]:
         """Return what is printed before the command *words* executes: its values from the file, and notes."""
         table, name = self._tables, ""
+        command: object = self._group
         for word in words:
-            if not isinstance(below := table.get(word), dict):
+            if not isinstance(command, TyperGroup) or word not in command.commands:
                 break
-            table, name = below, f"{name}.{word}" if name else word
+            command, table = command.commands[word], table.get(word, {})
+            name = f"{name}.{word}" if name else word
         values = [f"{key} = {value}" for key, value in table.items() if not isinstance(value, dict)]
         taken = [f"{self.file} [{name}]: {', '.join(values)}"] if name and values else []
         return [*self.notes, *taken]
@@ -91,8 +96,9 @@ def read_configuration(application: Callable[[], typer.Typer], folder: Path) -> 
             if foreign:
                 notes.append(f"{file} is ignored: {foreign}")
                 continue
-            defaults = _of_group(typer.main.get_group(application()), stated, f"{file}: ")
-            return Configuration(file, defaults, tuple(notes), stated)
+            where, group = f"{file}: ", typer.main.get_group(application())
+            tables = current_tables(stated, where)
+            return Configuration(file, _of_group(group, tables, where), tuple(notes), tables, group)
     return Configuration(notes=tuple(notes))
 
 
@@ -129,8 +135,12 @@ def _tables(file: Path) -> dict[str, Any] | None:
 
 def _of_group(group: TyperGroup, stated: dict[str, Any], where: str) -> dict[str, Any]:
     found: dict[str, Any] = {}
+    own: dict[str, Any] = {}
     for name, table in stated.items():
         command = group.commands.get(name)
+        if command is None and isinstance(group, Noun) and group.own is not None:
+            own[name] = table
+            continue
         if command is None:
             raise UsageError(f"{where}there is no command {name!r}{did_you_mean(name, group.commands)}")
         if not isinstance(table, dict):
@@ -140,7 +150,7 @@ def _of_group(group: TyperGroup, stated: dict[str, Any], where: str) -> dict[str
             found[name] = _of_group(command, table, below)
         else:
             found[name] = _of_command(command, table, below)
-    return found
+    return found | (_of_command(group.own, own, where) if isinstance(group, Noun) and own else {})
 
 
 def _of_command(command: Any, table: dict[str, Any], where: str) -> dict[str, Any]:

@@ -19,11 +19,12 @@ from volery.base.errors import UsageError
 from volery.base.garbage import seldom_collected
 from volery.base.process import outlive_output
 from volery.cli import commands
-from volery.cli.command import BAD_INPUT, FAILED, SECTIONS, Commands
+from volery.cli.command import BAD_INPUT, FAILED, FIRST_HOUR, HELP, Commands
 from volery.cli.configuration import Configuration, read_configuration
 from volery.cli.console import Output
+from volery.cli.old_names import QUIET, current_words
 
-INFORMATION = frozenset({"-h", "--help", "--version"})
+INFORMATION = frozenset({*HELP, "--version"})
 """Options that a wrong configuration file does not stop: its error is printed beside what they print."""
 
 
@@ -49,22 +50,24 @@ def application(word: str = "") -> typer.Typer:
     """Return the application.
 
     Args:
-        word: First word of the command line. If a file of commands has that name and declares a command of
-            that name, the other files are not imported.
+        word: First word of the command line. If the files whose names begin with it declare its commands,
+            the other files are not imported.
     """
     app = typer.Typer(
         callback=_root,
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode="markdown",
-        context_settings={"help_option_names": ["-h", "--help"]},
+        context_settings={"help_option_names": list(HELP)},
     )
     files = [one.name for one in iter_modules(commands.__path__)]
-    found = [one for file in files if file == word for one in _declared(file)]
+    own = [file for file in files if file.split("_")[0] == word]
+    found = [one for file in own for one in _declared(file)]
     if not any(one.has(word) for one in found):
         found = [one for file in files for one in _declared(file)]
-    for one in sorted(found, key=lambda one: SECTIONS.index(one.section)):
+    for one in found:
         one.add_to(app)
+    app.registered_commands.sort(key=lambda one: [*FIRST_HOUR, one.name].index(one.name))
     return app
 
 
@@ -85,19 +88,23 @@ def main() -> None:
     printed = outlive_output()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     atexit.register(gc.freeze)  # at its end Python looks for garbage in all that exists; nothing needs it
-    command = typer.main.get_command(application(next(iter(sys.argv[1:]), "")))
+    words, remark = current_words(sys.argv[1:])
+    if remark:
+        Output(quiet=not QUIET.isdisjoint(words)).note(remark)
+    informs = not INFORMATION.isdisjoint(words)
+    command = typer.main.get_command(application(next(iter(words), "")))
     configuration = Configuration()
     try:
         configuration = read_configuration(application, Path.cwd())
     except (UsageError, OSError) as error:
         Output().complain(f"volery: {error}")
-        if not INFORMATION.intersection(sys.argv[1:]) and sys.argv[1:]:
+        if words and not informs:
             raise SystemExit(BAD_INPUT) from None
-    if not INFORMATION.intersection(sys.argv[1:]):
-        for line in configuration.said(sys.argv[1:]):
+    if not informs:
+        for line in configuration.said(words):
             Output().note(line)
     try:
-        command(prog_name="volery", default_map=configuration.defaults)
+        command(words, prog_name="volery", default_map=configuration.defaults)
     finally:
         sys.stdout.flush()
         if printed is not None and printed.problem:

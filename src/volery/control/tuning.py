@@ -424,7 +424,7 @@ def is_robust(gains: PidGains, process: Process, sample_s: float = 0.05) -> bool
 
 
 def as_toml(loop: str, gains: PidGains, comment: str) -> str:
-    """Return the gains of a loop as the text of a file that ``volery go --gains`` reads."""
+    """Return the gains of a loop as the text of a file that ``volery control go --gains`` reads."""
     lines = [f"# {comment}", f"[{loop}]"]
     for name in ("kp", "ki", "kd", "filter_s", "deceleration"):
         value = float(getattr(gains, name))

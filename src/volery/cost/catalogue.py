@@ -74,8 +74,9 @@ class ProcessorEntry(BaseModel):
         law = self.ros.get(language) or self.ros.get(ROSCPP)
         if law is None:
             raise EstimateError(
-                f"{self.name}: the catalogue has no figures of ROS calls for it; allocate ROS nodes to a "
-                f"processor that has some, or measure them there: volery calibrate ros --client {language}"
+                f"{self.name}: the catalogue has no figures of ROS calls for it; allocate ROS nodes to "
+                "a processor that has some, or measure them there: "
+                f"volery cost calibrate ros --client {language}"
             )
         charged_as = "" if law.client == language else language
         return law.model_copy(update={"processor": self.name, "charged_as": charged_as})
@@ -101,7 +102,7 @@ class ProcessorEntry(BaseModel):
         if self.core_model is None:
             raise EstimateError(
                 f"{self.name}: the catalogue has no figures of compiled code for it; "
-                "volery calibrate processor measures them there"
+                "volery cost calibrate processor measures them there"
             )
         return self.core_model.model_copy(update={"name": self.name})
 

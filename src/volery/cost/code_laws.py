@@ -57,7 +57,7 @@ class CodeLaw(WithProvenance):
             return ()
         return (
             f"the time of counted {self.language} code on {self.processor}: {self.how_good()}; "
-            "run volery calibrate python on such a computer for a measured one",
+            "run volery cost calibrate python on such a computer for a measured one",
         )
 
 
@@ -148,7 +148,7 @@ SHORTEST = TimeBand(0.5, 9.0, "an activation below 2,000 cycles, whose library c
 SHORT = TimeBand(0.5, 2.2, "an activation below 20,000 cycles, whose library calls and branches are cold")
 LONGER = TimeBand(0.7, 1.45, "an activation of its size")
 """Extremes of single activations that followed other code, on a Zen 4 and a Zen 5 with figures of their own
-(``volery calibrate processor``): eighteen kernels and programs; see docs/native-simulation.md."""
+(``volery cost calibrate processor``): eighteen kernels and programs; see docs/native-simulation.md."""
 
 
 def time_band(cycles: float, lost: float) -> TimeBand:

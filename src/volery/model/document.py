@@ -66,7 +66,7 @@ class Platform:
     catalogues: Annotated[
         tuple[str, ...],
         ListOf(TEXT, bare=True),
-        "Files with kinds of processors beside the built-in ones, such as `volery calibrate` writes, "
+        "Files with kinds of processors beside the built-in ones, such as `volery cost calibrate` writes, "
         "relative to the model.",
     ] = ()
     processors: Annotated[tuple[Processor, ...], PROCESSORS, "Computers, by name."] = ()

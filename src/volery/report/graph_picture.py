@@ -103,7 +103,7 @@ def graph_of_model(system: System) -> GraphSnapshot:
                     subscribers.setdefault(commands, [f"/{target.name}"])
     names = sorted({*publishers, *subscribers})
     if not names:
-        raise UsageError(f"{system.name}: the model states no topics; volery graph shows those of a run")
+        raise UsageError(f"{system.name}: the model states no topics; volery ros graph shows those of a run")
     topics = tuple(
         TopicSnapshot(
             name,

@@ -111,7 +111,7 @@ def summary_table(record: RunRecord, *, notes: bool = False) -> RenderableType:
         parts += [Text(f"not counted: {line}", style="dim") for line in record.not_counted]
     elif record.warnings or record.not_counted:
         numbers = f"warnings: {len(record.warnings)}, not counted: {len(record.not_counted)}"
-        line = f"{numbers}; see the report, or `volery report --notes`"
+        line = f"{numbers}; see the report, or `volery runs report --notes`"
         parts.append(Text(line, style="yellow" if record.warnings else "dim"))
     return Group(*parts)
 

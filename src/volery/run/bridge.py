@@ -238,7 +238,7 @@ def _check_graph_names(address: Address, wanted: str) -> None:
             f"{address}: the vehicle is on a graph already, under {own}'s names; there is nothing to bridge"
         )
     if wanted in ("", own):
-        served = f"`volery serve {address.driver} --graph ros1`"
+        served = f"`volery vehicle serve {address.driver} --graph ros1`"
         raise CapabilityError(
             f"{address}: {address.driver} is a ROS node itself, under {own}'s names "
             f"(a simulated one: {served}); for other names give --names {choices(MAVLINK_NAMES)}"

@@ -229,7 +229,7 @@ class Options:
         tell: Receives single lines that the user should read at once.
         graph: ``ros1`` or ``ros2`` to run the components as processes on that graph, at a pace of 1 unless
             ``pace`` is given; empty for the embedded graph.
-        deployed: The components on ``graph`` are started by others, from the packages of ``volery deploy``.
+        deployed: The components on ``graph`` are started by others, from packages of ``volery ros deploy``.
         log: File into which the run writes what happens, line by line, or None.
         if_killed: What the autopilot of a flight does by itself if this program is killed: ``return``,
             ``land`` or ``hover``; None leaves its parameters as they are.

@@ -34,7 +34,7 @@ OPERATIONS = (
     "conformance",
 )
 """Columns: ``examples/mission.py``; each operation of the API; ``set_attitude`` without a heading; missions,
-fences and rally points up and down; get, set, load, save; ``volery conformance --fly``.
+fences and rally points up and down; get, set, load, save; ``volery vehicle conformance --fly``.
 """
 
 
@@ -89,7 +89,8 @@ TABLE: Sequence[Row] = (
     Row(
         *("Paparazzi", None, "rotorcraft firmware, master", "f19834aaa, pprzlink ac28897", "2026-11-28"),
         (_FLOWN, _FLOWN, _UNTRIED, _UNTRIED, _FLOWN, _FLOWN),
-        "in NPS, volery go by set-points too; settings stand for parameters, blocks of its plan for missions",
+        "in NPS, volery control go by set-points too; settings stand for parameters, blocks of its plan for "
+        "missions",
     ),
     Row(
         *("DJI", None, "Onboard SDK 3.8 and 4.1", "definitions and nodes of both", "2026-11-28"),

@@ -18,9 +18,9 @@ pytestmark = pytest.mark.integration
 
 PAGE = Path(__file__).parents[3] / "docs" / "calibration.md"
 QUICK = {
-    "calibrate ros": [],  # continues after rounds that were kept, which are precise
-    "calibrate python": ["--rounds", "2", "2"],
-    "validate": ["--runs", "1", "--seconds", "1"],
+    "cost calibrate ros": [],  # continues after rounds that were kept, which are precise
+    "cost calibrate python": ["--rounds", "2", "2"],
+    "cost validate": ["--runs", "1", "--seconds", "1"],
 }
 LEFT_OUT = ("rclpy", "calibrate processor")
 """ROS 2 is in another environment; the node of the model is not in C++."""
@@ -91,7 +91,7 @@ def test_the_sequence_runs_as_printed(ros: None, tmp_path: Path, monkeypatch: py
     model = MODEL.replace("NAME", machine.name).replace("MHZ", f"{machine.frequency_mhz:g}")
     (tmp_path / "model.yaml").write_text(model, encoding="utf-8")
     commands = documented()
-    assert [command[0] for command in commands] == ["calibrate", "calibrate", "calibrate", "validate"]
+    assert [command[1] for command in commands] == ["calibrate", "calibrate", "calibrate", "validate"]
     for command in commands:
         short = next(more for start, more in QUICK.items() if " ".join(command).startswith(start))
         done = CliRunner().invoke(application(), [one.replace("MODEL", ".") for one in command] + short)

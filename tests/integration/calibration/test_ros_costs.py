@@ -128,7 +128,7 @@ def model(folder: Path, text: str) -> Path:
 
 
 def test_a_models_nodes_are_measured_and_estimated(ros: None, tmp_path: Path) -> None:
-    command = ["validate", str(model(tmp_path, MODEL)), "--runs", "1", "--seconds", "1", "--json"]
+    command = ["cost", "validate", str(model(tmp_path, MODEL)), "--runs", "1", "--seconds", "1", "--json"]
     done = CliRunner().invoke(application(), command)
     [talker] = json.loads(done.stdout)["nodes"]
     assert (talker["node"], talker["language"]) == ("talker", "rospy")
@@ -148,7 +148,7 @@ def test_a_program_in_cpp_is_measured_from_its_main_on(ros: None, tmp_path: Path
 
 def test_ctrl_c_leaves_a_campaign_to_go_on_with(ros: None, tmp_path: Path) -> None:
     out = tmp_path / "catalogue.yaml"
-    command = [VOLERY, "calibrate", "ros", "--client", "rospy", "--out", str(out)]
+    command = [VOLERY, "cost", "calibrate", "ros", "--client", "rospy", "--out", str(out)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     rounds = tmp_path / "catalogue.yaml.rospy.rounds"
     end = time.monotonic() + 60

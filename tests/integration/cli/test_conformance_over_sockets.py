@@ -31,7 +31,7 @@ def served(autopilot: str, faster: int) -> Iterator[str]:
         port = listener.getsockname()[1]
     where = f"tcp://{HERE}:{port}"
     vehicle = subprocess.Popen(
-        [*COMMAND, "serve", autopilot, "--listen", where, "--speed", str(faster)],
+        [*COMMAND, "vehicle", "serve", autopilot, "--listen", where, "--speed", str(faster)],
         stdout=subprocess.PIPE,
         text=True,
     )
@@ -63,7 +63,7 @@ def is_armed(address: str) -> bool:
 
 
 def checked(address: str, folder: Path, *arguments: str) -> dict[str, dict[str, Any]]:
-    command = [*COMMAND, "conformance", address, "--out", str(folder), *arguments]
+    command = [*COMMAND, "vehicle", "conformance", address, "--out", str(folder), *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=WITHIN_S, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     report = json.loads((folder / "conformance.json").read_text(encoding="utf-8"))
@@ -104,7 +104,7 @@ def test_a_px4_that_other_programs_have_commanded(tmp_path: Path) -> None:
 def test_sigterm_lands_it_and_keeps_the_results(address: str, tmp_path: Path) -> None:
     arguments = ("--only", "takeoff,goto,hold", "--fly", "--out", str(tmp_path))
     running = subprocess.Popen(
-        [*COMMAND, "conformance", address, *arguments],
+        [*COMMAND, "vehicle", "conformance", address, *arguments],
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         text=True,

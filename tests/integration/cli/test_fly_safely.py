@@ -243,7 +243,14 @@ def test_a_fence_as_a_map_editor_writes_it(tmp_path: Path) -> None:
 def test_an_autopilot_of_another_make_answers(fly: Any) -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
-    command = [sys.executable, "-c", "from volery.cli.main import main; main()", "serve", "ardupilot"]
+    command = [
+        sys.executable,
+        "-c",
+        "from volery.cli.main import main; main()",
+        "vehicle",
+        "serve",
+        "ardupilot",
+    ]
     listen = ["--listen", f"tcp://127.0.0.1:{port}"]
     with subprocess.Popen([*command, *listen], stdout=subprocess.PIPE) as served:
         try:

@@ -143,7 +143,7 @@ def test_a_served_vehicle_can_be_flown_over_a_socket(starter):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    arguments = ("serve", "ardupilot", "--listen", f"tcp://127.0.0.1:{port}", "--speed", "10")
+    arguments = ("vehicle", "serve", "ardupilot", "--listen", f"tcp://127.0.0.1:{port}", "--speed", "10")
     environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
     in_a_script = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # begun with &
     command = [*COMMAND[:2], f"{in_a_script}; {COMMAND[2]}", *arguments]

@@ -43,10 +43,10 @@ def a_free_port(kind: int = socket.SOCK_STREAM) -> int:
 def served(
     carrier: str, speed: float, *options: str, autopilot: str = "ardupilot", query: str = ""
 ) -> Served:
-    """Start ``volery serve`` and wait for the line that says it can be reached."""
+    """Start ``volery vehicle serve`` and wait for the line that says it can be reached."""
     port = a_free_port(socket.SOCK_DGRAM if carrier == "udp" else socket.SOCK_STREAM)
     where = ("--listen", f"{carrier}://{HERE}:{port}{query}", "--speed", str(speed))
-    command = [*COMMAND, "serve", autopilot, *where, *options]
+    command = [*COMMAND, "vehicle", "serve", autopilot, *where, *options]
     environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
     process = subprocess.Popen(command, stdout=subprocess.PIPE, env=environment, text=True)
     assert process.stdout is not None

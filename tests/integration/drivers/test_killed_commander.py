@@ -58,7 +58,7 @@ def test_a_commander_is_killed_in_flight(autopilot: str, tmp_path: Path) -> None
     mission.write_text(MISSION)
     where = f"tcp://{HERE}:{free_port()}"
     url = f"{autopilot}+{where}"
-    with child(["serve", autopilot, "--listen", where, "--speed", FASTER]) as vehicle:
+    with child(["vehicle", "serve", autopilot, "--listen", where, "--speed", FASTER]) as vehicle:
         assert line_of(vehicle, "Ctrl-C")
         with child(["fly", str(mission), "--on", url, "--out", str(tmp_path / "run")]) as commander:
             assert "up" in line_of(commander, "up")

@@ -65,7 +65,7 @@ def served(notes: Path, descriptors: int | None = None) -> Iterator[int]:
     with (
         notes.open("w") as written,
         subprocess.Popen(
-            [sys.executable, "-c", program, "serve", "ardupilot", "--listen", listen],
+            [sys.executable, "-c", program, "vehicle", "serve", "ardupilot", "--listen", listen],
             stdout=subprocess.DEVNULL,
             stderr=written,
         ) as process,

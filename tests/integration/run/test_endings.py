@@ -157,7 +157,7 @@ def test_after_a_kill_the_report_recovers_the_run(commands, in_the_air):
     commands.end_of(process)
     folder = commands.folder / "out"
     assert not (folder / "run.json").exists()
-    done = commands.run("report", "out", "--json")
+    done = commands.run("runs", "report", "out", "--json")
     assert done.returncode == 0, done.stderr
     assert (folder / "report.html").exists()
     recovered = json.loads(done.stdout)

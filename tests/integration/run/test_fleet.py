@@ -188,8 +188,16 @@ def free_port(kind: int) -> int:
 
 @contextmanager
 def served(*listening: tuple[str, int]) -> Iterator[None]:
-    """``volery serve`` at each address, with each system id, in a process of its own."""
-    start = [sys.executable, "-c", "from volery.cli.main import main; main()", "serve", "--speed", "4"]
+    """``volery vehicle serve`` at each address, with each system id, in a process of its own."""
+    start = [
+        sys.executable,
+        "-c",
+        "from volery.cli.main import main; main()",
+        "vehicle",
+        "serve",
+        "--speed",
+        "4",
+    ]
     processes: list[subprocess.Popen[Any]] = []
     try:
         for url, system in listening:

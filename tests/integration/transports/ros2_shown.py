@@ -1,4 +1,4 @@
-"""Asks ``volery graph ros2`` until it shows all that is named, and twice the same; says it as JSON."""
+"""Asks ``volery ros graph ros2`` until it shows all that is named, and twice the same; says it as JSON."""
 
 import subprocess
 import sys
@@ -10,7 +10,7 @@ def main(named: list[str]) -> None:
     shown, before = "", "-"
     while shown != before or not all(f'"{name}"' in shown for name in named):
         before = shown
-        asked = [*COMMAND, "graph", "ros2", "--within", "0", "--json"]
+        asked = [*COMMAND, "ros", "graph", "ros2", "--within", "0", "--json"]
         shown = subprocess.run(asked, capture_output=True, text=True, timeout=60, check=True).stdout
     sys.stdout.write(shown)
 

@@ -1,5 +1,5 @@
-"""``volery bridge`` on a real roscore: the session of a thesis with Debian's tools, flights behind MAVROS's
-names, and autopilots that go by these without speaking MAVLink.
+"""``volery ros bridge`` on a real roscore: the session of a thesis with Debian's tools, flights behind
+MAVROS's names, and autopilots that go by these without speaking MAVLink.
 
 The simulated vehicles live four times as fast as real time.
 """
@@ -36,7 +36,7 @@ Start = Callable[..., Any]
 
 def bridged(start: Start, *options: str) -> Any:
     """A bridge that hears its vehicle."""
-    bridge = start(*COMMAND, "bridge", *options, "--speed", "4")
+    bridge = start(*COMMAND, "ros", "bridge", *options, "--speed", "4")
     said = ""
     while "disarmed" not in said:
         line = bridge.stdout.readline()
@@ -158,7 +158,7 @@ def test_a_paparazzi_goes_by_the_names_of_mavros(debian: Run, start: Start) -> N
 
 
 def test_a_dji_on_the_graph_gets_other_names_there(debian: Run, start: Start) -> None:
-    served = start(*COMMAND, "serve", "dji", "--graph", "ros1", "--speed", "4")
+    served = start(*COMMAND, "vehicle", "serve", "dji", "--graph", "ros1", "--speed", "4")
     assert "serving dji on ros1" in served.stdout.readline()
     bridged(start, "dji+ros1:///dji_sdk", "--names", "mavros", "--namespace", "/dji")
     state = armed_by_tools(debian, "/dji")
@@ -167,7 +167,7 @@ def test_a_dji_on_the_graph_gets_other_names_there(debian: Run, start: Start) ->
 
 def test_whose_name_is_taken_is_told(roscore: Roscore, start: Start, ours: Any) -> None:
     ours.graph.node("mavros", "/taken")
-    bridge = start(*COMMAND, "bridge", "sim:ardupilot", "--namespace", "/taken")
+    bridge = start(*COMMAND, "ros", "bridge", "sim:ardupilot", "--namespace", "/taken")
     try:
         said, _ = bridge.communicate(timeout=2 * LIMIT_S)
     except subprocess.TimeoutExpired:
@@ -197,7 +197,7 @@ def test_over_a_serial_line_it_asks_as_it_is_told(ros: Run, start: Start) -> Non
     address = f"ardupilot+serial://{os.ttyname(line)}?baud=57600"
     options = ("--names", "roscopter", "--namespace", "/serial", "--rate", "20", "--source-system", "254")
     in_a_script = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"  # begun with &
-    bridge = start(*COMMAND[:2], f"{in_a_script}; {COMMAND[2]}", "bridge", address, *options)
+    bridge = start(*COMMAND[:2], f"{in_a_script}; {COMMAND[2]}", "ros", "bridge", address, *options)
     assert "bridging" in bridge.stdout.readline()
     os.write(autopilot, BEAT)
     asks_for_streams(lambda: os.read(autopilot, 4096))
@@ -216,7 +216,7 @@ def test_a_link_that_breaks_is_opened_again(roscore: Roscore, start: Start) -> N
         autopilot.settimeout(LIMIT_S)
         address = f"ardupilot+tcp://127.0.0.1:{autopilot.getsockname()[1]}"
         options = ("--names", "roscopter", "--namespace", "/broken", "--rate", "20", "--source-system", "254")
-        start(*COMMAND, "bridge", address, *options)
+        start(*COMMAND, "ros", "bridge", address, *options)
         for _ in range(2):
             connection, _ = autopilot.accept()
             with connection:

@@ -1,4 +1,4 @@
-"""``volery bridge`` on real ROS 2: plain rclpy hears the vehicle and arms it, and we fly one behind
+"""``volery ros bridge`` on real ROS 2: plain rclpy hears the vehicle and arms it, and we fly one behind
 MAVROS's names.
 """
 
@@ -30,6 +30,7 @@ def beside() -> Iterator[Beside]:
         bridge = (
             python,
             *COMMAND[1:],
+            "ros",
             "bridge",
             "sim:ardupilot?start=warm",
             "--graph",

@@ -1,4 +1,4 @@
-"""What ``volery deploy`` writes is built and started by the tools of ROS, and delivers the parcel."""
+"""What ``volery ros deploy`` writes is built and started by the tools of ROS, and delivers the parcel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A simulated DJI served on a real roscore by ``volery serve``, flown from here over real topics."""
+"""A simulated DJI served on a real roscore by ``volery vehicle serve``, flown from here over real topics."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_it_takes_off_goes_and_lands(
     roscore: Roscore, start: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The vehicle four times as fast as real time, and we in real time: it must do for set-points."""
-    served = start(*COMMAND, "serve", "dji", "--graph", "ros1", "--speed", "4")
+    served = start(*COMMAND, "vehicle", "serve", "dji", "--graph", "ros1", "--speed", "4")
     said = served.stdout.readline()
     assert "serving dji on ros1" in said, said + served.stdout.read()
     monkeypatch.setenv("ROS_MASTER_URI", roscore.uri)

@@ -21,7 +21,7 @@ LIMIT_S = 100
 def test_a_gain_that_rclpy_sets_is_used_in_flight(tmp_path: Path) -> None:
     out = tmp_path / "run"
     python, environment = python_of("jazzy"), surroundings()
-    arguments = ["go", "rotation", "--graph", "ros2", "--angle", "0", "--angle", "30"]
+    arguments = ["control", "go", "rotation", "--graph", "ros2", "--angle", "0", "--angle", "30"]
     arguments += ["--hold", "20"]  # rclpy starts in the meantime, also on a busy machine
     arguments += ["--on", "sim:ardupilot?start=warm", "--speed", "3", "--out", str(out)]
     flight = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""Debian's ``rosbag`` and our ``volery bag`` read each other's recordings; ``volery graph`` on a roscore."""
+"""Debian's ``rosbag`` and ``volery ros bag`` read each other's files; ``volery ros graph`` on a roscore."""
 
 from __future__ import annotations
 
@@ -88,13 +88,13 @@ def test_we_read_and_play_what_rosbag_records(
         ours.graph.kernel.sleep_until(ours.graph.kernel.now() + 20 * MS)
     ros("rosnode", "kill", "/recording")
     recording.communicate(timeout=10)
-    told = volery("bag", "info", path)
+    told = volery("ros", "bag", "info", path)
     assert (told["format"], told["complete"]) == ("rosbag 1", True)
     assert told["topics"] == [{"name": "/words", "type": STRING, "messages": COUNT}]
     heard: list[str] = []
     speaker.close()
     ours.spinning("listener").subscribe("/words", STRING, lambda one: heard.append(one.data))
-    assert volery("bag", "play", path, "--rate", "5") == {"played": COUNT}
+    assert volery("ros", "bag", "play", path, "--rate", "5") == {"played": COUNT}
     ours.until(lambda: len(heard) == COUNT, "all is heard")
     assert heard == [f"word {number}" for number in range(COUNT)]
 
@@ -104,13 +104,13 @@ def test_a_recording_that_was_cut_short_is_played_as_far_as_it_is_whole(
 ) -> None:
     cut = tmp_path / "cut.bag"
     cut.write_bytes(bag.read_bytes()[:9000])
-    told = volery("bag", "info", cut)
+    told = volery("ros", "bag", "info", cut)
     whole = {topic["name"]: topic["messages"] for topic in told["topics"]}
     assert not told["complete"]
     assert 0 < whole["/words"] < COUNT
     heard: list[str] = []
     ours.spinning("listener").subscribe("/words", STRING, lambda one: heard.append(one.data))
-    played = volery("bag", "play", cut, "--rate", "10", "--topic", "/words")
+    played = volery("ros", "bag", "play", cut, "--rate", "10", "--topic", "/words")
     assert played == {"played": whole["/words"]}
     ours.until(lambda: len(heard) == whole["/words"], "what is whole is heard")
     assert heard == [f"word {number}" for number in range(whole["/words"])]
@@ -120,7 +120,7 @@ def test_our_record_of_rospys_talker(
     ours: Ours, ros: Run, start: Start, volery: Volery, tmp_path: Path
 ) -> None:
     path = tmp_path / "ours.bag"
-    recording = start(*VOLERY, "bag", "record", str(path), "--topic", "/chatter", "--quiet")
+    recording = start(*VOLERY, "ros", "bag", "record", str(path), "--topic", "/chatter", "--quiet")
     start(*TALKER, "_listeners:=2")
     node, heard = ours.spinning("listener"), []
     node.subscribe("/chatter", STRING, heard.append)
@@ -141,7 +141,7 @@ def test_the_graph_of_a_roscore(roscore: Any, start: Start, volery: Volery, tmp_
     picture: dict[str, Any] = {"topics": []}
     while not any(one["name"] == "/heard" and one["rate"] for one in picture["topics"]):
         assert time.monotonic() < end, picture
-        picture = volery("graph", "ros1", "--within", "2", "--svg", tmp_path / "graph.svg")
+        picture = volery("ros", "graph", "ros1", "--within", "2", "--svg", tmp_path / "graph.svg")
     topics = {one["name"]: one for one in picture["topics"]}
     assert {"/listener", "/rosout", "/talker"} <= set(picture["nodes"])
     assert not any("volery" in one for one in picture["nodes"])
@@ -165,9 +165,9 @@ def test_what_is_latched_is_played_and_recorded_as_such(
     with create_bag(path) as made:
         made.write("/plan", 0, new(STRING, data="once"), Offer(True, "/planner"))
         made.write("/tick", 300 * S, new(STRING, data="on"), Offer(False, "/planner"))
-    start(*VOLERY, "bag", "play", str(path), "--quiet")
+    start(*VOLERY, "ros", "bag", "play", str(path), "--quiet")
     assert 'data: "once"' in ros("rostopic", "echo", "-n1", "/plan")
-    told = volery("bag", "record", again, "--topic", "/plan", "--seconds", "5")
+    told = volery("ros", "bag", "record", again, "--topic", "/plan", "--seconds", "5")
     assert told == {"recorded": {"/plan": 1}, "problems": {}}
     (connection,) = open_bag(again).connections
     assert connection.source.offer.latched

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.integration
 
 
 def test_debian_tools_observe_it_change_its_gains_and_fly_it(start: Callable[..., Any], ros: Run) -> None:
-    cube = start(*COMMAND, "go", "cube", "--graph", "ros1", "--rounds", "0")
+    cube = start(*COMMAND, "control", "go", "cube", "--graph", "ros1", "--rounds", "0")
     wanted = {"/cmd_vel", "/poseupdate", "/odom"}
     until(lambda: wanted <= set(ros("rostopic", "list").split()), "its topics")
     ros("rosparam", "set", "/test_via_point/kp", "0.9")
@@ -27,7 +27,7 @@ def test_debian_tools_observe_it_change_its_gains_and_fly_it(start: Callable[...
 
 
 def test_any_node_can_fly_it(start: Callable[..., Any], ros: Run) -> None:
-    vehicle = start(*COMMAND, "go", "cube", "--graph", "ros1", "--no-controller")
+    vehicle = start(*COMMAND, "control", "go", "cube", "--graph", "ros1", "--no-controller")
     until(lambda: "/odom" in ros("rostopic", "list"), "its topics")
     start("rostopic", "pub", "-r", "10", "/cmd_vel", "geometry_msgs/Twist", "[1.0, 0, 0]", "[0, 0, 0]")
 

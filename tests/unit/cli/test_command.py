@@ -54,7 +54,7 @@ class Shared:
 
 
 def test_the_fields_of_a_dataclass_are_options():
-    commands, seen = Commands("Fly"), []
+    commands, seen = Commands(), []
 
     @commands.add("quiet")
     def climb(output: Output, shared: Shared, name: str = "one") -> int:

@@ -36,15 +36,15 @@ def test_without_a_file_there_are_no_defaults(tmp_path):
 @pytest.mark.parametrize(
     ("table", "name"),
     [
-        ("calibrate.ros", "python"),
+        ("cost.calibrate.ros", "python"),
         ("cost", "flag"),
         ("cost", "before"),
         ("fly", "ceiling"),
         ("fly", "fence"),
         ("fly", "reserve"),
-        ("go.land", "switch"),
-        ("serve", "signing"),
-        ("conformance", "fly"),
+        ("control.go.land", "switch"),
+        ("vehicle.serve", "signing"),
+        ("vehicle.conformance", "fly"),
     ],
 )
 def test_programs_flags_and_what_protects_come_from_the_command_line_only(tmp_path, table, name):
@@ -55,7 +55,7 @@ def test_programs_flags_and_what_protects_come_from_the_command_line_only(tmp_pa
 
 def test_what_is_refused_are_options_that_exist():
     def options(group):
-        for command in group.commands.values():
+        for command in (*group.commands.values(), *filter(None, [getattr(group, "own", None)])):
             yield from (
                 options(command)
                 if isinstance(command, TyperGroup)
@@ -86,10 +86,14 @@ def test_a_file_that_others_can_write_is_ignored_and_said_so(tmp_path, monkeypat
 
 def test_what_a_command_takes_from_a_file_is_said_in_one_line(tmp_path):
     file = tmp_path / "volery.toml"
-    file.write_text("[simulate]\nseed = 3\nset = ['a=b']\n[calibrate.ros]\nname = 'laptop'\n")
+    file.write_text(
+        "[simulate]\nseed = 3\nset = ['a=b']\n[cost.calibrate.ros]\nname = 'laptop'\n[cost]\nlisting = true\n"
+    )
     found = read_configuration(application, tmp_path)
     assert found.said(["simulate", "--quiet"]) == [f"{file} [simulate]: seed = 3, set = ['a=b']"]
-    assert found.said(["calibrate", "ros"]) == [f"{file} [calibrate.ros]: name = laptop"]
+    assert found.said(["cost", "calibrate", "ros"]) == [f"{file} [cost.calibrate.ros]: name = laptop"]
+    assert found.said(["cost", "calibrate"]) == found.said(["cost", "profile", "."]) == []
+    assert found.said(["cost", "step.c"]) == [f"{file} [cost]: listing = True"]
     assert found.said(["runs"]) == found.said([]) == []
 
 
@@ -103,7 +107,9 @@ def test_what_a_command_takes_from_a_file_is_said_in_one_line(tmp_path):
         ("[simulate]\nseed = [3]\n", "one value is expected"),
         ("[simulate]\nset = 'a=b'\n", "a list is expected"),
         ("[simulate]\nquiet = 'yes'\n", "true or false is expected"),
-        ("[bag.inf]\n", r"\[bag\] there is no command 'inf'"),
+        ("[ros.bag.inf]\n", r"\[bag\] there is no command 'inf'"),
+        ("[cost]\nlistin = true\n", r"\[cost\] there is no option --listin"),
+        ("[vehicle]\nkind = 'rover'\n", r"\[vehicle\] there is no command 'kind'"),
         ("[simulate\n", "cannot be read"),
     ],
 )

@@ -75,10 +75,15 @@ def test_help_is_quick_to_import():
 
 @pytest.mark.parametrize(
     ("word", "imported"),
-    [("fly", {"fly"}), ("calibrate", {"calibrate"}), ("ros", None), ("model", None), ("--help", None)],
+    [
+        ("fly", {"fly"}),
+        ("ros", {"ros", "ros_deploy"}),
+        ("cost", {"cost", "cost_calibrate"}),
+        ("doctor", None),
+        ("--help", None),
+    ],
 )
-def test_a_command_imports_its_own_file_only(word, imported):
-    """``ros`` is the name of a file, but of no command."""
+def test_a_command_imports_the_files_of_its_first_word_only(word, imported):
     package = "volery.cli.commands."
     script = (
         f"import sys; from volery.cli.main import application; application({word!r}); print(*sys.modules)"
@@ -348,13 +353,13 @@ def test_simulate_refuses_what_makes_no_sense(arguments, complaint):
     ],
 )
 def test_serve_refuses_what_makes_no_sense(arguments, complaint):
-    result = run("serve", *arguments)
+    result = run("vehicle", "serve", *arguments)
     assert result.exit_code == BAD_INPUT, result.output
     assert complaint in text(result)
 
 
 def test_report_of_a_folder_without_a_run(tmp_path):
-    assert run("report", str(tmp_path)).exit_code == BAD_INPUT
+    assert run("runs", "report", str(tmp_path)).exit_code == BAD_INPUT
 
 
 def test_run_folders_are_counted_up(tmp_path, monkeypatch):
@@ -388,14 +393,58 @@ def test_doctor_fails_if_something_needed_is_missing(monkeypatch, capsys):
     assert "missing: gyro" in said
 
 
-def test_a_shell_completes_commands_and_options():
-    script = "import sys; from volery.cli.main import main; sys.argv = ['volery']; main()"
-    words = {"_VOLERY_COMPLETE": "complete_bash", "COMP_WORDS": "volery simul", "COMP_CWORD": "1"}
-    offered = subprocess.run(
-        [sys.executable, "-c", script],
-        env={**os.environ, **words},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert offered.stdout.split() == ["simulate"]
+VOLERY = "import sys; from volery.cli.main import main; sys.argv[0] = 'volery'; main()"
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        ("simul", ["simulate"]),
+        ("vehicle params ", ["get", "set", "save", "load", "diff"]),
+        ("runs c", ["compare"]),
+        ("cost ", ["profile", "validate", "calibrate"]),
+        ("cost --cata", ["--catalogue"]),
+        ("cost step.c --cata", ["--catalogue"]),
+        ("ser", []),
+    ],
+)
+def test_a_shell_completes_nouns_verbs_and_options(typed, offered):
+    words = {"COMP_WORDS": f"volery {typed}", "COMP_CWORD": str(len(f"volery {typed}x".split()) - 1)}
+    done = subprocess.run(
+        [sys.executable, "-c", VOLERY],
+        env={**os.environ, **words, "_VOLERY_COMPLETE": "complete_bash"},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.stdout.split() == offered
+
+
+def test_completion_is_installed_for_the_shell_of_the_user(tmp_path):
+    done = subprocess.run(
+        [*("bash", "-c", f'"$0" -c "{VOLERY}" --install-completion bash', sys.executable)],
+        env={**os.environ, "HOME": str(tmp_path)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "volery.sh" in (tmp_path / ".bashrc").read_text()
+    assert "_VOLERY_COMPLETE=complete_bash" in next(tmp_path.rglob("volery.sh")).read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("runs", "compar", "a", "b"), "No such command 'compar'. Did you mean 'compare'?"),
+        (("cost", "profile.c"), "profile.c: there is no such file"),
+        (("vehicle", "serv"), "Did you mean 'serve'?"),
+    ],
+)
+def test_a_misspelt_verb_is_told_from_a_file(words, said):
+    result = run(*words)
+    assert result.exit_code == BAD_INPUT
+    assert said in text(result)
+
+
+def test_the_help_of_a_noun_shows_what_it_does_without_a_verb():
+    shown = text(run("cost", "--help"))
+    assert "--catalogue" in shown
+    assert "calibrate" in shown
+    assert text(run("cost")) == shown

@@ -55,8 +55,8 @@ def test_runs_are_listed_with_vehicles_and_size_reported_and_removed(tmp_path, m
     shown = volery.invoke(application(), ["runs"]).stdout
     assert "ardupilot" in shown
     assert "completed" in shown
-    refused = volery.invoke(application(), ["runs", "--remove", "up-3", "--remove", "up-1"])
+    refused = volery.invoke(application(), ["runs", "remove", "up-3", "up-1"])
     assert refused.exit_code == 2
     assert (tmp_path / "runs" / "up-1").is_dir()
-    assert volery.invoke(application(), ["runs", "--remove", "up-1"]).exit_code == 0
+    assert volery.invoke(application(), ["runs", "remove", "runs/up-1/"]).exit_code == 0
     assert [one.name for one in (tmp_path / "runs").iterdir()] == ["up-2"]

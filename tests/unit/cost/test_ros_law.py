@@ -173,7 +173,7 @@ def test_a_law_of_one_frequency_is_flagged_at_another() -> None:
 
 
 def test_a_client_without_a_law_gets_a_hint() -> None:
-    with pytest.raises(EstimateError, match="volery calibrate ros --client rclpy"):
+    with pytest.raises(EstimateError, match="volery cost calibrate ros --client rclpy"):
         measured_law("rclpy")
 
 

@@ -154,7 +154,7 @@ def test_demands() -> None:
 
 
 def run(*arguments: str) -> Any:
-    return CliRunner().invoke(application(), ["conformance", *arguments])
+    return CliRunner().invoke(application(), ["vehicle", "conformance", *arguments])
 
 
 def test_the_command_line_reports_the_results(tmp_path: Path) -> None:

@@ -162,7 +162,7 @@ def ros_law(costs: Mapping[str, CallCost], under: Conditions) -> RosLaw:
     return RosLaw(
         client=under.client,
         provenance="measured",
-        source=f"volery calibrate ros --client {under.client}, {rounds} rounds on {under.processor}",
+        source=f"volery cost calibrate ros --client {under.client}, {rounds} rounds on {under.processor}",
         validity=f"{under.frequency_mhz:g} MHz only; publishers with a queue (queue_size above 0)",
         error=round(max((cost.spread / 2.0 for cost in _common(costs)), default=0.0), 3),
         least_mhz=under.frequency_mhz,

@@ -1,4 +1,4 @@
-"""``volery cost`` and ``profile``: cost of compiled code on another core; ``volery validate``: its error."""
+"""``volery cost``, ``profile`` and ``validate``: cost of compiled code on another core, and its error."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from volery.cost.native import ProgramEstimate, SourceLineCost
     from volery.model.system import System
 
-commands = Commands("Cost of computing")
+commands = Commands("cost", "Estimate what code costs on another processor; calibrate, profile, validate.")
 
 TOP = 8
 """Number of source lines in the table."""
@@ -63,7 +63,8 @@ def cost(
         list[str] | None, typer.Option(help="Linker flag, such as -lpthread; may be repeated.")
     ] = None,
     catalogue: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Catalogue that `volery calibrate processor` wrote.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Catalogue that `volery cost calibrate processor` wrote."),
     ] = None,
     listing: Annotated[
         bool, typer.Option("--listing", help="Show the sources with each line's share of the cycles.")
@@ -238,7 +239,7 @@ def validate(
 ) -> int:
     """Run a model's nodes on real ROS, measure their CPU time and compare it with the estimate.
 
-    For models whose components are nodes of rospy or roscpp, on a processor that `volery calibrate` has
+    For models whose components are nodes of rospy or roscpp, on a processor that `volery cost calibrate` has
     measured. Exit status: 0 if every estimate is within 15 %, or within half the quartiles of the runs, which
     must be at most 30 %; 2 for bad input; 1 otherwise.
     """

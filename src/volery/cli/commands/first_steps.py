@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from volery.vehicles import Vehicle
     from volery.vehicles.firmware_versions import FirmwareVersion
 
-commands = Commands("First steps")
+commands = Commands()
 
 DEMO_MODEL, STARTER_MODEL = "delivery", "starter"
 
@@ -347,8 +347,18 @@ PARTS: tuple[Part, ...] = (
     _optional("ruamel.yaml", "model", "models and catalogues of processors"),
     _optional("rosbags", "ros", "ROS messages and bags, also without ROS"),
     _optional("jinja2", "report", "HTML reports"),
-    Part("mavsdk", distribution("mavsdk"), "to fly `volery serve` with MAVSDK", "pip install 'mavsdk>=3,<4'"),
-    Part("MAVProxy", distribution("MAVProxy"), "to fly `volery serve` by typing", "pip install MAVProxy"),
+    Part(
+        "mavsdk",
+        distribution("mavsdk"),
+        "to fly `volery vehicle serve` with MAVSDK",
+        "pip install 'mavsdk>=3,<4'",
+    ),
+    Part(
+        "MAVProxy",
+        distribution("MAVProxy"),
+        "to fly `volery vehicle serve` by typing",
+        "pip install MAVProxy",
+    ),
     Part("rospy", module("rospy"), "real ROS 1: the bridge, --graph ros1", "apt install python3-rospy"),
     Part("rclpy", module("rclpy"), "real ROS 2: the bridge, --graph ros2", "source your ROS 2 set-up"),
     Part(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from volery.base.time import Ns
     from volery.requirements.record import RunRecord
 
-commands = Commands("Simulate", group="model")
+commands = Commands("model")
 
 RunFolder = Annotated[
     Path | None,

@@ -1,10 +1,10 @@
-"""``volery model check``: everything that is wrong with a model, for people, programs and editors."""
+"""``volery model check``, ``rules``, ``schema`` and ``observables``: what is right and wrong in a model."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from volery.model.rules import Finding
     from volery.model.system import System
 
-commands = Commands("Simulate", group="model")
+commands = Commands("model", "Check, draw, analyse and convert models.")
 
 FORMATS = ("text", "json", "sarif")
 Format = Annotated[str, typer.Option("--format", metavar="text|json|sarif", help="Format of the findings.")]
@@ -163,3 +163,26 @@ def _readiness(missing: dict[str, tuple[Finding, ...]]) -> Iterable[Text]:
         yield Text(f"· not ready for fidelity {fidelity}:", style="yellow")
         for gap in found:
             yield Text(f"    {gap.where}: {gap}", style="dim")
+
+
+@commands.add()
+def schema(output: Output) -> int:
+    """Print the JSON Schema of models, for an editor that completes and checks YAML."""
+    from volery.model.document import schema as model_schema
+
+    replace(output, json=True).give(model_schema())
+    return OK
+
+
+@commands.add("json")
+def observables(output: Output) -> int:
+    """List the observables that a requirement may bound."""
+    from volery.requirements.observables import NOTED, OBSERVABLES
+
+    listed = make_table("observe", "unit", "meaning")
+    for one in (*OBSERVABLES, NOTED):
+        subject = one.subject if one.subject in ("application", NOTED.subject) else f"<{one.subject}>"
+        listed.add_row(f"{subject}.{one.quantity}", one.unit or "-", one.description)
+    output.show(listed)
+    output.give([asdict(one) for one in (*OBSERVABLES, NOTED)])
+    return OK

@@ -16,7 +16,7 @@ from volery.cli.options import AllowLoss, Model
 if TYPE_CHECKING:
     from volery.exchange.uml.context import Note
 
-commands = Commands("Simulate", group="model")
+commands = Commands("model")
 
 Processors = Annotated[
     list[str] | None,

@@ -1,4 +1,4 @@
-"""``volery model draw`` and ``volery model diff``: a model for the eye, and two of them side by side."""
+"""``volery model draw``, ``show`` and ``diff``: a model for the eye, and two of them side by side."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from volery.cli.options import Allocation, Model, Overrides, Scenario
 if TYPE_CHECKING:
     from volery.model.system import System
 
-commands = Commands("Simulate", group="model")
+commands = Commands("model")
 
 VIEWS = ("functional", "deployment", "verification", "topics")
 FORMATS = ("svg", "mermaid")
@@ -145,4 +145,22 @@ def diff(
             table.add_row(subject, each.kind)
     output.show(table if found else Text("no difference"))
     output.give([asdict(each) for each in found])
+    return OK
+
+
+@commands.add("debug")
+def show(
+    output: Output,
+    model: Model,
+    allocation: Allocation = None,
+    scenario: Scenario = None,
+    overrides: Overrides = None,
+) -> int:
+    """Draw one variant of a model in text: allocation and connections."""
+    from volery.model.diagram import diagram
+    from volery.model.system_loader import load
+    from volery.run.assembly.model_checks import vocabulary
+
+    system = load(model, vocabulary(), scenario, allocation, overrides or ())
+    output.show(Text(diagram(system), end=""))
     return OK

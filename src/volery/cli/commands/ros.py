@@ -1,4 +1,4 @@
-"""Real ROS graphs and recordings: ``volery bridge``, ``graph``, ``export-messages`` and ``bag``."""
+"""Real ROS graphs and recordings: ``volery ros bridge``, ``graph``, ``messages`` and ``bag``."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from volery.ros.messages.bags import Bag, BagConnection
     from volery.trace.events import Event
 
-bag_commands = Commands("ROS", group="bag", summary="Read, play and write rosbag 1, rosbag 2 and MCAP.")
+bag_commands = Commands("ros bag", "Read, play and write rosbag 1, rosbag 2 and MCAP.")
 
 DRAWING_PERIOD: Ns = from_seconds(0.5)
 
@@ -115,7 +115,7 @@ def play(
     _note_defects(output, bag)
     with (
         _progress_bar(output, to_seconds(bag.end - bag.start), f"playing {recording.name}") as show,
-        on_graph(on, "volery bag play") as graph,
+        on_graph(on, "volery ros bag play") as graph,
     ):
         node = graph.node("volery_play", anonymous=True)
         options = PlayOptions(
@@ -153,7 +153,7 @@ def record(
     with (
         create_bag(out) as writer,
         _progress_bar(output, seconds or 0.0, f"recording to {out}") as show,
-        on_graph(on, "volery bag record") as graph,
+        on_graph(on, "volery ros bag record") as graph,
     ):
         node = graph.node("volery_record", anonymous=True)
         recorder = Recorder(graph, node, writer, topics=tuple(topics or ()) or None)
@@ -252,7 +252,7 @@ def _progress_bar(output: Output, total: float, words: str) -> Iterator[Callable
         yield lambda done: progress.update(task, completed=done)
 
 
-commands = Commands("ROS")
+commands = Commands("ros", "Put vehicles and models on real ROS; look at graphs and recordings.")
 
 
 @commands.add("quiet", "debug")
@@ -394,7 +394,7 @@ def _read_graph(source: str, within: float) -> GraphSnapshot:
         return graph_of_run(folder)
     if source not in GRAPHS and folder.exists():
         raise UsageError(f"{folder} is not a run folder")
-    with on_graph(source, "volery graph") as there:
+    with on_graph(source, "volery ros graph") as there:
         return snapshot(there, from_seconds(within))
 
 
@@ -425,7 +425,7 @@ def _folded(heading: str) -> Column:
 
 
 @commands.add("quiet", "debug")
-def export_messages(
+def messages(
     output: Output,
     packages: Annotated[
         list[str], typer.Argument(help="Packages, such as roscopter, mavros_msgs, pprzros_msgs.")

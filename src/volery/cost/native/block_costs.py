@@ -338,5 +338,7 @@ def instrument(sources: Sequence[Path], law: CoreLaw, out: Path, flags: Sequence
     if kept is not None:
         return Instrumented(out, kept, law, functions, program.key)
     names = ", ".join(source.name for source in sources)
-    warning = f"the cost of {names} on {law.name} comes from the code alone; 'volery profile' measures it"
+    warning = (
+        f"the cost of {names} on {law.name} comes from the code alone; 'volery cost profile' measures it"
+    )
     return Instrumented(out, static_costs(program), law, functions, program.key, warning)

@@ -122,7 +122,7 @@ class FirmwareFamily:
     """Those of the newest version."""
     codec: Codec | None = MAVLINK
     default_links: tuple[DefaultLink, ...] = (GROUND_STATION,)
-    """Links that ``volery serve`` opens unless addresses are given."""
+    """Links that ``volery vehicle serve`` opens unless addresses are given."""
     versions: Mapping[str, Mapping[str, Firmware]] = field(default_factory=dict)
     """``kinds`` of each version, the newest last; empty where there is one only."""
 

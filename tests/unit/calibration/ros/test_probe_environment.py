@@ -56,14 +56,16 @@ def test_no_rclpy_in_that_python(tmp_path: Path) -> None:
 
 def test_the_command_ends_with_status_2_and_no_traceback(nothing_installed: None, tmp_path: Path) -> None:
     out = tmp_path / "catalogue.yaml"
-    done = CliRunner().invoke(application(), ["calibrate", "ros", "--client", "roscpp", "--out", str(out)])
+    done = CliRunner().invoke(
+        application(), ["cost", "calibrate", "ros", "--client", "roscpp", "--out", str(out)]
+    )
     assert done.exit_code == 2
     assert "no roscore on this machine" in done.stderr
     assert not list(tmp_path.iterdir())
 
 
 def test_measuring_a_model_without_nodes(tmp_path: Path) -> None:
-    done = CliRunner().invoke(application(), ["validate", str(tmp_path / "nowhere.yaml")])
+    done = CliRunner().invoke(application(), ["cost", "validate", str(tmp_path / "nowhere.yaml")])
     assert done.exit_code == 2
-    done = CliRunner().invoke(application(), ["validate", str(tmp_path), "--runs", "0"])
+    done = CliRunner().invoke(application(), ["cost", "validate", str(tmp_path), "--runs", "0"])
     assert "--runs 0: give at least 1" in done.stderr

@@ -1,4 +1,4 @@
-"""``volery bridge``: what makes no sense is told before anything is opened."""
+"""``volery ros bridge``: what makes no sense is told before anything is opened."""
 
 import pytest
 from typer.testing import CliRunner
@@ -11,7 +11,7 @@ from volery.trace.events import LinkState, Text
 
 
 def said_of(*arguments: str) -> str:
-    done = CliRunner().invoke(application(), ["bridge", *arguments])
+    done = CliRunner().invoke(application(), ["ros", "bridge", *arguments])
     assert done.exit_code == BAD_INPUT
     return " ".join(done.output.split())
 
@@ -27,7 +27,7 @@ def said_of(*arguments: str) -> str:
             "of vehicles that speak pprzlink; this one goes by mavros or roscopter",
         ),
         (("sim:dji", "--names", "pprzros"), "this one goes by mavros or roscopter"),
-        (("sim:dji",), "`volery serve dji --graph ros1`"),
+        (("sim:dji",), "`volery vehicle serve dji --graph ros1`"),
         (("sim:dji",), "for other names give --names mavros or roscopter"),
         (("paparazzi+ros1:///", "--names", "pprzros"), "a ROS node itself, under pprzros's names"),
         (("mavros+ros1:///mavros",), "on a graph already, under mavros's names"),

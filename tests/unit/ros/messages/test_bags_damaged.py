@@ -208,7 +208,10 @@ def test_a_folder_without_metadata_is_read_from_all_of_its_files(
     assert [one.at for one in bag.messages()] == times
     assert "metadata.yaml" in bag.remark
     assert (
-        CliRunner().invoke(application(), ["bag", "convert", str(folder), str(tmp_path / "b")]).exit_code == 0
+        CliRunner()
+        .invoke(application(), ["ros", "bag", "convert", str(folder), str(tmp_path / "b")])
+        .exit_code
+        == 0
     )
 
     for text in ("", "rosbag2_bagfile_information: 7", "\0\0", "a: [" * 2000):

@@ -33,8 +33,10 @@ MARKER, STATE, RANGE = "visualization_msgs/msg/Marker", "mavros_msgs/msg/State",
 
 
 def converted(path: Path, out: Path, *options: str) -> tuple[int, dict[str, Any], str]:
-    """Return exit status, result and notes of ``volery bag convert``."""
-    done = CliRunner().invoke(application(), ["bag", "convert", str(path), str(out), "--json", *options])
+    """Return exit status, result and notes of ``volery ros bag convert``."""
+    done = CliRunner().invoke(
+        application(), ["ros", "bag", "convert", str(path), str(out), "--json", *options]
+    )
     return done.exit_code, json.loads(done.stdout), done.stderr
 
 
@@ -488,7 +490,8 @@ def test_a_topic_that_was_not_recorded_is_bad_input(tmp_path: Path) -> None:
     with create_bag(tmp_path / "a.bag") as writer:
         writer.write("/n", 1, new("std_msgs/String"))
     done = CliRunner().invoke(
-        application(), ["bag", "convert", str(tmp_path / "a.bag"), str(tmp_path / "b"), "--topic", "/m"]
+        application(),
+        ["ros", "bag", "convert", str(tmp_path / "a.bag"), str(tmp_path / "b"), "--topic", "/m"],
     )
     assert (done.exit_code, "has no topic /m" in done.stderr) == (2, True)
 

@@ -1,4 +1,4 @@
-"""``volery teleop`` and ``volery twin``: a vehicle follows an operator, a record or another vehicle."""
+"""``volery control teleop`` and ``twin``: a vehicle follows an operator, a record or another vehicle."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 
 from volery.base.errors import UsageError
 from volery.cli.command import FAILED, Commands
-from volery.cli.commands.go import By, Height
+from volery.cli.commands.control_go import By, Height
 from volery.cli.console import Output, make_table, number_column
 from volery.cli.options import IfKilled, Out, Seed
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from volery.control.teleoperation import Input
     from volery.vehicles import Drone
 
-commands = Commands("Fly")
+commands = Commands("control")
 
 
 @commands.add("quiet", "json", "debug")

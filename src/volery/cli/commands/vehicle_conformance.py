@@ -1,4 +1,4 @@
-"""``volery conformance``: checks of a driver together with its autopilot."""
+"""``volery vehicle conformance``: checks of a driver together with its autopilot."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from volery.testing.checks import Check
     from volery.testing.driver_conformance import Report, Result, Show
 
-commands = Commands("Fly")
+commands = Commands("vehicle")
 
 
 @commands.add("quiet", "json", "debug")

@@ -1,4 +1,4 @@
-"""``volery response``."""
+"""``volery control response``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from volery.cli.main import application
 
 
 def run(*arguments: object) -> Any:
-    return CliRunner().invoke(application(), ["response", *(str(one) for one in arguments)])
+    return CliRunner().invoke(application(), ["control", "response", *(str(one) for one in arguments)])
 
 
 def turn(path: Path, lag: float) -> Path:

@@ -1,4 +1,4 @@
-"""``volery deploy``: ROS packages for the computers of an allocation."""
+"""``volery ros deploy``: ROS packages for the computers of an allocation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from volery.cli.command import OK, Commands
 from volery.cli.console import Output, make_table
 from volery.cli.options import Allocation, Model, Overrides, Scenario
 
-commands = Commands("ROS")
+commands = Commands("ros")
 
 
 @commands.add("quiet", "json", "debug")

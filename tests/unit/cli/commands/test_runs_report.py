@@ -1,4 +1,4 @@
-"""`volery report` on run folders, whole and cut short."""
+"""`volery runs report` and `compare` on run folders, whole and cut short."""
 
 import io
 import json
@@ -10,34 +10,18 @@ from typer.testing import CliRunner
 from volery.cli.main import application
 from volery.report.html_report import recover
 from volery.report.terminal import comparison_table
-from volery.requirements.accounts import Accounts
-from volery.requirements.record import write_record
-from volery.ros.messages.store import definition
-from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
-from volery.trace.attachments import to_json
-from volery.trace.mcap_writer import Attachment, McapWriter
-
-
-def make_run(folder, megahertz=1500.0):
-    """A run folder as a run leaves it."""
-    folder.mkdir()
-    setup = sample_setup(onboard_mhz=megahertz)
-    attached = [Attachment("world.json", "application/json", to_json(sample_scenery()))]
-    writer, accounts = McapWriter(folder / "trace.mcap", setup, attached, definition), Accounts(setup)
-    for event in sample_events(seconds=20.0, onboard_mhz=megahertz):
-        writer(event)
-        accounts(event)
-    writer.close()
-    write_record(accounts.record("completed"), folder)
-    return folder
 
 
 def report(*arguments):
-    return CliRunner().invoke(application(), ["report", *map(str, arguments)])
+    return CliRunner().invoke(application(), ["runs", "report", *map(str, arguments)])
+
+
+def compare(*arguments):
+    return CliRunner().invoke(application(), ["runs", "compare", *map(str, arguments)])
 
 
 @pytest.fixture
-def folder(tmp_path):
+def folder(make_run, tmp_path):
     return make_run(tmp_path / "fast")
 
 
@@ -49,21 +33,27 @@ def test_it_writes_the_document_and_shows_the_tables(folder):
     assert "report.html" in result.stderr
 
 
-def test_several_are_compared(folder, tmp_path):
+def test_several_are_compared(folder, tmp_path, make_run):
     slow = make_run(tmp_path / "slow", 600.0)
-    result = report(folder, slow)
+    result = compare(folder, slow)
     assert result.exit_code == 0, result.output
     assert "fast" in result.stdout
     assert "slow" in result.stdout
 
 
-def test_the_comparison_is_written_as_a_page(folder, tmp_path, monkeypatch):
+def test_the_comparison_is_written_as_a_page(folder, tmp_path, monkeypatch, make_run):
     monkeypatch.chdir(tmp_path)
     make_run(tmp_path / "slow", 600.0)
-    result = report("fast", "slow")
+    result = compare("fast", "slow")
     assert "side by side: comparison.html" in result.stderr
     page = (tmp_path / "comparison.html").read_text()
     assert "fast/report.html" in page
+
+
+def test_one_run_is_not_compared(folder):
+    result = compare(folder)
+    assert result.exit_code == 2
+    assert "give a second run" in result.output
 
 
 def test_one_report_writes_no_comparison(folder, tmp_path):
@@ -71,7 +61,7 @@ def test_one_report_writes_no_comparison(folder, tmp_path):
     assert not (tmp_path / "comparison.html").exists()
 
 
-def test_the_comparison_fits_80_columns_with_whole_words(folder, tmp_path):
+def test_the_comparison_fits_80_columns_with_whole_words(folder, tmp_path, make_run):
     records = [recover(one).record for one in (folder, make_run(tmp_path / "slow", 600.0))]
     console = Console(file=io.StringIO(), width=80)
     console.print(comparison_table(records, ["fast", "slow"]))
@@ -81,10 +71,10 @@ def test_the_comparison_fits_80_columns_with_whole_words(folder, tmp_path):
         assert word in said
 
 
-def test_json_is_the_record_and_nothing_else(folder, tmp_path):
+def test_json_is_the_record_and_nothing_else(folder, tmp_path, make_run):
     assert json.loads(report(folder, "--json").stdout)["system"] == "hospital-delivery"
     slow = make_run(tmp_path / "slow", 600.0)
-    both = json.loads(report(folder, slow, "--json").stdout)
+    both = json.loads(compare(folder, slow, "--json").stdout)
     assert [one["allocation"] for one in both] == ["fast", "slow"]
 
 

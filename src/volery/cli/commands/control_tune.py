@@ -1,4 +1,4 @@
-"""``volery tune``: gains of a control loop from a relay experiment."""
+"""``volery control tune``: gains of a control loop from a relay experiment."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import typer
 
 from volery.base.files import write_text
 from volery.cli.command import OK, Commands
-from volery.cli.commands.go import By, On, SwitchOptions
+from volery.cli.commands.control_go import By, On, SwitchOptions
 from volery.cli.console import Output, make_table, number_column
 from volery.cli.options import Out, Seed
 
-commands = Commands("Fly")
+commands = Commands("control", "Fly by control laws of this program or by hand; tune loops, judge responses.")
 
 
 @commands.add("quiet", "json", "debug")
@@ -24,7 +24,10 @@ def tune(
     on: On,
     switch: SwitchOptions,
     gains: Annotated[
-        Path, typer.Option(metavar="FILE", help="TOML file to write the gains into, for `volery go --gains`.")
+        Path,
+        typer.Option(
+            metavar="FILE", help="TOML file to write the gains into, for `volery control go --gains`."
+        ),
     ] = Path("gains.toml"),
     by: By = "attitude",
     seed: Seed = 1,
@@ -66,7 +69,7 @@ def tune(
             *flown,
         )
     output.show(table)
-    write_text(gains, as_toml(found.loop.name, found.best, f"volery tune {loop} on {on}"))
+    write_text(gains, as_toml(found.loop.name, found.best, f"volery control tune {loop} on {on}"))
     output.give(
         {
             "process": {
@@ -81,5 +84,5 @@ def tune(
             },
         }
     )
-    output.note(f"gains: {gains}; volery go {loop} --gains {gains} flies with them")
+    output.note(f"gains: {gains}; volery control go {loop} --gains {gains} flies with them")
     return OK

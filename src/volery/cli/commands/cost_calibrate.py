@@ -1,4 +1,4 @@
-"""``volery calibrate``: measurements of this machine as entries of a catalogue."""
+"""``volery cost calibrate``: measurements of this machine as entries of a catalogue."""
 
 from __future__ import annotations
 
@@ -22,9 +22,7 @@ if TYPE_CHECKING:
     from volery.calibration.ros.call_costs import CallCost
     from volery.cost import CoreLaw, OperationTable
 
-commands = Commands(
-    "Cost of computing", group="calibrate", summary="Measure the cost of computing on this machine."
-)
+commands = Commands("cost calibrate", "Measure the cost of computing on this machine.")
 
 MAX_LOOSE_SHOWN = 5
 """Number of uncertain figures that are named."""
@@ -238,7 +236,7 @@ def _calibration_sentences(found: Calibration) -> tuple[str, str, str]:
 
 
 def _write_reference(file: Path, table: OperationTable) -> None:
-    head = "Cost of CPython's operations in nanoseconds: by `volery calibrate python --reference`."
+    head = "Cost of CPython's operations in nanoseconds: by `volery cost calibrate python --reference`."
     _write_yaml(file, table.model_dump(exclude_defaults=True), head)
 
 

@@ -1,4 +1,4 @@
-"""``volery go``: wrong options are named before anything starts."""
+"""``volery control go``: wrong options are named before anything starts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ON = ("--on", "sim:ardupilot")
     ],
 )
 def test_wrong_options_are_named(arguments: tuple[str, ...], said: str) -> None:
-    result = CliRunner().invoke(application(), ["go", *arguments])
+    result = CliRunner().invoke(application(), ["control", "go", *arguments])
     assert result.exit_code == 2
     assert said in result.stderr
     assert "Traceback" not in result.stderr

@@ -1,4 +1,4 @@
-"""``volery go``: flights under control laws of this program, with the operator's safety switch on top."""
+"""``volery control go``: flights under laws of this program, with the operator's safety switch on top."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from volery.run.go import GoSettings
     from volery.trace.events import Event
 
-commands = Commands("Fly", group="go", summary="Fly under a control law on this side of the link.")
+commands = Commands("control go", "Fly under a control law on this side of the link.")
 
 On = Annotated[str, typer.Option(metavar="URL", help="Address of the vehicle, such as sim:ardupilot.")]
 By = Annotated[
@@ -277,5 +277,5 @@ def _go(
         run = go(make, options.on, settings, how, listener=note_sample)
     status = show_outcome(output, run)
     if flown:
-        output.note(f"volery response {run.folder} judges its loops")
+        output.note(f"volery control response {run.folder} judges its loops")
     return status

@@ -1,4 +1,4 @@
-"""``volery response``: step responses in the records of flights."""
+"""``volery control response``: step responses in the records of flights."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from volery.control.step_response import Judgement, Signal, StepResponse
 
-commands = Commands("Fly")
+commands = Commands("control")
 
 NOTHING = "–"
 

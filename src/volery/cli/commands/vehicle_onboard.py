@@ -1,4 +1,4 @@
-"""``volery params``, ``mission``, ``logs`` and ``files``: what an autopilot keeps on board.
+"""``volery vehicle params``, ``mission``, ``logs`` and ``files``: what an autopilot keeps on board.
 
 None of these commands moves a vehicle, and one that flies goes on flying.
 """
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from volery.vehicles import Vehicle
     from volery.vehicles.parameters import Difference, Parameters
 
-parameters = Commands("Fly", group="params", summary="Read and write the parameters of an autopilot.")
-missions = Commands("Fly", group="mission", summary="Upload and download missions, geofences, rally points.")
-commands = Commands("Fly")
+parameters = Commands("vehicle params", "Read and write the parameters of an autopilot.")
+missions = Commands("vehicle mission", "Upload and download missions, geofences, rally points.")
+commands = Commands("vehicle", "Read and set what an autopilot keeps, serve a simulated one, check a driver.")
 
 Url = Annotated[str, typer.Argument(metavar="URL", help="Address, such as px4+udp://:14550 or sim:px4.")]
 Kind = Annotated[str, typer.Option(help="drone or rover.")]
