@@ -84,8 +84,10 @@ def observables() -> str:
         lines.append(f"| `{one.quantity}` | {one.unit} | {one.description} |")
     lines += [
         "\n## Of your own\n",
-        f"`{NOTED.subject}.{NOTED.quantity}` counts {NOTED.description}.",
-        "Kind, subject and state are words of your own; a component states them while it runs:\n",
+        "| observable | unit | what it is |",
+        "|---|---|---|",
+        *(f"| `{one.subject}.{one.quantity}` | {one.unit} | {one.description} |" for one in NOTED),
+        "\nKind, subject and state are words of your own; a component states them while it runs:\n",
         "```python",
         'volery.note("point", "north-east corner", "inspected")',
         "```\n",
@@ -93,8 +95,18 @@ def observables() -> str:
         "```yaml",
         "requirements:",
         "  all_inspected: {observe: note.point.inspected, min: 4}",
+        "  in_time: {observe: note.point.inspected.time_max, max: 5 min}",
         "```\n",
-        "A state that was never noted counts 0, also one that is misspelt.",
+        "A state that was never noted counts 0, also one that is misspelt; its times are unknown, so no",
+        "bound on them is met. The report has a table of each kind, its counts and its marks on the map.\n",
+        "\n## Of other packages\n",
+        "A package adds quantities and a table for the report by a class in its entry points",
+        "`volery.observables`; `examples/separation` measures how near drones come to each other:\n",
+        "```yaml",
+        "requirements:",
+        "  apart: {observe: drone_1.separation_min, min: 5 m}",
+        "```\n",
+        "`volery model observables` lists what the installed packages add; their values are in `run.json`.",
     ]
     return "\n".join(lines) + "\n"
 

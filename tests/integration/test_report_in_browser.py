@@ -141,7 +141,7 @@ def test_the_slider_moves_the_vehicles_and_tells_the_time(open_page: Any, folder
     assert page.locator("#clock").inner_text() == "0:01:40.0"
     assert "30.0 m" in card.inner_text()
     assert "12.0 m/s" in card.inner_text()
-    assert "on drone_1" in page.locator("#parcels").inner_text()
+    assert "on drone_1" in page.locator("#noted").inner_text()
     assert picture(page, "#map") != before
     page.locator("#time").press("ArrowRight")
     assert page.evaluate("stage.now") > 100

@@ -174,10 +174,10 @@ def _unreachable(system: System, bound: Bound) -> str:
 def _unreachable_minimum(system: System, bound: Bound, quantity: str) -> str:
     orders = system.environment.workload
     most = orders.count if orders.rate_hz or orders.count else 0
-    parcels = bound.observe in ("application.delivered", "application.ordered")
+    of_orders = bound.observe in ("application.delivered", "application.ordered")
     if bound.bound <= 0.0:
         return f"{bound.observe} is never less than zero: every run meets it"
-    if parcels and most is not None and bound.bound > most:
+    if of_orders and most is not None and bound.bound > most:
         return f"{bound.bound:g} are required, and {most} are ordered"
     if quantity in _SHARES and bound.bound > 1.0:
         return f"{bound.bound:g} is required of a share, which is at most 1"

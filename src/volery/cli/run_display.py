@@ -20,6 +20,7 @@ from volery.base.errors import UsageError, choices
 from volery.base.time import clock, to_seconds
 from volery.cli.command import BAD_INPUT, BAD_INPUT_ERRORS, FAILED, OK
 from volery.cli.console import Output
+from volery.report.grids import by_state, plural
 from volery.report.terminal import summary_table
 from volery.requirements.record import RunRecord
 from volery.run.event_log import LogOptions, parse_level
@@ -88,8 +89,13 @@ class LineProgress:
         self._last[title] = now
         of = f" of at most {clock(progress.limit)[:-4]}" if progress.limit else ""
         pace = to_seconds(progress.now) / (now - self._start)
-        parcels = "".join(f", {count} {state}" for state, count in progress.parcels.items())
-        self._output.note(f"{title}: {clock(progress.now)[:-4]}{of}, {pace:,.1f}× real time{parcels}")
+        noted = "".join(f", {words}" for words in _noted(progress))
+        self._output.note(f"{title}: {clock(progress.now)[:-4]}{of}, {pace:,.1f}× real time{noted}")
+
+
+def _noted(progress: Progress) -> list[str]:
+    """Return how many subjects of notes are in each state: ``parcels: 2 delivered``."""
+    return [f"{plural(kind)}: {by_state(states)}" for kind, states in progress.notes.items()]
 
 
 def draw_progress(title: str, progress: Progress, wall_s: float) -> RenderableType:
@@ -99,8 +105,8 @@ def draw_progress(title: str, progress: Progress, wall_s: float) -> RenderableTy
     line.append(clock(progress.now)[:-4], style="cyan")
     if wall_s > 0.0:
         line.append(f"  {simulated / wall_s:,.0f}× real time", style="dim")
-    parcels = ", ".join(f"{count} {state}" for state, count in progress.parcels.items())
-    line.append(f"  {parcels}" if parcels else "")
+    noted = ", ".join(_noted(progress))
+    line.append(f"  {noted}" if noted else "")
     vehicles = Table.grid(padding=(0, 2))
     for one in progress.vehicles:
         height = f"{one.height:.1f} m" if one.armed else "on the ground"

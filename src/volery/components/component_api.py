@@ -96,7 +96,8 @@ def add_time(seconds: float, at_mhz: float | None = None, energy: float = 0.0) -
 def note(kind: str, subject: str, state: str, detail: str = "") -> None:
     """Record that something which the application follows has entered a state.
 
-    For example ``note("parcel", "p-1", "ordered")``.
+    For example ``note("point", "north-east corner", "inspected")``. The report has a table of each kind
+    with its subjects and their states; requirements bound ``note.<kind>.<state>``.
 
     Args:
         kind: Kind of thing.

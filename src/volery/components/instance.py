@@ -273,7 +273,7 @@ def exit_status(end: SystemExit) -> int:
 def describe(error: BaseException) -> str:
     """Return what was raised, and the line of the component's code that did it or made the call.
 
-    For example ``ValueError: no such parcel (delivery_central.py:41)``. A call that the callee does not take
+    For example ``ValueError: no such order (delivery_central.py:41)``. A call that the callee does not take
     is raised by the framework on behalf of its caller: then it is the caller's line.
     """
     if isinstance(error, ForeignError):

@@ -23,6 +23,22 @@ T = TypeVar("T")
 NOTE_PREFIX = "note"
 """First word of the observables ``note.<kind>.<state>`` that an application makes with ``volery.note()``."""
 
+NOTE_TIMES = ("time_max", "time_mean")
+"""Quantities of ``note.<kind>.<state>.<quantity>``: seconds from a subject's first state to this one."""
+
+
+def split_note(text: str) -> tuple[str, str, str] | None:
+    """Return kind, state and quantity of an observable of notes, None if it is none or lacks a word.
+
+    The quantity is one of ``NOTE_TIMES``, or empty for the number of subjects. A state may contain points.
+    """
+    prefix, _, words = text.partition(".")
+    kind, _, state = words.partition(".")
+    stem, _, last = state.rpartition(".")
+    quantity = last if stem and last in NOTE_TIMES else ""
+    state = stem if quantity else state
+    return (kind, state, quantity) if prefix == NOTE_PREFIX and kind and state else None
+
 
 @dataclass(frozen=True, slots=True)
 class Observable:

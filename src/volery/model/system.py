@@ -44,7 +44,7 @@ from volery.model.fields import (
     WrongValueError,
 )
 from volery.model.instances import Instance, component_of
-from volery.model.reading import NOTE_PREFIX, Observable, Provenance, Reading
+from volery.model.reading import NOTE_PREFIX, NOTE_TIMES, Observable, Provenance, Reading, split_note
 from volery.model.resources import (
     CACHES,
     POWER_STATES,
@@ -317,10 +317,12 @@ def _is_operation(reading: Reading, path: Path, instance: str, operation: str) -
 
 
 def _noted(reading: Reading, path: Path, text: str) -> Observable | None:
-    """Return the count of what ``volery.note()`` puts into a state; the words are the application's."""
-    _, kind, state = (*text.split(".", 2), "", "")[:3]
-    if kind and state:
-        return Observable(NOTE_PREFIX, text, "", "number of noted things")
+    """Return what is observed of the notes of one state; the words are the application's."""
+    words = split_note(text)
+    if words is not None:
+        return Observable(
+            NOTE_PREFIX, text, "s" if words[2] in NOTE_TIMES else "", "subjects, or their times"
+        )
     what = f"{text!r}: write {NOTE_PREFIX}.<kind>.<state>, as in volery.note(kind, subject, state)"
     reading.problems.add(path, what, rule=rules.UNKNOWN_OBSERVABLE)
     return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
 from volery.report.grids import (
@@ -12,11 +11,14 @@ from volery.report.grids import (
     Grid,
     bound,
     brief,
+    by_state,
     count,
     energy,
     figure,
+    last_states,
     milliseconds,
     number,
+    plural,
     total,
     verdict,
     widest_band,
@@ -39,7 +41,10 @@ def outcome_comparison(labels: Sequence[str], records: Sequence[RunRecord]) -> G
         ("seed", [Cell(str(record.seed)) for record in records]),
         ("simulated s", [Cell(number(record.sim_s, 1)) for record in records]),
         ("faster than real time", [Cell(number(record.real_time_factor, 0, "×")) for record in records]),
-        ("parcels", [Cell(_parcels(record)) for record in records]),
+        *(
+            (plural(kind), [Cell(_noted(record, kind)) for record in records])
+            for kind in _names(record.notes for record in records)
+        ),
         ("energy of computers", [Cell(_of_computers(record)) for record in records]),
         ("energy of vehicles", [Cell(energy(total(_vehicles(record)))) for record in records]),
     ]
@@ -64,9 +69,8 @@ def _met(record: RunRecord) -> Cell:
     )
 
 
-def _parcels(record: RunRecord) -> str:
-    states = Counter(parcel.state for parcel in record.parcels.values())
-    return ", ".join(f"{amount} {state}" for state, amount in states.most_common()) or NOTHING
+def _noted(record: RunRecord, kind: str) -> str:
+    return by_state(dict(last_states(record.notes.get(kind, {})).most_common())) or NOTHING
 
 
 def _computers(record: RunRecord) -> list[float | None]:

@@ -1,4 +1,4 @@
-"""The drawn content of a report, folded from the events of a run: tracks, curves, load, parcels, remarks.
+"""The drawn content of a report, folded from the events of a run: tracks, curves, load, notes, remarks.
 
 ``Digest`` is a tap of the event stream. Its result is plain lists and numbers that become JSON within the
 document. Tracks and curves are thinned, so the report of a long run stays small. A track keeps the points
@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.base.time import MS, Ns, S, to_seconds
-from volery.requirements.accounts import PARCEL
+from volery.report.grids import heading
+from volery.requirements.record import DELIVERY_KIND
 from volery.trace.attachments import RunSetup, Scenery
 from volery.trace.events import (
     NONE,
@@ -98,6 +99,8 @@ _MOST_BINS = 300
 _TRACK_TOLERANCE_M = 0.15
 _CURVE_STRETCHES = 350
 _MOST_REMARKS = 400
+_MOST_SUBJECTS = 60  # of a kind of notes
+_MOST_STEPS = 200  # of a subject, after its first one
 _WARNING = 4  # syslog's severity of a warning
 
 Json = dict[str, Any]
@@ -142,7 +145,7 @@ class Digest:
         self._load: dict[str, dict[str, list[Ns]]] = {one.name: {} for one in setup.processors}
         self._misses: dict[str, list[int]] = {}
         self._processor_of = {one.name: one.processor for one in setup.components}
-        self._parcels: dict[str, list[Milestone]] = {}
+        self._noted: dict[str, dict[str, list[Milestone]]] = {}
         self._remarks: list[Json] = []
         self._collisions: list[Json] = []
         self._left_out = 0
@@ -192,8 +195,7 @@ class Digest:
 
     def _milestone(self, event: Milestone) -> None:
         self._last = max(self._last, event.at)
-        if event.kind == PARCEL:
-            self._parcels.setdefault(event.subject, []).append(event)
+        self._noted.setdefault(event.kind, {}).setdefault(event.subject, []).append(event)
 
     def _message(self, event: Message) -> None:
         counts = self._lost.setdefault(event.topic, [0, 0])
@@ -206,7 +208,7 @@ class Digest:
                 self._subscriptions.setdefault(event.subscriber.strip("/"), set()).add(vehicle)
 
     def _names_of_vehicles(self) -> dict[str, str]:
-        """Return {name in a parcel's state: vehicle}: its own name, or a node that subscribes to it alone."""
+        """Return {name in a note: vehicle}: its own name, or a node that subscribes to it alone."""
         alone = {name: next(iter(found)) for name, found in self._subscriptions.items() if len(found) == 1}
         return alone | {name: name for name in self._tracks}
 
@@ -249,13 +251,26 @@ class Digest:
             "scenery": _scenery(self._scenery),
             "vehicles": [_vehicle(name, track) for name, track in self._tracks.items()],
             "processors": [self._processor(name) for name in self._load],
-            "parcels": [{"name": name, "steps": self._steps(steps)} for name, steps in self._parcels.items()],
+            "notes": [self._notes(kind, subjects) for kind, subjects in self._noted.items()],
             "collisions": self._collisions,
             "remarks": sorted(self._remarks, key=lambda remark: float(remark["t"])),
             "left_out": self._left_out,
             "messages": [
                 {"topic": topic, "sent": sent, "lost": lost}
                 for topic, (sent, lost) in sorted(self._lost.items())
+            ],
+        }
+
+    def _notes(self, kind: str, subjects: dict[str, list[Milestone]]) -> Json:
+        """Return what is drawn of a kind of notes: the first subjects, of each its first and last states."""
+        drawn = list(subjects.items())[:_MOST_SUBJECTS]
+        return {
+            "kind": kind,
+            "title": heading(kind),
+            "left_out": len(subjects) - len(drawn),
+            "subjects": [
+                {"name": name, "steps": self._steps(steps[:1] + steps[1:][-_MOST_STEPS:])}
+                for name, steps in drawn
             ],
         }
 
@@ -270,6 +285,7 @@ class Digest:
                 "detail": step.detail,
                 "vehicle": _mentioned(step, vehicles),
                 "place": _place(step, places, first=step is steps[0]),
+                "from": vehicles.get(step.component, ""),
             }
             for step in steps
         ]
@@ -310,17 +326,20 @@ def _mentioned(step: Milestone, names: dict[str, str]) -> str:
 
 
 def _place(step: Milestone, kinds: dict[str, str], first: bool) -> str:
-    """Return the place that the state names or that the detail is; an ordered parcel is in the store.
+    """Return where the subject is: the place that it is, that the state names or that the detail is.
 
-    A place within a longer detail may be the destination, so it does not count.
+    A place within a longer detail may be the destination, so it does not count. What is
+    to be delivered is in the store at first.
     """
+    if step.subject in kinds:
+        return step.subject
     said = [name for name in kinds if name in step.state]
     if said:
         return max(said, key=len)
     if step.detail in kinds:
         return step.detail
     stores = [name for name, kind in kinds.items() if kind == "store"]
-    return stores[0] if first and len(stores) == 1 else ""
+    return stores[0] if first and step.kind == DELIVERY_KIND and len(stores) == 1 else ""
 
 
 def _seconds(at: Ns) -> float:

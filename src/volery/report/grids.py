@@ -6,7 +6,8 @@ text and never instead of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, log10
 from typing import Literal
@@ -14,8 +15,8 @@ from typing import Literal
 from volery.base.time import clock, from_seconds
 from volery.requirements.record import (
     ComponentRecord,
+    NoteRecord,
     OffsetRecord,
-    ParcelRecord,
     RequirementRecord,
     RunRecord,
     VehicleRecord,
@@ -23,6 +24,7 @@ from volery.requirements.record import (
 
 CellStatus = Literal["", "good", "bad", "warn", "quiet"]
 NOTHING = "–"
+_MOST_STATES = 12  # of one subject in a line
 
 
 @dataclass(frozen=True)
@@ -375,21 +377,81 @@ def operations_grid(record: RunRecord) -> Grid:
     return Grid("Vehicle operations", columns, rows)
 
 
-def parcels_grid(record: RunRecord) -> Grid:
-    """Return the parcels and their last state."""
-    rows = tuple(
-        (Cell(name), Cell(one.state), Cell(moment(one.history[-1].at_s)), Cell(_story(one), status="quiet"))
-        for name, one in record.parcels.items()
+def plural(kind: str) -> str:
+    """Return the name of several things of a kind of notes; a kind that ends in s is taken for one."""
+    if kind.endswith(("ch", "sh", "x", "z", "ss")):
+        return f"{kind}es"
+    if kind.endswith("y") and kind[-2:-1] not in tuple("aeiou"):
+        return f"{kind[:-1]}ies"
+    return kind if kind.endswith("s") else f"{kind}s"
+
+
+def heading(kind: str) -> str:
+    """Return the heading of what is said of a kind of notes."""
+    words = plural(kind)
+    return words[:1].upper() + words[1:]
+
+
+def by_state(counts: Mapping[str, int]) -> str:
+    """Format the numbers of subjects in each state: ``2 delivered, 1 failed``."""
+    return ", ".join(f"{amount} {state}" for state, amount in counts.items())
+
+
+def last_states(subjects: Mapping[str, NoteRecord]) -> Counter[str]:
+    """Return the number of subjects in each state at the end."""
+    return Counter(one.state for one in subjects.values())
+
+
+def note_grids(record: RunRecord) -> list[Grid]:
+    """Return a table for each kind of notes: the subjects, their last state, and how they came to it."""
+    columns = (
+        Column("subject"),
+        Column("state"),
+        Column("since"),
+        Column("after s", True, "from its first state to this one"),
+        Column("history", essential=False),
     )
-    return Grid(
-        "Parcels",
-        (Column("parcel"), Column("state"), Column("since"), Column("history", essential=False)),
-        rows,
+    return [
+        Grid(heading(kind), columns, tuple(_noted(name, one) for name, one in subjects.items()))
+        for kind, subjects in record.notes.items()
+    ]
+
+
+def _noted(name: str, one: NoteRecord) -> tuple[Cell, ...]:
+    first, last = one.history[0].at_s, one.history[-1].at_s
+    story = [step.state for step in one.history]
+    left_out = len(story) - 1 - _MOST_STATES
+    if left_out > 0:
+        story[1:-_MOST_STATES] = [f"({left_out} more)"]
+    return (
+        Cell(name),
+        Cell(one.state),
+        Cell(moment(last)),
+        Cell(number(last - first)),
+        Cell(" → ".join(story), status="quiet"),
     )
 
 
-def _story(parcel: ParcelRecord) -> str:
-    return " → ".join(step.state for step in parcel.history)
+def added_grids(record: RunRecord) -> list[Grid]:
+    """Return the tables of other packages, and a table of values for those that have none."""
+    tables = []
+    for name, one in record.added.items():
+        if one.table is not None:
+            table = one.table
+            numeric = [
+                all(isinstance(row[index], float | None) for row in table.rows)
+                for index in range(len(table.columns))
+            ]
+            columns = tuple(Column(title, right) for title, right in zip(table.columns, numeric, strict=True))
+            rows = tuple(
+                tuple(Cell(cell if isinstance(cell, str) else figure(cell)) for cell in row)
+                for row in table.rows
+            )
+            tables.append(Grid(table.title, columns, rows))
+        elif one.values:
+            rows = tuple((Cell(what), Cell(figure(value))) for what, value in one.values.items())
+            tables.append(Grid(name, (Column("observable"), Column("observed", True)), rows))
+    return [table for table in tables if table]
 
 
 def laws_grid(record: RunRecord) -> Grid:
@@ -418,7 +480,8 @@ def all_grids(record: RunRecord) -> list[Grid]:
         chains_grid(record),
         processors_grid(record),
         vehicles_grid(record),
-        parcels_grid(record),
+        *note_grids(record),
+        *added_grids(record),
     )
     return [grid for grid in made if grid]
 

@@ -29,14 +29,18 @@ from volery.report.grids import (
     CellStatus,
     Column,
     Grid,
+    added_grids,
+    by_state,
     chains_grid,
     cost_grid,
     energy,
     labels,
+    last_states,
     laws_grid,
     moment,
     number,
     operations_grid,
+    plural,
     preemptions_grid,
     processors_grid,
     requirements_grid,
@@ -46,8 +50,8 @@ from volery.report.grids import (
     widest_band,
 )
 from volery.report.terminal import comparison_table
-from volery.requirements.accounts import DELIVERED, Accounts
-from volery.requirements.record import RUN_FILE, ParcelRecord, RunRecord, Status, read_record, write_record
+from volery.requirements.accounts import Accounts
+from volery.requirements.record import RUN_FILE, RunRecord, Status, read_record, write_record
 from volery.trace.attachments import WORLD_ATTACHMENT, RunSetup, scenery_from_json
 from volery.trace.events import Event, Record, Verdict
 from volery.trace.mcap_writer import OUTCOME, TRACE_FILE, Attachment
@@ -62,6 +66,7 @@ except ModuleNotFoundError:
     raise
 
 REPORT_FILE = "report.html"
+_MOST_OTHERS = 3  # states in a figure of the headline beside the most frequent one
 
 
 @dataclass(frozen=True)
@@ -195,7 +200,6 @@ def _content_hash(script: str) -> str:
 def render(material: ReportContent) -> str:
     """Return the HTML of a report."""
     record, data = material.record, material.data
-    states = _states(record)
     return (
         environment()
         .get_template("report.html.j2")
@@ -216,8 +220,8 @@ def render(material: ReportContent) -> str:
             processors=processors_grid(record),
             vehicles=vehicles_grid(record),
             operations=operations_grid(record),
-            parcels=[_lane(name, parcel, states, record.sim_s) for name, parcel in record.parcels.items()],
-            states=[{"name": name, "colour": colour} for name, colour in states.items()],
+            notes=[_lanes(kind, record.sim_s) for kind in data["notes"]],
+            added=added_grids(record),
             ticks=_ticks(record.sim_s),
             not_counted=record.not_counted,
             warnings=record.warnings,
@@ -259,9 +263,10 @@ def _facts(record: RunRecord) -> list[Fact]:
     if record.wall_s is not None and not record.is_real:
         speed = number(record.real_time_factor, 0, "× real time")
         facts.append(Fact("it took", number(record.wall_s, 1, "s"), speed))
-    if record.parcels:
-        states = [parcel.state for parcel in record.parcels.values()]
-        facts.append(Fact("parcels delivered", f"{states.count(DELIVERED)} of {len(states)}"))
+    for kind, subjects in record.notes.items():
+        (state, most), *others = last_states(subjects).most_common()
+        value, rest = f"{most} of {len(subjects)}", by_state(dict(others[:_MOST_OTHERS]))
+        facts.append(Fact(f"{plural(kind)} {state}", value, rest))
     if record.vehicles:
         flown = sum(one.distance_m for one in record.vehicles.values())
         facts.append(
@@ -290,41 +295,42 @@ def _troubles(record: RunRecord, lost: str) -> list[str]:
     return [*said, f"the trace: {lost}"] if lost else said
 
 
-def _states(record: RunRecord) -> dict[str, int]:
-    """Return a colour number for each state of parcels, in order of first occurrence."""
-    names = dict.fromkeys(step.state for parcel in record.parcels.values() for step in parcel.history)
-    return {name: index % 8 + 1 for index, name in enumerate(names)}
+def _lanes(kind: Json, end: float) -> Json:
+    """Return the notes of one kind: each state's colour, each subject as spans of a row that is 100 wide."""
+    names = dict.fromkeys(step["state"] for subject in kind["subjects"] for step in subject["steps"])
+    colours = {name: index % 8 + 1 for index, name in enumerate(names)}
+    return {
+        **kind,
+        "states": [{"name": name, "colour": colour} for name, colour in colours.items()],
+        "lanes": [_lane(one["name"], one["steps"], colours, end) for one in kind["subjects"]],
+    }
 
 
-def _lane(name: str, parcel: ParcelRecord, states: dict[str, int], end: float) -> dict[str, Any]:
-    """Return one parcel as spans of a row that is 100 wide."""
-    steps = parcel.history
-    ends = [*(step.at_s for step in steps[1:]), max(end, steps[-1].at_s)]
+def _lane(name: str, steps: list[Json], colours: Mapping[str, int], end: float) -> Json:
+    ends = [*(step["t"] for step in steps[1:]), max(end, steps[-1]["t"])]
     whole = max(end, 1e-9)
     spans = [
         {
-            "left": 100.0 * step.at_s / whole,
-            "width": 100.0 * (until - step.at_s) / whole,
-            "colour": states[step.state],
-            "state": step.state,
-            "title": f"{step.state} until {moment(until)} by {step.component}  {step.detail}".strip(),
+            "left": 100.0 * step["t"] / whole,
+            "width": 100.0 * (until - step["t"]) / whole,
+            "colour": colours[step["state"]],
+            "state": step["state"],
+            "title": f"{step['state']} until {moment(until)} by {step['by']}  {step['detail']}".strip(),
         }
         for step, until in zip(steps, ends, strict=True)
     ]
-    history = Grid(
-        name,
-        (Column("at"), Column("state"), Column("by"), Column("detail")),
-        tuple(
-            (
-                Cell(moment(step.at_s)),
-                Cell(step.state),
-                Cell(step.component),
-                Cell(step.detail, status="quiet"),
-            )
-            for step in steps
-        ),
+    columns = (Column("at"), Column("state"), Column("where"), Column("by"), Column("detail"))
+    rows = tuple(
+        (
+            Cell(moment(step["t"])),
+            Cell(step["state"]),
+            Cell(step["vehicle"] or step["place"]),
+            Cell(step["by"]),
+            Cell(step["detail"], status="quiet"),
+        )
+        for step in steps
     )
-    return {"name": name, "state": parcel.state, "spans": spans, "history": history}
+    return {"name": name, "state": steps[-1]["state"], "spans": spans, "history": Grid(name, columns, rows)}
 
 
 def _ticks(end: float) -> list[dict[str, Any]]:

@@ -1,16 +1,18 @@
 """The accounts of a run: one fold over its events, the same during the run and from a trace read back.
 
 Memory does not grow with time, only with the number of parts of the run and of what the application tracks
-(parcels, vehicle operations, failures). Nothing is priced here: the energy law of processors is an argument.
+(subjects of notes, vehicle operations, failures). Nothing is priced here: the energy law of processors is an
+argument.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
 from volery.base.time import Ns, to_seconds
+from volery.requirements.added_observables import AddedInRun, load_added
 from volery.requirements.ledgers import (
     ChainLedger,
     ComponentLedger,
@@ -24,8 +26,8 @@ from volery.requirements.record import (
     ComponentRecord,
     FailureRecord,
     LawRecord,
+    NoteRecord,
     OutcomeRecord,
-    ParcelRecord,
     PreemptionRecord,
     ProcessorRecord,
     RequirementRecord,
@@ -56,11 +58,6 @@ from volery.trace.events import (
     Verdict,
 )
 
-PARCEL = "parcel"
-"""Kind of the milestones of a parcel."""
-ORDERED, DELIVERED, FAILED = "ordered", "delivered", "failed"
-"""States of a parcel that observables are defined by. An application may have others in between."""
-"""The kind of milestones of parcels."""
 FRAMEWORK = "volery"
 """The source of texts of the framework: its warnings become warnings of the record."""
 WARNING = 4
@@ -95,7 +92,8 @@ class Accounts:
         self._processors = {one.name: one for one in setup.processors}
         self._busy: dict[str, Ns] = dict.fromkeys(self._processors, 0)
         self._vehicles = {one.name: VehicleLedger(one) for one in setup.vehicles}
-        self._parcels: dict[str, list[Milestone]] = {}
+        self._notes: dict[str, dict[str, list[Milestone]]] = {}
+        self._added = tuple(AddedInRun(name, made, setup) for name, made in load_added().items())
         self._verdicts: dict[str, Verdict] = {}
         self._chains = {one.name: ChainLedger(one) for one in setup.chains}
         self._demands = Demands()
@@ -103,6 +101,7 @@ class Accounts:
         self._failures: list[Failure] = []
         self._unserved: list[UnservedRecord] = []
         self._warnings = dict.fromkeys(setup.warnings)
+        self._listening: dict[type[Any], Record] = {}
         self.last: Ns = 0
         self._listeners: dict[type[Any], Record] = {
             Slice: self._slice,
@@ -127,7 +126,11 @@ class Accounts:
 
     def listener(self, kind: type[Any]) -> Record:
         """Return what adds events of *kind*; of kinds without an account, only the time counts."""
-        return self._listeners.get(kind, self._other)
+        if kind not in self._listening:
+            takers = [one.take for one in self._added if one.listens_to(kind)]
+            own = self._listeners.get(kind, self._other)
+            self._listening[kind] = _all_of(own, takers) if takers else own
+        return self._listening[kind]
 
     def _component(self, name: str, processor: str) -> ComponentLedger:
         """Return the ledger of a component that is not in the set-up."""
@@ -195,8 +198,7 @@ class Accounts:
         self.last = event.end if event.end > self.last else self.last
 
     def _milestone(self, event: Milestone) -> None:
-        if event.kind == PARCEL:
-            self._parcels.setdefault(event.subject, []).append(event)
+        self._notes.setdefault(event.kind, {}).setdefault(event.subject, []).append(event)
         self._other(event)
 
     def _failure(self, event: Failure) -> None:
@@ -238,7 +240,9 @@ class Accounts:
     ) -> RunRecord:
         """Return the contents of ``run.json`` for a run that ended at *ended*; default: its last event."""
         setup = self.setup
-        elapsed = to_seconds(self.last if ended is None else ended)
+        end = self.last if ended is None else ended
+        elapsed = to_seconds(end)
+        added = {one.name: one.record(end) for one in self._added}
         wall = circumstances.wall_s
         return RunRecord(
             system=setup.system,
@@ -250,14 +254,18 @@ class Accounts:
             components=self._component_records(),
             processors={name: self._processor_record(name, elapsed) for name in self._processors},
             vehicles={name: ledger.record() for name, ledger in self._vehicles.items()},
-            parcels={subject: _parcel(steps) for subject, steps in self._parcels.items()},
+            notes={
+                kind: {subject: _history(steps) for subject, steps in subjects.items()}
+                for kind, subjects in self._notes.items()
+            },
+            added=added,
             requirements=self._requirements(),
             chains={name: chain.record() for name, chain in self._chains.items()},
             preemptions=self._preemption_records(),
             failures=[_failure(one) for one in self._failures],
             laws=[LawRecord.model_validate(asdict(law)) for law in setup.laws],
             not_counted=[*setup.not_counted, *self._not_counted()],
-            warnings=list(self._warnings),
+            warnings=[*self._warnings, *(one.failed for one in self._added if one.failed)],
             unserved=self._unserved,
             versions=dict(sorted(circumstances.versions.items())),
             sim_s=elapsed,
@@ -353,12 +361,21 @@ class Accounts:
         return [f"{', '.join(names)}: {what}" for what, names in missing if names]
 
 
+def _all_of(own: Record, takers: Sequence[Record]) -> Record:
+    def take(event: Any) -> None:
+        own(event)
+        for taker in takers:
+            taker(event)
+
+    return take
+
+
 def _failure(event: Failure) -> FailureRecord:
     return FailureRecord(at_s=to_seconds(event.at), who=event.who, what=event.what)
 
 
-def _parcel(steps: list[Milestone]) -> ParcelRecord:
-    return ParcelRecord(
+def _history(steps: list[Milestone]) -> NoteRecord:
+    return NoteRecord(
         state=steps[-1].state,
         history=[
             StepRecord(at_s=to_seconds(one.at), state=one.state, component=one.component, detail=one.detail)

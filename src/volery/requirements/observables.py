@@ -4,8 +4,8 @@ An observer folds one quantity of one subject over the events of a run; the same
 progress and a trace that is read back. It keeps what its quantity needs and no more. Where nothing was
 observed the value is NaN, never zero.
 
-A new observable: one entry of ``TABLE``. Checks of models, the list of ``volery model observables`` and the
-reference follow from it.
+A new observable: one entry of ``TABLE``; of another package: a class of the entry points
+``volery.observables``. Checks of models, the list of ``volery model observables`` and the reference follow.
 """
 
 from __future__ import annotations
@@ -17,8 +17,14 @@ from typing import Any
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import Ns, S, to_seconds
-from volery.model.reading import NOTE_PREFIX, Observable
-from volery.requirements.accounts import DELIVERED, FAILED, ORDERED, PARCEL
+from volery.model.reading import NOTE_PREFIX, Observable, split_note
+from volery.requirements.added_observables import (
+    AddedInRun,
+    AddedObservables,
+    a_kind,
+    load_added,
+    subjects_of,
+)
 from volery.requirements.ledgers import (
     ChainLedger,
     ComponentLedger,
@@ -27,6 +33,7 @@ from volery.requirements.ledgers import (
     linear_energy,
     processor_energy,
 )
+from volery.requirements.record import DELIVERY_KIND
 from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
 from volery.trace.events import (
     NONE,
@@ -368,51 +375,32 @@ def _failed_operations(vehicle: str, setup: RunSetup) -> Observer:
 # -- the application
 
 
-def _parcels(state: str) -> Make:
-    """Count the parcels that ever were in a state."""
+def _noted(kind: str, state: str, quantity: str) -> Observer:
+    """Observe the subjects of *kind* that ``volery.note()`` ever put into *state*.
 
-    def make(application: str, setup: RunSetup) -> Observer:
-        seen: dict[str, None] = {}
-
-        def take(event: Milestone) -> None:
-            if event.kind == PARCEL and event.state == state:
-                seen[event.subject] = None
-
-        return Observer((Milestone,), take, lambda at: float(len(seen)))
-
-    return make
-
-
-def _noted(kind: str, state: str) -> Observer:
-    """Count the subjects of *kind* that ``volery.note()`` ever put into *state*."""
-    seen: dict[str, None] = {}
+    Without a *quantity* they are counted, each once; the times are from a subject's first state to this one.
+    """
+    since: dict[str, Ns] = {}
+    entered: dict[str, None] = {}
+    spread = Distribution()
 
     def take(event: Milestone) -> None:
-        if event.kind == kind and event.state == state:
-            seen[event.subject] = None
-
-    return Observer((Milestone,), take, lambda at: float(len(seen)))
-
-
-def _delivery_time(reading: Callable[[Distribution], float | None]) -> Make:
-    """Observe times from a parcel's first state to its delivery."""
-
-    def make(application: str, setup: RunSetup) -> Observer:
-        since: dict[str, Ns] = {}
-        delivered: dict[str, None] = {}
-        spread = Distribution()
-
-        def take(event: Milestone) -> None:
-            if event.kind != PARCEL:
-                return
+        if event.kind == kind:
             since.setdefault(event.subject, event.at)
-            if event.state == DELIVERED and event.subject not in delivered:
-                delivered[event.subject] = None
+            if event.state == state and event.subject not in entered:
+                entered[event.subject] = None
                 spread.add(event.at - since[event.subject])
 
-        return Observer((Milestone,), take, lambda at: _seconds(reading(spread)))
+    readings: dict[str, Callable[[Ns], float]] = {
+        "": lambda at: float(spread.count),
+        "time_max": lambda at: _seconds(_largest(spread)),
+        "time_mean": lambda at: _seconds(spread.mean()),
+    }
+    return Observer((Milestone,), take, readings[quantity])
 
-    return make
+
+def _of_a_delivery(state: str, quantity: str) -> Make:
+    return lambda application, setup: _noted(DELIVERY_KIND, state, quantity)
 
 
 def _failures(application: str, setup: RunSetup) -> Observer:
@@ -435,6 +423,15 @@ def _latency(reading: Callable[[Distribution], float | None]) -> Make:
 
 
 # -- the table
+
+_DELIVERY = {
+    "ordered": ("ordered", ""),
+    "delivered": ("delivered", ""),
+    "undelivered": ("failed", ""),
+    "delivery_time_max": ("delivered", "time_max"),
+    "delivery_time_mean": ("delivered", "time_mean"),
+}
+"""State and quantity of the notes that a delivery has names of its own for."""
 
 TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
     (
@@ -566,22 +563,15 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
     ("chain", "latency", "s", "greatest age of data at the end of a chain of topics", _latency(_largest)),
     ("chain", "latency_mean", "s", "mean age", _latency(Distribution.mean)),
     ("chain", "latency_p95", "s", "age that 95 % do not exceed, at most 0.2 % too high", _latency(_p95)),
-    ("application", "ordered", "", "parcels ordered", _parcels(ORDERED)),
-    ("application", "delivered", "", "parcels delivered", _parcels(DELIVERED)),
-    ("application", "undelivered", "", "parcels that were given up", _parcels(FAILED)),
-    (
-        "application",
-        "delivery_time_max",
-        "s",
-        "longest time from a parcel's first state to its delivery",
-        _delivery_time(_largest),
-    ),
-    (
-        "application",
-        "delivery_time_mean",
-        "s",
-        "mean time from a parcel's first state to its delivery",
-        _delivery_time(Distribution.mean),
+    *(
+        (
+            "application",
+            quantity,
+            "s" if words[1] else "",
+            f"the same as `{'.'.join((NOTE_PREFIX, DELIVERY_KIND, *filter(None, words)))}`",
+            _of_a_delivery(*words),
+        )
+        for quantity, words in _DELIVERY.items()
     ),
     (
         "application",
@@ -598,15 +588,44 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
 OBSERVABLES = tuple(Observable(*row[:4]) for row in TABLE)
 """Everything that can be observed. An empty unit stands for a count or a share."""
 
-NOTED = Observable(
-    NOTE_PREFIX,
-    "<kind>.<state>",
-    "",
-    "subjects that volery.note(kind, subject, state) has put into the state, each counted once",
+NOTED = (
+    Observable(
+        NOTE_PREFIX,
+        "<kind>.<state>",
+        "",
+        "subjects that volery.note(kind, subject, state) has put into the state, each counted once",
+    ),
+    Observable(
+        NOTE_PREFIX,
+        "<kind>.<state>.time_max",
+        "s",
+        "longest time from the first state of a subject to this one",
+    ),
+    Observable(NOTE_PREFIX, "<kind>.<state>.time_mean", "s", "mean of these times"),
 )
 """What an application observes itself. Kinds and states are its own words, so ``TABLE`` has no entries."""
 
 _MAKERS = {(subject, quantity): make for subject, quantity, _, _, make in TABLE}
+
+
+def all_observables() -> tuple[Observable, ...]:
+    """Return everything that a model's requirements may bound by a subject's name: with other packages'.
+
+    Raises:
+        UsageError: Observables of a package cannot be loaded, or two define the same quantity.
+    """
+    owners = dict.fromkeys(_MAKERS, "volery")
+    found = list(OBSERVABLES)
+    for name, made in load_added().items():
+        for one in made.quantities:
+            owner = owners.setdefault((made.subject, one.name), name)
+            if owner != name:
+                raise UsageError(
+                    f"the observables {name!r} and those of {owner!r} both define the quantity {one.name!r} "
+                    f"of {a_kind(made.subject)}; rename it in one of the packages, or uninstall one"
+                )
+            found.append(Observable(made.subject, one.name, one.unit, one.description))
+    return tuple(found)
 
 
 def make_observer(expression: str, setup: RunSetup | None = None) -> Observer:
@@ -618,37 +637,43 @@ def make_observer(expression: str, setup: RunSetup | None = None) -> Observer:
             first kind in the table that has such a quantity.
 
     Raises:
-        UsageError: the quantity is not in the table.
+        UsageError: the quantity is neither in the table nor one of a package.
     """
-    prefix, _, noted = expression.partition(".")
-    kind, _, state = noted.partition(".")
-    if prefix == NOTE_PREFIX and kind and state:
-        return _noted(kind, state)
+    if (words := split_note(expression)) is not None:
+        return _noted(*words)
     circumstances = setup or RunSetup()
     subject, _, quantity = expression.rpartition(".")
     kind = _kind(subject, quantity, circumstances)
-    make = _MAKERS.get((kind, quantity))
+    make = _MAKERS.get((kind, quantity)) or _added(kind, quantity)
     if make is None or not subject:
-        known = [one.quantity for one in OBSERVABLES if one.subject == kind]
+        known = [one.quantity for one in all_observables() if one.subject == kind]
         raise UsageError(
-            f"{expression!r}: a {kind} has no quantity {quantity!r}{did_you_mean(quantity, known)}; "
+            f"{expression!r}: {a_kind(kind)} has no quantity {quantity!r}{did_you_mean(quantity, known)}; "
             f"there is {choices(known)}"
         )
     return make(subject, circumstances)
 
 
+def _added(kind: str, quantity: str) -> Make | None:
+    """Return what observes a quantity of a package, None if no package defines it."""
+    for name, made in load_added().items():
+        if made.subject == kind and any(one.name == quantity for one in made.quantities):
+            return _from_a_package(name, made, quantity)
+    return None
+
+
+def _from_a_package(name: str, made: type[AddedObservables], quantity: str) -> Make:
+    def make(subject: str, setup: RunSetup) -> Observer:
+        one = AddedInRun(name, made, setup)
+        return Observer(made.listens, one.take, lambda at: one.value(subject, quantity, at))
+
+    return make
+
+
 def _kind(subject: str, quantity: str, setup: RunSetup) -> str:
-    if subject == "application":
-        return subject
+    for kind, names in subjects_of(setup).items():
+        if subject in names:
+            return kind
     if "." in subject:
         return "operation"
-    for kind, things in (
-        ("component", setup.components),
-        ("processor", setup.processors),
-        ("vehicle", setup.vehicles),
-        ("chain", setup.chains),
-        ("network", setup.networks),
-    ):
-        if any(one.name == subject for one in things):
-            return kind
     return next((one.subject for one in OBSERVABLES if one.quantity == quantity), "component")

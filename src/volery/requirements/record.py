@@ -7,15 +7,19 @@ versions are stored here and nowhere else in a run folder.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from volery.base.errors import UsageError
 from volery.base.files import replace_text
 
-RUN_SCHEMA: Final = "volery-run/1"
+RUN_SCHEMA: Final = "volery-run/2"
 RUN_FILE = "run.json"
+
+DELIVERY_KIND: Final = "parcel"
+"""Kind of the notes of a delivery. Version 1 of ``run.json`` had no others, and ``application.delivered`` and
+its like are about them."""
 
 Status = Literal["completed", "interrupted", "failed", "unfinished"]
 """``interrupted`` by the user; ``failed``: something raised; ``unfinished``: killed, known from its trace."""
@@ -174,7 +178,7 @@ class VehicleRecord(_Part):
 
 
 class StepRecord(_Part):
-    """A state that a parcel entered."""
+    """A state that a subject entered, and the component that noted it."""
 
     at_s: float
     state: str
@@ -182,11 +186,26 @@ class StepRecord(_Part):
     detail: str
 
 
-class ParcelRecord(_Part):
-    """A parcel: its state at the end and its history. It is in exactly one state at any time."""
+class NoteRecord(_Part):
+    """A subject of ``volery.note()``: its state at the end, and its history. It is always in one state."""
 
     state: str
     history: list[StepRecord]
+
+
+class TableRecord(_Part):
+    """A table for the report; each row has a text, a number or nothing for each column."""
+
+    title: str
+    columns: list[str]
+    rows: list[list[str | float | None]]
+
+
+class AddedRecord(_Part):
+    """What the observables of a package came to: values by ``<subject>.<quantity>``, and its table."""
+
+    values: dict[str, float | None]
+    table: TableRecord | None = None
 
 
 class RequirementRecord(_Part):
@@ -219,9 +238,12 @@ class LawRecord(_Part):
 
 
 class RunRecord(_Part):
-    """The whole of ``run.json``."""
+    """The whole of ``run.json``; a document of version 1 is read as one of version 2.
 
-    schema_: Literal["volery-run/1"] = Field(default=RUN_SCHEMA, alias="schema")
+    ``notes`` are by kind and subject, ``added`` by the name of the entry point.
+    """
+
+    schema_: Literal["volery-run/2"] = Field(default=RUN_SCHEMA, alias="schema")
     system: str
     fidelity: str
     allocation: str
@@ -231,8 +253,9 @@ class RunRecord(_Part):
     components: dict[str, ComponentRecord]
     processors: dict[str, ProcessorRecord]
     vehicles: dict[str, VehicleRecord]
-    parcels: dict[str, ParcelRecord]
+    notes: dict[str, dict[str, NoteRecord]]
     requirements: dict[str, RequirementRecord]
+    added: dict[str, AddedRecord] = {}
     chains: dict[str, ChainRecord] = {}
     preemptions: list[PreemptionRecord] = []
     failures: list[FailureRecord]
@@ -244,6 +267,20 @@ class RunRecord(_Part):
     sim_s: float
     wall_s: float | None
     real_time_factor: float | None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_version_1(cls, document: Any) -> Any:
+        if not isinstance(document, dict) or document.get("schema") != "volery-run/1":
+            return document
+        notes = {DELIVERY_KIND: subjects} if (subjects := document.get("parcels")) else {}
+        kept = {name: part for name, part in document.items() if name != "parcels"}
+        return {**kept, "schema": RUN_SCHEMA, "notes": notes}
+
+    @property
+    def parcels(self) -> dict[str, NoteRecord]:
+        """Return the notes of a delivery, by the name that version 1 gave them."""
+        return self.notes.get(DELIVERY_KIND, {})
 
     @property
     def is_real(self) -> bool:

@@ -38,12 +38,15 @@ class VehicleProgress:
 
 @dataclass(frozen=True)
 class Progress:
-    """Present state of a run. ``limit`` is its latest end or 0, ``parcels`` the number by state."""
+    """Present state of a run.
+
+    ``limit`` is its latest end or 0, ``notes`` the number of noted subjects by kind and present state.
+    """
 
     now: Ns
     limit: Ns
     vehicles: tuple[VehicleProgress, ...]
-    parcels: dict[str, int]
+    notes: dict[str, dict[str, int]]
 
 
 ReadVehicles = Callable[[], tuple[VehicleProgress, ...]]
@@ -146,17 +149,17 @@ class ProgressReporter:
         self._limit = limit
         self._read = read
         self._show = show
-        self._parcels: dict[str, str] = {}
+        self._notes: dict[str, dict[str, str]] = {}
         kernel.every(PERIOD, self._report)
 
     def __call__(self, event: Event) -> None:
-        """Count parcels by state."""
-        if isinstance(event, Milestone) and event.kind == "parcel":
-            self._parcels[event.subject] = event.state
+        """Keep the present state of what is noted."""
+        if isinstance(event, Milestone):
+            self._notes.setdefault(event.kind, {})[event.subject] = event.state
 
     def _report(self) -> None:
-        parcels = dict(Counter(self._parcels.values()))
-        self._show(Progress(self._kernel.now(), self._limit, self._read(), parcels))
+        notes = {kind: dict(Counter(states.values())) for kind, states in self._notes.items()}
+        self._show(Progress(self._kernel.now(), self._limit, self._read(), notes))
 
 
 @dataclass(frozen=True)

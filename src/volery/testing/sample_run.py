@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from volery.base.seeds import stream
 from volery.base.time import MS, US, Ns, S, from_seconds
+from volery.requirements.record import DELIVERY_KIND
 from volery.trace.attachments import (
     Area,
     ChainSetup,
@@ -94,7 +95,7 @@ _STARTS = {"drone_1": 75.0, "drone_2": 0.0, "rover_north": 5.0, "rover_south": 1
 _REQUIREMENTS = (
     RequirementSetup("landing", "drone_1.landing_offset", "max", 0.3, "m"),
     RequirementSetup("control", "drone_control.deadline_misses", "max", 0.0),
-    RequirementSetup("delivered", "parcels.delivered", "min", 1.0),
+    RequirementSetup("delivered", "application.delivered", "min", 1.0),
 )
 _LAWS = (
     LawSetup("ROS calls of roscpp", "the paper's Table II", "measured", "600 to 1500 MHz"),
@@ -300,7 +301,9 @@ def _story(journey: list[tuple[Ns, float, float, float]]) -> Iterator[Event]:
         yield Slice(at + 23 * MS, at + 25 * MS, "ground", 1, "central", "central")
         yield Preemption(at + 25 * MS, "ground", 1, "central", "planner")
         for after, state, component, detail in _PARCEL_STEPS if number == 1 else _PARCEL_STEPS[: 4 - number]:
-            yield Milestone(at + from_seconds(after), component, "parcel", f"parcel_{number}", state, detail)
+            yield Milestone(
+                at + from_seconds(after), component, DELIVERY_KIND, f"parcel_{number}", state, detail
+            )
     names = ["takeoff", "goto", "goto", "land", "takeoff", "goto", "goto", "land"]
     for (start, *_), (end, x, y, z), name in zip(journey[1::2], journey[2::2], names, strict=False):
         where = f"{x:g} m east, {y:g} m north, {z:g} m up"
@@ -329,4 +332,4 @@ def _verdicts(now: Ns, onboard_mhz: float) -> Iterator[Event]:
     misses = 0.0 if onboard_mhz >= 1500.0 else 1374.0
     yield Verdict(now, "landing", "drone_1.landing_offset", "max", 0.3, 0.12, True)
     yield Verdict(now, "control", "drone_control.deadline_misses", "max", 0.0, misses, misses == 0.0)
-    yield Verdict(now, "delivered", "parcels.delivered", "min", 1.0, 1.0, True)
+    yield Verdict(now, "delivered", "application.delivered", "min", 1.0, 1.0, True)

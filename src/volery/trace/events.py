@@ -188,7 +188,7 @@ class Operation(NamedTuple):
 
 
 class Milestone(NamedTuple):
-    """Something that the application tracks, such as a parcel, entered a state."""
+    """Something that the application tracks, such as an order, entered a state: see ``volery.note()``."""
 
     at: Ns
     component: str

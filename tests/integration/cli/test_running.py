@@ -222,7 +222,7 @@ def test_the_demo_shows_both_allocations_and_is_no_failure(tmp_path):
         name: json.loads((tmp_path / "demo" / name / "run.json").read_text()) for name in ("fast", "slow")
     }
     for record in records.values():
-        assert [parcel["state"] for parcel in record["parcels"].values()] == ["delivered"] * 3
+        assert [parcel["state"] for parcel in record["notes"]["parcel"].values()] == ["delivered"] * 3
     missed = [name for name, found in records["slow"]["requirements"].items() if not found["met"]]
     assert missed
     for name in missed:

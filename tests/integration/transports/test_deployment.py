@@ -47,7 +47,7 @@ def assert_delivered(folder: Path, said: str) -> None:
     assert (folder / "run.json").exists(), said
     record: dict[str, Any] = json.loads((folder / "run.json").read_text())
     assert record["outcome"]["status"] == "completed", said
-    assert record["parcels"]["parcel-1"]["state"] == "delivered"
+    assert record["notes"]["parcel"]["parcel-1"]["state"] == "delivered"
     assert record["outcome"]["requirements_met"], record["requirements"]
     assert all(vehicle["landed"] for vehicle in record["vehicles"].values())
     assert not record["failures"]

@@ -126,7 +126,7 @@ def deliver(python: str, out: Path, graph: str, env: Mapping[str, str]) -> dict[
 
 
 def assert_delivered(record: dict[str, Any], folder: Path) -> None:
-    states = [step["state"] for step in record["parcels"]["parcel-1"]["history"]]
+    states = [step["state"] for step in record["notes"]["parcel"]["parcel-1"]["history"]]
     assert states == THE_WAY
     assert all(vehicle["landed"] for vehicle in record["vehicles"].values())
     assert record["requirements"]["delivered"]["met"]

@@ -13,15 +13,22 @@ PROGRESS = Progress(
     83 * S,
     15 * MINUTE,
     (VehicleProgress("drone_1", "GUIDED", True, 24.96), VehicleProgress("rover_1", "HOLD", False, 0.0)),
-    {"delivered": 1, "in the air": 2},
+    {"parcel": {"delivered": 1, "in the air": 2}, "battery": {"charged": 1}},
 )
 
 
-def test_it_tells_time_speed_vehicles_and_parcels():
+def test_it_tells_time_speed_vehicles_and_notes():
     console = Console(file=io.StringIO(), width=100)
     console.print(draw_progress("delivery", PROGRESS, 0.5))
     said = console.file.getvalue()
-    for piece in ("delivery", "0:01:23", "166× real time", "1 delivered, 2 in the air", "GUIDED", "25.0 m"):
+    for piece in (
+        "delivery",
+        "0:01:23",
+        "166× real time",
+        "parcels: 1 delivered, 2 in the air, batteries: 1 charged",
+        "GUIDED",
+        "25.0 m",
+    ):
         assert piece in said
     assert "on the ground" in said
 
@@ -37,7 +44,8 @@ def test_a_pipe_gets_a_line_now_and_then():
     for now[0] in (1.0, LINE_PERIOD_S, LINE_PERIOD_S + 1.0):
         lines.show("delivery", PROGRESS)
     assert said.getvalue() == (
-        "delivery: 0:01:23 of at most 0:15:00, 8.3× real time, 1 delivered, 2 in the air\n"
+        "delivery: 0:01:23 of at most 0:15:00, 8.3× real time, parcels: 1 delivered, 2 in the air, "
+        "batteries: 1 charged\n"
     )
 
 

@@ -27,7 +27,7 @@ from volery.report.terminal import comparison_table, cost_table, short_compariso
 from volery.requirements.accounts import Accounts, Circumstances
 from volery.requirements.record import RunRecord, read_record, write_record
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
-from volery.trace.attachments import RunSetup, to_json
+from volery.trace.attachments import RunSetup, VehicleSetup, to_json
 from volery.trace.events import Charge, Event, Failure, Message, Milestone, Text, VehicleState
 from volery.trace.mcap_writer import Attachment, McapWriter
 
@@ -215,7 +215,8 @@ def test_a_parcel_is_drawn_with_the_vehicle_of_the_component_that_has_it(tmp_pat
         Milestone(2, "central", "parcel", "p", "seen", "watcher"),
         Milestone(3, "central", "parcel", "p", "on rover_8", "driver"),
     )
-    (parcel,) = embedded(render(gather(folder)))["parcels"]
+    (kind,) = embedded(render(gather(folder)))["notes"]
+    (parcel,) = kind["subjects"]
     assert [step["vehicle"] for step in parcel["steps"]] == ["rover_7", "", "rover_8"]
 
 
@@ -231,8 +232,38 @@ def test_a_parcel_is_in_the_store_then_where_it_is_said_to_be(tmp_path: Path) ->
     ):
         writer(Milestone(at, "central", "parcel", "p", state, detail))
     writer.close()
-    (parcel,) = embedded(render(gather(folder)))["parcels"]
+    (kind,) = embedded(render(gather(folder)))["notes"]
+    (parcel,) = kind["subjects"]
     assert [step["place"] for step in parcel["steps"]] == ["store", "", "port_north", "san_rafael"]
+
+
+def test_kinds_of_notes_have_sections_of_their_own_that_stay_bounded(tmp_path: Path) -> None:
+    toggling = [
+        Milestone(n, "porter", "door", "gate", f"{'open' if n % 2 else 'shut'}", "") for n in range(500)
+    ]
+    seen = [Milestone(n, "camera", "survey point", f"point_{n}", "seen", "") for n in range(70)]
+    html = render(
+        gather(small_run(tmp_path / "kinds", *toggling, *seen, Milestone(9, "a", "box", "b", "x", "")))
+    )
+    for words in ("<h2>Doors", "<h2>Survey points", "<h2>Boxes", "10 more stand in run.json", "70 of 70"):
+        assert words in html
+    doors, points, _ = embedded(html)["notes"]
+    assert doors["subjects"][0]["steps"][0]["state"] == "shut"
+    assert len(doors["subjects"][0]["steps"]) == 201
+    assert (len(points["subjects"]), points["left_out"]) == (60, 10)
+
+
+def test_a_noted_place_is_there_and_the_vehicle_of_who_noted_it_is_known(tmp_path: Path) -> None:
+    folder = tmp_path / "inspected"
+    folder.mkdir()
+    writer = McapWriter(folder / "trace.mcap", RunSetup(vehicles=(VehicleSetup("drone_9"),)), [_MAP])
+    writer(Message(0, 1, "/drone_9/mavros/state", "drone_9/mavros", "inspector", 10))
+    writer(Milestone(1, "inspector", "place", "port_north", "inspected", "by drone_9"))
+    writer(Milestone(2, "inspector", "crack", "c1", "found", ""))
+    writer.close()
+    places, cracks = (kind["subjects"][0]["steps"][0] for kind in embedded(render(gather(folder)))["notes"])
+    assert (places["place"], places["from"]) == ("port_north", "drone_9")
+    assert (cracks["place"], cracks["vehicle"], cracks["from"]) == ("", "", "drone_9")
 
 
 def test_more_words_than_fit_are_counted(tmp_path: Path) -> None:

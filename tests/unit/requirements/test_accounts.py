@@ -1,5 +1,6 @@
 """Accounts: what a stream of events comes to."""
 
+import json
 from dataclasses import replace
 from math import nan
 from pathlib import Path
@@ -205,15 +206,20 @@ def test_errors_are_the_largest_of_what_succeeded() -> None:
     assert [one.outcome for one in found.operations] == ["ok", "ok", "Refused"]
 
 
-def test_a_parcel_is_where_it_was_last_seen() -> None:
+def test_a_subject_is_in_the_state_that_was_noted_last() -> None:
     found = books(
         Milestone(0, "central", "parcel", "p1", "ordered", "blood"),
         Milestone(S, "central", "order", "o1", "accepted", ""),
         Milestone(2 * S, "drone", "parcel", "p1", "delivered", ""),
-    ).parcels
-    assert list(found) == ["p1"]
-    assert found["p1"].state == "delivered"
-    assert [(step.at_s, step.state) for step in found["p1"].history] == [(0.0, "ordered"), (2.0, "delivered")]
+    )
+    assert {kind: list(subjects) for kind, subjects in found.notes.items()} == {
+        "parcel": ["p1"],
+        "order": ["o1"],
+    }
+    parcel = found.notes["parcel"]["p1"]
+    assert parcel.state == "delivered"
+    assert [(step.at_s, step.state) for step in parcel.history] == [(0.0, "ordered"), (2.0, "delivered")]
+    assert found.parcels == found.notes["parcel"]
 
 
 def test_verdicts_and_what_has_none() -> None:
@@ -314,15 +320,30 @@ def test_run_json_has_the_wall_time_and_is_read_back(tmp_path: Path) -> None:
     record = accounts.record("interrupted", "Ctrl-C", circumstances=Circumstances(2.0, {"volery": "1"}))
     assert record.real_time_factor == 5.0
     path = write_record(record, tmp_path)
-    assert '"schema": "volery-run/1"' in path.read_text()
+    assert '"schema": "volery-run/2"' in path.read_text()
     assert read_record(tmp_path) == record
+
+
+def test_version_1_is_read_and_what_scripts_read_is_where_it_was(tmp_path: Path) -> None:
+    record = books(
+        Milestone(2 * S, "central", "parcel", "p1", "delivered", ""), Call(0, S, "a", "control", "x", "ok")
+    )
+    new = json.loads(write_record(record, tmp_path).read_text())
+    assert (new["outcome"]["status"], new["sim_s"]) == ("completed", 2.0)
+    assert new["components"]["control"]["response_s"].keys() == {"of", "count", "mean", "p95", "max"}
+    kept = {name: part for name, part in new.items() if name not in ("notes", "added")}
+    old = {**kept, "schema": "volery-run/1", "parcels": new["notes"]["parcel"]}
+    (tmp_path / "run.json").write_text(json.dumps(old))
+    assert read_record(tmp_path) == record
+    (tmp_path / "run.json").write_text(json.dumps({**old, "parcels": {}}))
+    assert read_record(tmp_path).notes == {}
 
 
 def test_a_run_json_that_is_none(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="cannot read"):
         read_record(tmp_path)
     (tmp_path / "run.json").write_text("{}")
-    with pytest.raises(UsageError, match=r"volery-run/1"):
+    with pytest.raises(UsageError, match=r"volery-run/2"):
         read_record(tmp_path)
     with pytest.raises(UsageError, match="cannot write"):
         write_record(books(), tmp_path / "none")

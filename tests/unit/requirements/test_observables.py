@@ -319,6 +319,13 @@ def test_parcels_are_counted_once_and_timed_from_their_first_state():
     assert observed("application.undelivered", events) == 1.0
     assert observed("application.delivery_time_max", events) == 8.0
     assert isnan(observed("application.delivery_time_mean", events[:2]))
+    assert observed("note.parcel.delivered", events) == 1.0
+    assert observed("note.parcel.delivered.time_max", events) == 8.0
+    assert observed("note.parcel.failed.time_mean", events) == 9.0
+    assert observed("note.parcel.ordered.time_max", events) == 0.0
+    assert observed("note.truck.delivered.time_max", events) == 0.0
+    assert isnan(observed("note.parcel.time_max.time_mean", events))
+    assert observed("note.parcel.time_max", events) == 0.0  # a state of that name
 
 
 def test_failures_and_lost_messages():

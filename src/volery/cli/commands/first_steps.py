@@ -94,11 +94,12 @@ def demo(
     names = load(model, vocabulary()).allocations[:2]
     outcomes = run_all(output, {name: Job(model, name, seed, make_folder(out / name)) for name in names})
     records = [outcome.record for outcome in outcomes.values()]
-    parcels = [
-        f"{name}: {parcel.state} at {parcel.history[-1].at_s:.0f} s {parcel.history[-1].detail}".rstrip()
-        for name, parcel in records[0].parcels.items()
+    noted = [
+        f"{name}: {one.state} at {one.history[-1].at_s:.0f} s {one.history[-1].detail}".rstrip()
+        for subjects in records[0].notes.values()
+        for name, one in subjects.items()
     ]
-    output.show(*parcels, short_comparison(records, list(outcomes)))
+    output.show(*noted, short_comparison(records, list(outcomes)))
     output.give(f"[{', '.join(record.model_dump_json(by_alias=True) for record in records)}]")
     for name, outcome in outcomes.items():
         for requirement, found in outcome.record.requirements.items():

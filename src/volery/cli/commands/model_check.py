@@ -177,12 +177,14 @@ def schema(output: Output) -> int:
 @commands.add("json")
 def observables(output: Output) -> int:
     """List the observables that a requirement may bound."""
-    from volery.requirements.observables import NOTED, OBSERVABLES
+    from volery.model.reading import NOTE_PREFIX
+    from volery.requirements.observables import NOTED, all_observables
 
+    known = (*all_observables(), *NOTED)
     listed = make_table("observe", "unit", "meaning")
-    for one in (*OBSERVABLES, NOTED):
-        subject = one.subject if one.subject in ("application", NOTED.subject) else f"<{one.subject}>"
+    for one in known:
+        subject = one.subject if one.subject in ("application", NOTE_PREFIX) else f"<{one.subject}>"
         listed.add_row(f"{subject}.{one.quantity}", one.unit or "-", one.description)
     output.show(listed)
-    output.give([asdict(one) for one in (*OBSERVABLES, NOTED)])
+    output.give([asdict(one) for one in known])
     return OK

@@ -1,8 +1,8 @@
-// The map: scenery, trails, vehicles, parcels. Drag to move, pinch or ctrl-wheel or the buttons to zoom.
+// The map: scenery, trails, vehicles, notes. Drag to move, pinch or ctrl-wheel or the buttons to zoom.
 (() => {
   const element = document.getElementById("map");
   if (!element) return;
-  const { data, at, before, colour, series, current } = stage;
+  const { data, at, before, colour, series, markOf, current } = stage;
   const scenery = data.scenery || { places: [], roads: [], corridors: [], areas: [] };
   const view = { x: 0, y: 0, scale: 1, fitted: true };
   const bright = 90; // seconds of the way that stand out
@@ -212,17 +212,22 @@
     context.restore();
   }
 
-  // Where a parcel is: on the vehicle or at the place that its state speaks of, else where it was left.
-  function spotOf(parcel, time) {
-    for (let index = parcel.steps.findLastIndex((step) => step.t <= time), until = time; index >= 0; index--) {
-      const step = parcel.steps[index];
+  // Where a noted subject is: on the vehicle or at the place that its state speaks of, else where it was left;
+  // if it was said of neither, where the vehicle of the component was that noted it.
+  function spotOf(subject, time) {
+    const known = subject.steps.findLastIndex((step) => step.t <= time);
+    for (let index = known, until = time; index >= 0; index--) {
+      const step = subject.steps[index];
+      const place = scenery.places.find((one) => one[0] === step.place);
+      if (place && step.place === subject.name) return { x: place[1], y: place[2] };
       const vehicle = data.vehicles.find((one) => one.name === step.vehicle);
       if (vehicle && vehicle.t.length) return where(vehicle, until);
-      const place = scenery.places.find((one) => one[0] === step.place);
       if (place) return { x: place[1], y: place[2] };
       until = step.t;
     }
-    return null;
+    const step = subject.steps[known];
+    const vehicle = step && data.vehicles.find((one) => one.name === step.from);
+    return vehicle && vehicle.t.length ? where(vehicle, step.t) : null;
   }
 
   function drawCollisions(context, time) {
@@ -239,23 +244,35 @@
     }
   }
 
-  function drawParcels(context, time) {
+  function drawNotes(context, time) {
     const stacked = {};
-    for (const parcel of data.parcels) {
-      const spot = spotOf(parcel, time);
-      if (!spot) continue;
-      const key = Math.round(toX(spot.x) / 8) + "/" + Math.round(toY(spot.y) / 8);
-      const row = stacked[key] = (stacked[key] || 0) + 1;
-      const left = toX(spot.x) + 8 + 11 * (row - 1), top = toY(spot.y) - 20;
-      context.beginPath();
-      context.roundRect(left, top, 11, 11, 2);
-      context.fillStyle = "#c99a5b";
-      context.fill();
-      context.lineWidth = 1.3;
-      context.strokeStyle = "#5e4318";
-      context.moveTo(left + 5.5, top); context.lineTo(left + 5.5, top + 11);
-      context.stroke();
+    data.notes.forEach((kind, index) => {
+      for (const subject of kind.subjects) {
+        const spot = spotOf(subject, time);
+        if (!spot) continue;
+        const key = Math.round(toX(spot.x) / 8) + "/" + Math.round(toY(spot.y) / 8);
+        const row = stacked[key] = (stacked[key] || 0) + 1;
+        drawMark(context, markOf(index), toX(spot.x) + 8 + 11 * (row - 1), toY(spot.y) - 20);
+      }
+    });
+  }
+
+  function drawMark(context, mark, left, top) {
+    context.beginPath();
+    if (mark.shape === "disc") context.arc(left + 5.5, top + 5.5, 5.5, 0, 2 * Math.PI);
+    else if (mark.shape === "diamond") {
+      for (const [x, y] of [[0, 5.5], [5.5, 0], [11, 5.5], [5.5, 11]]) context.lineTo(left + x, top + y);
+      context.closePath();
+    } else context.roundRect(left, top, 11, 11, 2);
+    context.fillStyle = mark.fill;
+    context.fill();
+    context.lineWidth = 1.3;
+    context.strokeStyle = mark.edge;
+    if (mark.shape === "box") {
+      context.moveTo(left + 5.5, top);
+      context.lineTo(left + 5.5, top + 11);
     }
+    context.stroke();
   }
 
   function drawScale(context) {
@@ -294,7 +311,7 @@
     data.vehicles.forEach((vehicle, index) => drawTrail(context, vehicle, colour(series(index)), time));
     drawPlaces(context, taken);
     data.vehicles.forEach((vehicle, index) => drawVehicle(context, vehicle, colour(series(index)), time));
-    drawParcels(context, time);
+    drawNotes(context, time);
     drawCollisions(context, time);
     data.vehicles.forEach((vehicle) => {
       if (!vehicle.t.length) return;

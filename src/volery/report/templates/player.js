@@ -1,6 +1,6 @@
 // The slider, the play button, and what stands beside the map.
 (() => {
-  const { data, at, tenths, current, clock, series, element: make } = stage;
+  const { data, at, tenths, current, clock, series, markOf, element: make } = stage;
   const slider = document.getElementById("time");
   if (!slider) return;
   const rate = document.getElementById("rate");
@@ -21,14 +21,17 @@
     document.getElementById("vehicles").append(item);
     return { vehicle, mode, numbers };
   });
-  const parcels = data.parcels.map((parcel) => {
-    const item = make("li", "parcel"), box = make("i", "box"), state = make("span", "state");
-    box.style.background = "#c99a5b";
-    item.append(box, make("b", "", parcel.name), state);
-    document.getElementById("parcels").append(item);
-    return { parcel, item, state };
+  const noted = data.notes.flatMap((kind, index) => {
+    const list = make("ul", "cards"), mark = markOf(index);
+    document.getElementById("noted").append(make("h3", "", kind.title), list);
+    return kind.subjects.map((subject) => {
+      const item = make("li", "noted"), sign = make("i", mark.shape), state = make("span", "state");
+      sign.style.background = mark.fill;
+      item.append(sign, make("b", "", subject.name), state);
+      list.append(item);
+      return { subject, item, state };
+    });
   });
-  document.getElementById("parcels-title").hidden = !parcels.length;
   const cursors = document.querySelectorAll(".lane .cursor");
 
   function tell(time) {
@@ -48,8 +51,8 @@
       if (vehicle.battery.t.length) words.push(Math.round(at(vehicle.battery.t, vehicle.battery.v, time)) + " %");
       numbers.textContent = words.join("  ·  ");
     }
-    for (const { parcel, item, state } of parcels) {
-      const step = current(parcel.steps, time, (one) => one.t);
+    for (const { subject, item, state } of noted) {
+      const step = current(subject.steps, time, (one) => one.t);
       item.hidden = !step;
       if (step) state.textContent = step.state;
     }

@@ -41,6 +41,13 @@ const stage = (() => {
   const colour = (name) => styles.getPropertyValue("--" + name).trim();
   const series = (index) => "c" + (index % 8 + 1);
 
+  // How the subjects of the kinds of notes are marked, by the kind's index.
+  const marks = [
+    { shape: "box", fill: "#c99a5b", edge: "#5e4318" }, { shape: "disc", fill: "#6fa8c9", edge: "#1c4359" },
+    { shape: "diamond", fill: "#9bb85f", edge: "#3d4c17" }, { shape: "box", fill: "#b98ac2", edge: "#4b2353" },
+  ];
+  const markOf = (index) => marks[index % marks.length];
+
   function clock(seconds, digits) {
     const whole = Math.floor(seconds + 1e-6);
     const two = (value) => String(value).padStart(2, "0");
@@ -73,7 +80,7 @@ const stage = (() => {
   dark.addEventListener("change", () => redraws.forEach((redraw) => redraw()));
 
   return {
-    data, before, at, tenths, current, colour, series, clock, canvas,
+    data, before, at, tenths, current, colour, series, markOf, clock, canvas,
     element(tag, classes, text) {
       const made = document.createElement(tag);
       if (classes) made.className = classes;

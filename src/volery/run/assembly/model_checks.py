@@ -22,7 +22,7 @@ from volery.model.instances import Instance
 from volery.model.reading import ProcessorKind, Vocabulary
 from volery.model.system import System
 from volery.model.text import CollectedModelError
-from volery.requirements.observables import OBSERVABLES
+from volery.requirements.observables import all_observables
 from volery.ros.client_libraries.importable_modules import importable_modules
 from volery.ros.graph import EmbeddedGraph
 from volery.ros.messages import define_imported
@@ -42,7 +42,12 @@ def vocabulary() -> Vocabulary:
     """Return the names that a model is checked against."""
     autopilots = frozenset(firmwares.names())
     return Vocabulary(
-        _kinds(), frozenset(RUNNING_LANGUAGES), autopilots, OBSERVABLES, _kinds, frozenset(sensors.names())
+        _kinds(),
+        frozenset(RUNNING_LANGUAGES),
+        autopilots,
+        all_observables(),
+        _kinds,
+        frozenset(sensors.names()),
     )
 
 

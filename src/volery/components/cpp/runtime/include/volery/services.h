@@ -23,7 +23,7 @@ inline void log(const std::string& text, const std::string& severity = "info") {
     request("log", Writer().put(text).put(severity));
 }
 
-// Record that something which the application follows has entered a state: note("parcel", "p-1", "ordered").
+// Record that something which the application follows has entered a state: note("point", "gate", "inspected").
 inline void note(const std::string& kind, const std::string& subject, const std::string& state,
                  const std::string& detail = "") {
     request("note", Writer().put(kind).put(subject).put(state).put(detail));
