@@ -11,6 +11,8 @@ settings.load_profile("patient")
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what it sends to the background so,
     signal.signal(signal.SIGINT, signal.default_int_handler)  # and programs that tests start would inherit it
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:  # by nohup; with a handler, programs have the default
+    signal.signal(signal.SIGHUP, lambda *_: None)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -1,4 +1,7 @@
-"""A simulated drone behind a real socket or line, in a thread with a clock of its own; and a flight to it."""
+"""A simulated drone behind a real socket or line, in a thread with a clock of its own; and a flight to it.
+
+The side that flies takes its time from the drone: both see equally much pass, however busy the machine is.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +13,9 @@ from typing import Any
 import pytest
 
 from rigs.airstrip import FRAME, at, dialects
-from volery.base.time import HOUR
+from volery.base.time import HOUR, MS
 from volery.kernel.virtual import VirtualKernel
-from volery.kernel.wall import WallKernel
+from volery.kernel.wall import FollowingKernel
 from volery.links.coded_link import CodedLink
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
@@ -22,13 +25,18 @@ from volery.vehicles.driver import drivers
 
 HERE = "127.0.0.1"
 PACE = 20.0
-"""Times faster than the wall clock, on both sides."""
+"""Times faster than the wall clock, at most."""
+TICK = 10 * MS
 
 
 @contextmanager
-def served(listen: Callable[[VirtualKernel], CodedLink], autopilot: str) -> Iterator[Any]:
-    """The link of a simulated drone, made by *listen*."""
+def served(
+    listen: Callable[[VirtualKernel], CodedLink], autopilot: str, follower: FollowingKernel | None = None
+) -> Iterator[Any]:
+    """The link of a simulated drone, made by *listen*; *follower* is given its time."""
     kernel = VirtualKernel(pace=PACE)
+    if follower is not None:
+        kernel.every(TICK, lambda: follower.advance(TICK))
     _, (flight,) = make_world(kernel.now, [Multirotor()], seed=7, frame=FRAME)
     served_one = Autopilot(kernel, flight, dialects.load(autopilot), warm=True)
     link = listen(kernel)
@@ -39,12 +47,12 @@ def served(listen: Callable[[VirtualKernel], CodedLink], autopilot: str) -> Iter
         yield link
     finally:
         kernel.post(lambda: kernel.cancel(kernel.root, "end"))
-        thread.join(10)
+        thread.join(60)
         link.close()
         assert not thread.is_alive()
 
 
-def flown(kernel: WallKernel, link: CodedLink, autopilot: str) -> None:
+def flown(kernel: FollowingKernel, link: CodedLink, autopilot: str) -> None:
     """There and back."""
     open_driver = drivers.load(autopilot).on_link
     assert open_driver is not None

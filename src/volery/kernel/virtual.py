@@ -41,8 +41,16 @@ NEVER: Ns = -1
 VOID = 0
 
 
+LATE_S = 0.05
+"""Wall time that an event may be late, s, as by the scheduling of a busy machine, and later ones make good."""
+
+
 class Pacer:
-    """Limits virtual time to `pace` seconds per second of wall time. Time that was lost is not caught up."""
+    """Limits virtual time to `pace` seconds per second of wall time. Time that was lost is not caught up.
+
+    What talks to the run from outside lives in wall time: a vehicle that rushed after a pause would take
+    those who command it for silent.
+    """
 
     def __init__(self, pace: float) -> None:
         if pace <= 0.0:
@@ -66,6 +74,8 @@ class Pacer:
         wall, virtual = self._anchor
         ahead = to_seconds(when - virtual) / self.pace - to_seconds(monotonic_ns() - wall)
         if ahead <= 0.0:
+            if ahead < -LATE_S:
+                self._anchor = (monotonic_ns(), when)
             return None
         self._wake_up.wait(min(ahead, LONGEST_WAIT_S))
         passed = int((monotonic_ns() - wall) * self.pace)

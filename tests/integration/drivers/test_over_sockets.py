@@ -7,10 +7,10 @@ import threading
 import pytest
 
 from rigs.airstrip import at
-from rigs.sockets import HERE, PACE, flown, served
+from rigs.sockets import HERE, flown, served
 from volery.base.errors import Overridden, VoleryError
 from volery.base.time import S
-from volery.kernel.wall import WallKernel
+from volery.kernel.wall import FollowingKernel
 from volery.links.stream_links import TcpServer
 from volery.links.udp_link import UdpLink
 from volery.run.connect import connect
@@ -23,17 +23,17 @@ AUTOPILOTS = ("ardupilot", "px4")
 
 @pytest.mark.parametrize("autopilot", AUTOPILOTS)
 def test_tcp(autopilot: str) -> None:
-    with served(lambda kernel: TcpServer(kernel, HERE, 0), autopilot) as server:
-        kernel = WallKernel(speed=PACE)
+    kernel = FollowingKernel()
+    with served(lambda theirs: TcpServer(theirs, HERE, 0), autopilot, kernel) as server:
         address = parse(f"{autopilot}+tcp://{HERE}:{server.port}")
         flown(kernel, open_link(kernel, address), autopilot)
 
 
 @pytest.mark.parametrize("autopilot", AUTOPILOTS)
 def test_udp(autopilot: str) -> None:
-    kernel = WallKernel(speed=PACE)
+    kernel = FollowingKernel()
     ours = UdpLink(kernel, HERE, 0)  # as udp://:PORT does, on a port that is free
-    with served(lambda theirs: UdpLink(theirs, HERE, 0, (HERE, ours.port)), autopilot):
+    with served(lambda theirs: UdpLink(theirs, HERE, 0, (HERE, ours.port)), autopilot, kernel):
         flown(kernel, ours, autopilot)
 
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from rigs.sockets import HERE, PACE, flown, served
+from rigs.sockets import HERE, flown, served
 from volery.base.errors import LinkGarbled
 from volery.kernel.virtual import VirtualKernel
-from volery.kernel.wall import WallKernel
+from volery.kernel.wall import FollowingKernel
 from volery.links.coded_link import CodedLink
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.links.stream_links import SerialLink
@@ -26,15 +26,15 @@ PAPARAZZI = "paparazzi"
 
 
 def test_udp_to_a_host_that_listens() -> None:
-    with served(lambda kernel: UdpLink(kernel, HERE, 0, codec=PPRZLINK), PAPARAZZI) as theirs:
-        kernel = WallKernel(speed=PACE)
+    kernel = FollowingKernel()
+    with served(lambda own: UdpLink(own, HERE, 0, codec=PPRZLINK), PAPARAZZI, kernel) as theirs:
         address = parse(f"paparazzi+udp://{HERE}:{theirs.port}")
         flown(kernel, open_link(kernel, address, PPRZLINK), PAPARAZZI)
 
 
 def test_udp_answering_at_the_uplink_port() -> None:
     """The aircraft speaks from one port and listens at another: here it does so with two links."""
-    kernel = WallKernel(speed=PACE)
+    kernel = FollowingKernel()
 
     def aircraft(theirs: VirtualKernel) -> CodedLink:
         return UdpLink(theirs, HERE, 0, (HERE, ours.port), codec=PPRZLINK)
@@ -43,7 +43,7 @@ def test_udp_answering_at_the_uplink_port() -> None:
     ours = UdpLink(kernel, HERE, 0, codec=PPRZLINK, answers_to=deaf.port)
     received: list[str] = []
     deaf.receive(lambda frame: received.append(frame.name))
-    with served(aircraft, PAPARAZZI):
+    with served(aircraft, PAPARAZZI, kernel):
         drone = Drone(kernel, "drone_1", open_driver(kernel, ours, "drone_1", {}))
         kernel.start()
         with kernel.adopt("script"):
@@ -65,9 +65,9 @@ def test_a_serial_line() -> None:
         def _open(self) -> Any:
             return _Master(theirs)
 
-    kernel = WallKernel(speed=PACE)
+    kernel = FollowingKernel()
     address = parse(f"paparazzi+serial://{os.ttyname(ours)}")
-    with served(lambda virtual: Line(virtual, "master", 115_200, "master", PPRZLINK), PAPARAZZI):
+    with served(lambda virtual: Line(virtual, "master", 115_200, "master", PPRZLINK), PAPARAZZI, kernel):
         flown(kernel, open_link(kernel, address, PPRZLINK), PAPARAZZI)
     os.close(ours)
 
@@ -92,9 +92,9 @@ class _Master:
 
 
 def test_another_autopilot_than_the_one_meant() -> None:
-    kernel = WallKernel(speed=PACE)
+    kernel = FollowingKernel()
     ours = UdpLink(kernel, HERE, 0, codec=PPRZLINK)
-    with served(lambda theirs: UdpLink(theirs, HERE, 0, (HERE, ours.port)), "ardupilot"):
+    with served(lambda theirs: UdpLink(theirs, HERE, 0, (HERE, ours.port)), "ardupilot", kernel):
         drone = Drone(kernel, "drone_1", open_driver(kernel, ours, "drone_1", {}))
         kernel.start()
         try:

@@ -283,9 +283,12 @@ def test_a_pacer_lets_pass_what_passes_on_the_wall_and_makes_nothing_good(
     assert pacer.wait(6 * S, 6 * S) is None
     wall[0] = 5 * S
     assert pacer.wait(6 * S, 10 * S) is None  # no ring: it would wait for ever
+    wall[0] = 9 * S
+    assert pacer.wait(10 * S, 11 * S) is None  # 7 s too late
+    assert cut_short(11 * S, 19 * S) == 11 * S
     pacer.rest()
     wall[0] = 500 * S
-    assert cut_short(10 * S, 11 * S) == 10 * S
+    assert cut_short(11 * S, 12 * S) == 11 * S
 
 
 def test_the_watchdog_names_component_and_line_of_code_that_freezes_virtual_time() -> None:
