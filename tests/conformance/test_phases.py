@@ -28,7 +28,7 @@ def phases() -> ModuleType:
     return module
 
 
-@pytest.mark.timeout(600)  # and therefore begun first: 360 flights of PX4
+@pytest.mark.timeout(1000)  # and therefore begun first: 360 flights of PX4
 @pytest.mark.parametrize("autopilot", NOT_REACHED)
 def test_simulated_phases_are_within_the_aims(autopilot: str, phases: ModuleType) -> None:
     compared = phases.compare(autopilot)

@@ -17,7 +17,7 @@ import pytest
 
 from rigs.requirements import lacking
 
-pytestmark = [pytest.mark.integration, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(1200)]
 
 ROOT = Path(__file__).parents[2]
 OLD_PROCESSOR = {

@@ -66,6 +66,6 @@ def test_the_same_bytes_whatever_the_hash_seed(tmp_path: Path) -> None:
         folder = tmp_path / hash_seed
         folder.mkdir()
         with run_writer(folder, 20.0, "go", hash_seed) as process:
-            assert process.wait(60) == 0
+            assert process.wait(300) == 0
         contents.append([(folder / name).read_bytes() for name in ("trace.mcap", "timeline.json")])
     assert contents[0] == contents[1]

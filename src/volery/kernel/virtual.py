@@ -42,7 +42,7 @@ VOID = 0
 
 
 LATE_S = 0.05
-"""Wall time that an event may be late, s, as by the scheduling of a busy machine, and later ones make good."""
+"""How late an event may be, s of wall time, for the later ones to be in time again."""
 
 
 class Pacer:

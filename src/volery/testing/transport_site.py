@@ -12,7 +12,7 @@ from volery.kernel.task import ExecutionContext
 from volery.ros.graph.interface import Node, RosGraph
 from volery.testing.checks import demand
 
-LIMIT: Ns = 30 * S
+LIMIT: Ns = 120 * S
 """Longest wait for something that must happen, ns; DDS repeats a lost announcement only after seconds."""
 QUIET: Ns = 300 * MS
 """Time of waiting for something that must not happen, ns."""

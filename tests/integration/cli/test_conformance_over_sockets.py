@@ -22,7 +22,7 @@ pytestmark = pytest.mark.integration
 
 HERE = "127.0.0.1"
 COMMAND = (sys.executable, "-c", "from volery.cli.main import main; main()")
-WITHIN_S = 150
+WITHIN_S = 300
 
 
 @contextmanager
@@ -41,7 +41,7 @@ def served(autopilot: str, faster: int) -> Iterator[str]:
         yield f"{autopilot}+{where}"
     finally:
         vehicle.kill()
-        vehicle.wait(10)
+        vehicle.wait(WITHIN_S)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def is_armed(address: str) -> bool:
     where = address.partition("+")[2].replace("tcp://", "tcp:")
     station = mavutil.mavlink_connection(where, source_system=254)
     try:
-        heartbeat = station.recv_match(type="HEARTBEAT", blocking=True, timeout=10)
+        heartbeat = station.recv_match(type="HEARTBEAT", blocking=True, timeout=WITHIN_S)
         assert heartbeat is not None
         return bool(heartbeat.base_mode & mavutil.mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
     finally:
@@ -120,7 +120,8 @@ def test_sigterm_lands_it_and_keeps_the_results(address: str, tmp_path: Path) ->
     station = mavutil.mavlink_connection(address.partition("+")[2].replace("tcp://", "tcp:"))
     armed = mavutil.mavlink.MAV_MODE_FLAG_SAFETY_ARMED
     assert any(
-        station.recv_match(type="HEARTBEAT", blocking=True, timeout=10).base_mode & armed for _ in range(200)
+        station.recv_match(type="HEARTBEAT", blocking=True, timeout=WITHIN_S).base_mode & armed
+        for _ in range(200)
     )
     station.close()
     running.send_signal(signal.SIGTERM)

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.integration
 ROOT = Path(__file__).parents[3]
 TUTORIAL = ROOT / "docs" / "tutorial"
 PAGES = ("install.md", "first-flight.md", "first-service.md")
-WITHIN_S = 200
+WITHIN_S = 600
 
 _FILE = re.compile(r"[Ss]ave this as `([^`]+)`:$")
 _INSTALL = re.compile(r"(python3 -m venv|\. \.venv|pip install) *(.*)")

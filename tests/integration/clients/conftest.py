@@ -19,7 +19,7 @@ import pytest
 from rigs.requirements import lacking
 
 HERE = "127.0.0.1"
-WITHIN_S = 60.0
+WITHIN_S = 200.0
 """Longer than anything here takes on a busy machine; nothing waits so long unless it fails."""
 
 AGAIN_S = 6.0

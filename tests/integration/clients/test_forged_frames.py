@@ -82,7 +82,7 @@ class Forger:
 
     def close(self) -> None:
         self._end.send(b".")
-        self._thread.join(30.0)
+        self._thread.join(200.0)
         for one in (self._vehicle, self._listener, self._ends, self._end):
             one.close()
 

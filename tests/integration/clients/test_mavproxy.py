@@ -15,7 +15,6 @@ from pymavlink import DFReader
 pytestmark = pytest.mark.integration
 
 GUIDED = 4
-WITHIN_S = 30.0
 SCRIPT = Path(sys.executable).with_name("mavproxy.py")
 
 

@@ -199,7 +199,7 @@ def test_all_parameters_are_read_as_one_file(tower: Any, tmp_path: Path) -> None
     client = MAVFTP(tower.connection, 1, 1)
     file = tmp_path / "all.param"
     client.cmd_getparams([str(file)])
-    client.process_ftp_reply("getparams", timeout=60)
+    client.process_ftp_reply("getparams", timeout=200)
     lines = file.read_text(encoding="utf-8").splitlines()
     assert len(lines) == COUNT_OF_PARAMETERS
     values = dict(line.replace(",", " ").split()[:2] for line in lines)

@@ -57,7 +57,7 @@ def peer(speak: Callable[[socket.socket], None]) -> Iterator[str]:
             yield f"ardupilot+tcp://{HERE}:{listener.getsockname()[1]}"
         finally:
             over.set()
-            thread.join(10)
+            thread.join(300)
 
 
 def test_no_listener() -> None:

@@ -75,7 +75,7 @@ def served(notes: Path, descriptors: int | None = None) -> Iterator[int]:
             assert process.poll() is None, "the server has ended"
         finally:
             process.terminate()
-            process.wait(30)
+            process.wait(300)
 
 
 def assert_served(client: socket.socket) -> None:
@@ -166,6 +166,6 @@ def wait_at_a_high_descriptor() -> None:
     reader = ReaderThread("high", lambda thread: read.append(thread.readable(high)))
     theirs.sendall(b"!")
     reader.start()
-    reader._thread.join(10)
+    reader._thread.join(300)
     assert read == [True]
     reader.stop()

@@ -211,7 +211,7 @@ def served(*listening: tuple[str, int]) -> Iterator[None]:
         for one in processes:
             one.terminate()
         for one in processes:
-            one.communicate(timeout=20)
+            one.communicate(timeout=300)
 
 
 @pytest.mark.integration

@@ -130,7 +130,7 @@ print(drone.armed)
 
 def test_connect_in_a_plain_script():
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-c", SCRIPT], capture_output=True, text=True, timeout=300, check=False
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["10", "GUIDED", "False"]  # whoever leaves it in the air has it landed

@@ -19,7 +19,7 @@ from volery.trace.reader import read
 
 from .conftest import HERE
 
-LIMIT_S = 60
+LIMIT_S = 200
 Said = dict[str, list[bytes]]
 
 MODEL = """

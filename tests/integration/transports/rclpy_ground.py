@@ -11,7 +11,7 @@ import rclpy
 from sensor_msgs.msg import NavSatFix
 from std_srvs.srv import Empty
 
-LIMIT_S = 60.0
+LIMIT_S = 100.0
 
 
 def main(namespace: str) -> None:

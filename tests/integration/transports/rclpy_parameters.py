@@ -10,7 +10,7 @@ import rclpy
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 
-LIMIT_S = 60
+LIMIT_S = 200
 
 
 def main(of, name, value):

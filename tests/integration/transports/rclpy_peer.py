@@ -16,7 +16,7 @@ from rclpy.parameter_client import AsyncParameterClient
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-LIMIT_S = 40
+LIMIT_S = 200
 
 
 def fill(message, number=1):

@@ -27,6 +27,7 @@ from volery.ros.transports.ros2 import carried, ros2_graph
 from volery.ros.transports.ros2.rclpy_types import rclpy_class
 from volery.testing.checks import demand, raising
 from volery.testing.transport_conformance import ROS2, Site, no_fault, run_checks
+from volery.testing.transport_site import LIMIT
 from volery.trace.events import Text
 
 STRING = "std_msgs/msg/String"
@@ -65,8 +66,8 @@ def a_type_without_support(site: Site, texts: list[str]) -> None:
     node.serve("set_mode", SET_MODE, lambda asked: kind.response(asked.custom_mode == "LAND"))
     site.spinning(node)
     client = other.client("set_mode", SET_MODE)
-    demand(client.wait(30 * S), "it is served")
-    demand(client.call(request(SET_MODE, custom_mode="LAND"), 30 * S).mode_sent, "it is answered")
+    demand(client.wait(LIMIT), "it is served")
+    demand(client.call(request(SET_MODE, custom_mode="LAND"), LIMIT).mode_sent, "it is answered")
 
 
 def a_type_with_other_fields(site: Site, texts: list[str]) -> None:
@@ -194,7 +195,7 @@ def a_thousand_topics(site: Site, texts: list[str]) -> None:
     publishers = [speaker.advertise(f"t{number}", STRING) for number in range(500)]
     for number in range(500):
         listener.subscribe(f"t{number}", STRING, lambda one: heard.append(one.data))
-    site.until(speaker, lambda: all(one.subscribers() for one in publishers), "all connect", 60 * S)
+    site.until(speaker, lambda: all(one.subscribers() for one in publishers), "all connect", 300 * S)
     for number, publisher in enumerate(publishers):
         publisher.publish(new(STRING, data=str(number)))
     site.spin_until(listener, lambda: len(heard) == 500, "all are heard")

@@ -11,7 +11,7 @@ def main(named: list[str]) -> None:
     while shown != before or not all(f'"{name}"' in shown for name in named):
         before = shown
         asked = [*COMMAND, "ros", "graph", "ros2", "--within", "0", "--json"]
-        shown = subprocess.run(asked, capture_output=True, text=True, timeout=60, check=True).stdout
+        shown = subprocess.run(asked, capture_output=True, text=True, timeout=200, check=True).stdout
     sys.stdout.write(shown)
 
 

@@ -12,10 +12,10 @@ from typing import Any
 
 import pytest
 
-from .conftest import HERE, python_of, surroundings
+from .conftest import HERE, LIMIT_S, python_of, surroundings
 from .test_dji_on_ros1 import COMMAND
 
-pytestmark = [pytest.mark.integration, pytest.mark.timeout(240)]
+pytestmark = pytest.mark.integration
 
 Beside = Callable[..., dict[str, Any]]
 
@@ -40,7 +40,9 @@ def beside() -> Iterator[Beside]:
         )
         started.append(subprocess.Popen([*bridge, *options, "--quiet"], env=around))
         command = [python, str(HERE / script), argument]
-        done = subprocess.run(command, env=around, capture_output=True, text=True, timeout=150, check=False)
+        done = subprocess.run(
+            command, env=around, capture_output=True, text=True, timeout=LIMIT_S, check=False
+        )
         assert done.returncode == 0, done.stderr[-3000:]
         found: dict[str, Any] = json.loads(done.stdout)
         return found
@@ -48,7 +50,7 @@ def beside() -> Iterator[Beside]:
     yield run
     for bridge in started:
         bridge.send_signal(signal.SIGINT)
-        assert bridge.wait(60) == 0
+        assert bridge.wait(LIMIT_S) == 0
 
 
 def test_plain_rclpy_hears_a_vehicle_and_arms_it(beside: Beside) -> None:

@@ -30,11 +30,11 @@ from volery.run.distributed.call_types import call_types
 
 from .conftest import python_of, surroundings
 
-pytestmark = [pytest.mark.integration, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(1000)]
 
 DELIVERY = Path(__file__).parents[3] / "examples" / "delivery"
 LIMIT_S = 400
-LEAVE_S = 90
+LEAVE_S = 150
 """Longest time until the components have ended after their run."""
 SETTINGS = ("--seed", "7", "--speed", "1.5", "--set", "run.duration=300s")
 
@@ -334,7 +334,7 @@ def test_in_reality_a_component_waits_for_its_services_and_ends_with_sigterm(ros
         assert said == "GOOD MORNING\n"
         for process in (speaker, echoer):
             process.send_signal(signal.SIGTERM)
-        assert [process.wait(60) for process in (speaker, echoer)] == [0, 0]
+        assert [process.wait(LEAVE_S) for process in (speaker, echoer)] == [0, 0]
     finally:
         for process in (speaker, echoer):
             process.kill()

@@ -57,7 +57,7 @@ def tutorial_msgs(tmp_path_factory: pytest.TempPathFactory) -> Path:
         generator = f"/usr/lib/genpy/gen{kind}_py.py"
         include = ["-I", "std_msgs:/usr/share/std_msgs/msg", "-p", "tutorial_msgs", "-o", str(output)]
         for command in (sources, ["--initpy"]):
-            subprocess.run(["/usr/bin/python3", generator, *command, *include], check=True, timeout=30)
+            subprocess.run(["/usr/bin/python3", generator, *command, *include], check=True, timeout=LIMIT_S)
     (made / "tutorial_msgs" / "__init__.py").touch()
     return made
 

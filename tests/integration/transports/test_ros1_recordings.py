@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from volery.base.time import MS, S
+from volery.ros.graph import QoS
 from volery.ros.messages import message_class, new
 from volery.ros.messages.bags import create_bag, open_bag
 from volery.ros.messages.containers import Offer
@@ -26,6 +27,8 @@ TALKER = ("/usr/bin/python3", str(HERE / "ros_files" / "ros1" / "talker.py"))
 LISTENER = ("/usr/bin/python3", str(HERE / "ros_files" / "ros1" / "listener.py"))
 VOLERY = (sys.executable, "-c", "from volery.cli.main import main; main()")
 COUNT = 30
+ALL = QoS(depth=COUNT)
+"""Of a subscription that loses nothing, however late its callbacks run."""
 
 Volery = Callable[..., Any]
 
@@ -69,8 +72,8 @@ def test_rosbag_plays_ours(bag: Path, ours: Ours, ros: Run) -> None:
     node = ours.spinning("listener")
     heard: dict[str, list[Any]] = {"/pose": [], "/words": [], "/state": []}
     for topic, kind in (("/pose", POSE), ("/words", STRING), ("/state", "mavros_msgs/msg/State")):
-        node.subscribe(topic, kind, heard[topic].append)
-    ros("rosbag", "play", "--quiet", "--delay", "1", "--rate", "4", str(bag))
+        node.subscribe(topic, kind, heard[topic].append, ALL)
+    ros("rosbag", "play", "--quiet", "--wait-for-subscribers", "--rate", "4", str(bag))
     ours.until(lambda: all(len(one) == COUNT for one in heard.values()), "all is heard")
     written = {topic: [one.message for one in open_bag(bag).messages([topic])] for topic in heard}
     assert heard == written
@@ -87,14 +90,14 @@ def test_we_read_and_play_what_rosbag_records(
         publisher.publish(new(STRING, data=f"word {number}"))
         ours.graph.kernel.sleep_until(ours.graph.kernel.now() + 20 * MS)
     ros("rosnode", "kill", "/recording")
-    recording.communicate(timeout=10)
+    recording.communicate(timeout=LIMIT_S)
     told = volery("ros", "bag", "info", path)
     assert (told["format"], told["complete"]) == ("rosbag 1", True)
     assert told["topics"] == [{"name": "/words", "type": STRING, "messages": COUNT}]
     heard: list[str] = []
     speaker.close()
-    ours.spinning("listener").subscribe("/words", STRING, lambda one: heard.append(one.data))
-    assert volery("ros", "bag", "play", path, "--rate", "5") == {"played": COUNT}
+    ours.spinning("listener").subscribe("/words", STRING, lambda one: heard.append(one.data), ALL)
+    assert volery("ros", "bag", "play", path, "--rate", "5", "--wait-for-subscribers") == {"played": COUNT}
     ours.until(lambda: len(heard) == COUNT, "all is heard")
     assert heard == [f"word {number}" for number in range(COUNT)]
 
@@ -109,8 +112,8 @@ def test_a_recording_that_was_cut_short_is_played_as_far_as_it_is_whole(
     assert not told["complete"]
     assert 0 < whole["/words"] < COUNT
     heard: list[str] = []
-    ours.spinning("listener").subscribe("/words", STRING, lambda one: heard.append(one.data))
-    played = volery("ros", "bag", "play", cut, "--rate", "10", "--topic", "/words")
+    ours.spinning("listener").subscribe("/words", STRING, lambda one: heard.append(one.data), ALL)
+    played = volery("ros", "bag", "play", cut, "--rate", "10", "--topic", "/words", "--wait-for-subscribers")
     assert played == {"played": whole["/words"]}
     ours.until(lambda: len(heard) == whole["/words"], "what is whole is heard")
     assert heard == [f"word {number}" for number in range(whole["/words"])]
@@ -126,7 +129,7 @@ def test_our_record_of_rospys_talker(
     node.subscribe("/chatter", STRING, heard.append)
     ours.until(lambda: len(heard) > 5, "the talker talks")
     recording.send_signal(signal.SIGINT)
-    recording.communicate(timeout=20)
+    recording.communicate(timeout=LIMIT_S)
     assert recording.returncode == 0
     said = [one.message.data for one in open_bag(path).messages()]
     assert said == [f"hello, number {number}" for number in range(len(said))]

@@ -11,7 +11,7 @@ from volery.base.time import S
 from volery.ros.graph import LATCHED
 from volery.ros.messages import message_class, new, request, service
 
-from .conftest import Ours, Run, Start
+from .conftest import LIMIT, LIMIT_S, Ours, Run, Start
 
 pytestmark = pytest.mark.integration
 
@@ -144,7 +144,7 @@ def test_roscpp(ours: Ours, start: Start, roscpp_peer: str) -> None:
     ours.until(lambda: len(heard) == 2, "roscpp answers")
     assert set(heard) == {"roscpp heard us", "roscpp was told by volery"}
     client = node.client("roscpp_set", SET_BOOL)
-    assert client.wait(30 * S)
+    assert client.wait(LIMIT)
     answer = client.call(request(SET_BOOL, data=True), 30 * S)
     assert (answer.success, answer.message) == (True, "roscpp")
 
@@ -174,7 +174,7 @@ except Exception as error:
     print(type(error).__name__, error)
 """
     done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=LIMIT_S, check=False
     )
     assert "LinkSilent no ROS master answers" in done.stdout, done.stdout + done.stderr
     assert "start roscore or set ROS_MASTER_URI" in done.stdout

@@ -13,9 +13,9 @@ import pytest
 
 from volery.testing.transport_conformance import CHECKS
 
-from .conftest import HERE, python_of, surroundings
+from .conftest import HERE, LIMIT_S, python_of, surroundings
 
-pytestmark = [pytest.mark.integration, pytest.mark.timeout(240)]
+pytestmark = pytest.mark.integration
 
 DISTRIBUTIONS = ("jazzy", "kilted")
 FAULTS = (
@@ -40,7 +40,7 @@ def findings(distribution: str) -> dict[str, str]:
         env=surroundings(),
         capture_output=True,
         text=True,
-        timeout=200,
+        timeout=600,
         check=False,
     )
     assert done.returncode == 0, done.stderr[-3000:]
@@ -74,7 +74,7 @@ def our_node(distribution: str, around: Mapping[str, str]) -> Iterator[list[str]
         yield names
         process.stdin.write("x")
         process.stdin.flush()
-        assert process.wait(20) == 0
+        assert process.wait(LIMIT_S) == 0
     finally:
         process.kill()
         process.communicate()
@@ -89,7 +89,7 @@ def test_plain_rclpy_exchanges_all_types_with_us(ours: str, theirs: str) -> None
             env=around,
             capture_output=True,
             text=True,
-            timeout=120,
+            timeout=LIMIT_S,
             check=False,
         )
         assert done.returncode == 0, done.stderr[-3000:]

@@ -23,7 +23,7 @@ def flown(**settings):
         env=environment,
         capture_output=True,
         text=True,
-        timeout=170,
+        timeout=600,
         check=False,
     )
     assert run.returncode == 0, run.stderr

@@ -103,6 +103,9 @@ def play(
         float,
         typer.Option(help="Seconds to wait before the first and after the last message."),
     ] = 0.5,
+    wait_for_subscribers: Annotated[
+        bool, typer.Option("--wait-for-subscribers", help="Wait until each topic has a subscriber.")
+    ] = False,
     allow_loss: AllowLoss = False,
 ) -> int:
     """Play a recording into a real ROS graph."""
@@ -124,6 +127,7 @@ def play(
             after,
             clock,
             delay,
+            wait_for_subscribers,
             lambda played, at: show(to_seconds(at - bag.start)),
         )
         played = play_bag(node, bag, options)

@@ -124,6 +124,7 @@ def _offer(offered: Collection[QoS]) -> Offer:
 
 _DEPTH = 100
 _CLOCK_PERIOD: Ns = 10 * MS
+_LOOK_PERIOD: Ns = 50 * MS
 _LATCHED = frozenset({"/tf_static", "/robot_description", "/map"})
 """Topics that are latched by ROS's conventions, for recordings that do not state it."""
 
@@ -139,6 +140,7 @@ class PlayOptions:
         clock: Publish the recorded time on ``/clock``.
         delay: Time between advertising and the first message, and after the last one, s; connecting takes
             time on a real graph.
+        wait_for_subscribers: Wait until each topic has a subscriber, before the delay.
         on_message: Called for each message with the number of played messages and its recorded time, ns.
     """
 
@@ -147,6 +149,7 @@ class PlayOptions:
     after: float = 0.0
     clock: bool = False
     delay: float = 0.0
+    wait_for_subscribers: bool = False
     on_message: Callable[[int, Ns], None] = lambda played, at: None
 
     def __post_init__(self) -> None:
@@ -168,6 +171,8 @@ def play(node: Node, bag: Bag, how: PlayOptions = PlayOptions()) -> int:
     publishers = _advertise(node, bag, how)
     clock = node.advertise(CLOCK, "rosgraph_msgs/msg/Clock", QoS(1)) if how.clock else None
     begin = bag.start + from_seconds(how.after)
+    while how.wait_for_subscribers and not all(one.subscribers() for one in publishers.values()):
+        node.sleep(_LOOK_PERIOD)
     node.sleep(from_seconds(how.delay))
     started = node.now()
     ticked: Ns = begin - _CLOCK_PERIOD

@@ -154,7 +154,8 @@ class ClientLibrary(Protocol):
 
 
 T = TypeVar("T")
-PATIENCE: Ns = 10 * S
+PATIENCE: Ns = 60 * S
+"""Longest wait for a client library, ns: on a small computer it compiles, or discovers, for long."""
 _waiting: dict[Kernel, list[str]] = {}
 """Names of the tasks that wait for a thread, for kernels where there are any."""
 POLL_S = 0.05

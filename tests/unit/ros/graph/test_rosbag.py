@@ -53,6 +53,26 @@ def test_a_recording_is_played_in_time(rig: Rig, bag: Bag, rate: float) -> None:
     assert played == [10]
 
 
+def test_a_recording_waits_for_subscribers(rig: Rig, bag: Bag) -> None:
+    heard: list[Any] = []
+    how = PlayOptions(topics=["/words"], wait_for_subscribers=True)
+
+    def player() -> None:
+        play(rig.graph.node("player"), bag, how)
+
+    def late() -> None:
+        node = rig.graph.node("late")
+        node.sleep(60 * S)
+        node.subscribe("/words", "std_msgs/String", lambda words: heard.append(words.data))
+        node.sleep(10 * S)
+        node.spin_once(0)
+        while node.spin_once(0):
+            pass
+
+    rig.run(player, late)
+    assert heard == [f"step {number}" for number in range(5)]
+
+
 def test_only_some_topics_from_a_moment_on(rig: Rig, bag: Bag) -> None:
     heard: list[Any] = []
     told: list[Any] = []

@@ -10,7 +10,10 @@ from std_msgs.msg import String
 class Pairs:
     def __init__(self):
         self.found = rospy.Publisher("pairs", String, queue_size=100)
+        self.seen = rospy.Publisher("seen", String, queue_size=100)
         while self.found.get_num_connections() < rospy.get_param("~listeners"):
+            rospy.sleep(0.05)
+        while self.seen.get_num_connections() < 1:
             rospy.sleep(0.05)
         self.left = message_filters.Subscriber("left", PointStamped, queue_size=10)
         self.right = message_filters.Subscriber("right", PointStamped, queue_size=10)
@@ -19,6 +22,8 @@ class Pairs:
         exact.registerCallback(self.tell, "same")
         near = message_filters.ApproximateTimeSynchronizer([self.left, self.right], 5, 0.025)
         near.registerCallback(self.tell, "near")
+        for camera in (self.left, self.right):  # after the filters: they are through with it
+            camera.registerCallback(lambda image: self.seen.publish(f"{image.point.x:g}"))
 
     def tell(self, left, right, how):
         oldest, last = self.cache.getOldestTime(), self.cache.getLastestTime()
