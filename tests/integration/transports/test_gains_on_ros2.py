@@ -22,27 +22,22 @@ def test_a_gain_that_rclpy_sets_is_used_in_flight(tmp_path: Path) -> None:
     out = tmp_path / "run"
     python, environment = python_of("jazzy"), surroundings()
     arguments = ["control", "go", "rotation", "--graph", "ros2", "--angle", "0", "--angle", "30"]
-    arguments += ["--hold", "20"]  # rclpy starts in the meantime, also on a busy machine
+    arguments += ["--hold", "20"]  # in which the gain is set
     arguments += ["--on", "sim:ardupilot?start=warm", "--speed", "3", "--out", str(out)]
-    flight = subprocess.Popen(
-        [python, "-c", FLIGHT, *arguments], env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
-    )
+    told = {"env": environment, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    tune = [python, str(HERE / "rclpy_parameters.py"), "/volery_go", "yaw.kp", "1.5"]
+    tuner = subprocess.Popen(tune, **told)  # before the flight, for which it waits
+    flight = subprocess.Popen([python, "-c", FLIGHT, *arguments], **told)
     try:
-        tuner = subprocess.run(
-            [python, str(HERE / "rclpy_parameters.py"), "/volery_go", "yaw.kp", "1.5"],
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=LIMIT_S,
-            check=False,
-        )
-        assert tuner.returncode == 0, tuner.stderr[-2000:]
-        assert float(tuner.stdout) == 2.2
-        said, _ = flight.communicate(timeout=LIMIT_S)
-        assert flight.returncode == 0, said[-2000:]
+        said, why = tuner.communicate(timeout=LIMIT_S)
+        assert tuner.returncode == 0, why[-2000:]
+        assert float(said) == 2.2
+        _, why = flight.communicate(timeout=LIMIT_S)
+        assert flight.returncode == 0, why[-2000:]
     finally:
-        flight.kill()
-        flight.communicate()
+        for process in (tuner, flight):
+            process.kill()
+            process.communicate()
     events = list(read(out / "trace.mcap").events)
     assert any("are in use" in one.text for one in events if isinstance(one, Text))
     turn = [
