@@ -6,6 +6,8 @@ component has computed so far is served first.
 
 from __future__ import annotations
 
+from typing import Any
+
 from volery.base.errors import UsageError
 from volery.base.time import from_seconds, to_seconds
 from volery.components.instance import ComponentContext, Instance
@@ -101,13 +103,21 @@ def note(kind: str, subject: str, state: str, detail: str = "") -> None:
 
     Args:
         kind: Kind of thing.
-        subject: Its name.
+        subject: Its name. What is no text, such as a number, is written as one; also in the other arguments.
         state: State that it has entered.
         detail: Text for the reader of the report.
+
+    Raises:
+        UsageError: An argument is None.
     """
     kernel, task = caller("volery.note()")
+    words: dict[str, Any] = {"kind": kind, "subject": subject, "state": state, "detail": detail}
+    for name, word in words.items():
+        if word is None:
+            raise UsageError(f"volery.note(): {name} is None; give a text")
+        words[name] = str(word).encode(errors="backslashreplace").decode()  # surrogates are no UTF-8
     with kernel:
-        kernel.record(Milestone(kernel.now(), task.context.component, kind, subject, state, detail))
+        kernel.record(Milestone(kernel.now(), task.context.component, **words))
 
 
 def log(text: str, severity: str = "info") -> None:

@@ -272,6 +272,25 @@ def test_api_calls_find_the_run_and_the_component(desk):
     assert charges == [("stated", 75, 0.0), ("stated", 10, 0.5)]
 
 
+def test_a_note_is_written_as_text_and_none_is_refused(desk):
+    path = desk.write(
+        "user.py",
+        """
+        from volery.components.component_api import note
+
+        class User:
+            def run(self):
+                note("point", 3, "\\udc80", 0.5)
+                note("point", 4, None)
+        """,
+    )
+    desk.start(path, "User")
+    desk.kernel.run(S)
+    [(_, error)] = desk.failures
+    assert "volery.note(): state is None; give a text" in str(error)
+    assert desk.of(Milestone) == [Milestone(0, "user", "point", "3", "\\udc80", "0.5")]
+
+
 def test_api_calls_outside_a_run_are_refused():
     with pytest.raises(UsageError, match="works in a component or a mission of a run only"):
         component_api.note("parcel", "p-1", "ordered")
