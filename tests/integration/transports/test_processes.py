@@ -17,7 +17,7 @@ import pytest
 
 from volery.ros.messages import from_cdr
 from volery.ros.transports.ros1 import Roscore
-from volery.ros.transports.ros1.master import master_answers
+from volery.ros.transports.ros1.master import Master, master_answers
 from volery.trace.events import Message, Published, Text
 from volery.trace.reader import read
 
@@ -199,6 +199,9 @@ def test_what_a_component_raises_reaches_its_caller_in_another_process(roscore: 
     assert said[0] == "Words(text='HELLO', times=(1, 2))"
     assert said[1] == "echoer: fall raised ValueError: no voice (echoer.py:10)"
     assert said[2] == "slept until 1"
+    assert (
+        Master(roscore.uri, "/test").find("getParam", "/use_sim_time") is None
+    )  # or others would stand still
 
 
 def test_a_process_that_dies_ends_the_run_by_its_name(roscore: Roscore, pair: Path) -> None:

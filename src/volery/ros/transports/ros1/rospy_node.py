@@ -49,6 +49,7 @@ from volery.ros.transports.ros1.rospy_copy import (
 from volery.ros.transports.transport_graph import TransportGraph
 
 GOODBYE_S = 2.0
+SIM_TIME = "/use_sim_time"
 Aside = Callable[[Callable[[], object]], None]
 """Executes something in a thread: the caller must not wait for a master that may be gone."""
 ANY = "*"
@@ -370,6 +371,7 @@ class Ros1Library:
         self._guard = threading.Lock()
         self._over = threading.Event()
         self._log: _ToTrace | None = None
+        self._restore_time: Callable[[], object] = lambda: None
         self.say: Callable[[str], None] = lambda text: None
 
     def start(self) -> None:
@@ -441,12 +443,17 @@ class Ros1Library:
         return [ServiceState(name, "", nodes[0] if nodes else "") for name, nodes in sorted(services)]
 
     def announce_clock(self) -> None:
-        """Set ``/use_sim_time``, which every node reads when it starts."""
-        self._master.value("setParam", "/use_sim_time", True)
+        """Set ``/use_sim_time``, which every node reads when it starts, until the graph is left."""
+        before = self._master.find("getParam", SIM_TIME)
+        restored = ("deleteParam", SIM_TIME) if before is None else ("setParam", SIM_TIME, before)
+        self._master.value("setParam", SIM_TIME, True)
+        self._restore_time = partial(self._master.ask, *restored)
 
     def close(self) -> None:
-        """Stop watching the master, and the roscore if this process started it."""
+        """Restore the time of the master, and stop watching it; stop a roscore that this process started."""
         self._over.set()
+        with suppress(LinkError):  # the master is gone
+            self._restore_time()
         if self._log is not None:
             for name in LOGGERS:
                 logging.getLogger(name).removeHandler(self._log)
