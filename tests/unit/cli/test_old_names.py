@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -45,6 +46,18 @@ def test_old_names_are_in_no_help():
     top = get_command(application())
     assert not MOVED.keys() & top.commands.keys()
     assert len(top.commands) <= 14
+
+
+def test_old_spellings_are_shown_nowhere():
+    root = Path(__file__).parents[3]
+    shown = re.compile(rf"(?<![\w/.-])volery ({'|'.join(MOVED)})(?![\w.=-])")
+    texts = [root / "README.md", *(root / "docs").rglob("*.md"), *(root / "examples").rglob("*.md")]
+    found = [
+        f"{file.relative_to(root)}: {one[0]}"
+        for file in (*texts, *(root / "src").rglob("*.py"))
+        for one in shown.finditer(file.read_text(encoding="utf-8"))
+    ]
+    assert found == []
 
 
 def said(monkeypatch, capsys, *words):
