@@ -8,7 +8,7 @@ joined by dots. The entry that is set may be new; what leads to it must exist or
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 
 from volery.base import files
@@ -16,6 +16,7 @@ from volery.base.errors import Location, ModelError, UsageError
 from volery.model import rules
 from volery.model.builder import TEXT_NAME, ModelBuilder
 from volery.model.document import GEOGRAPHY, keys_at, names_are_free, short_key
+from volery.model.replication import is_counted, leads_to_copy, replicate
 from volery.model.system import Source
 from volery.model.text import (
     Node,
@@ -148,13 +149,21 @@ NOT_PLACES = ("extends", "set")
 
 @dataclass
 class Assembly:
-    """The tree of one allocation and one scenario. ``places`` is the allocation with what it extends."""
+    """The tree of one allocation and one scenario. ``places`` is the allocation with what it extends.
+
+    ``stated`` is the tree before a number of vehicles is replaced by the copies.
+    """
 
     root: Node
     sources: tuple[Source, ...]
+    stated: Node = field(init=False)
     allocation: str = ""
     scenario: str = ""
     places: dict[str, Node] | None = None
+
+    def __post_init__(self) -> None:
+        """See ``stated``."""
+        self.stated = self.root
 
 
 @dataclass(frozen=True)
@@ -203,10 +212,17 @@ def model_file(path: str | FilePath) -> FilePath:
 def read_tree(file: FilePath) -> Node:
     """Return the tree of a model as its files state it, without an allocation or a scenario.
 
+    A number of vehicles is replaced by the copies; the geography is part of the tree then.
+
     Raises:
         ModelError: a file cannot be read, or is no YAML of a model.
     """
     made, problems = _read_files(file)
+    environment = made.root.child("environment")
+    if environment is not None and is_counted(made.root):
+        _merge_world(made, file.parent, [], problems)
+        environment.items.pop("world", None)
+        made.root = replicate(made.root, None, problems)
     problems.raise_if_any()
     return made.root
 
@@ -291,15 +307,22 @@ def assemble(model: FilePath | ModelBuilder, selection: Selection) -> tuple[Asse
     made, problems = _built(model) if isinstance(model, ModelBuilder) else _read_files(model)
     folder = model.folder if isinstance(model, ModelBuilder) else model.parent
     root = made.root
-    early, late = _parted(selection.options)
+    early, others = _parted(selection.options)
     apply_changes(root, early, problems)
     all_changes = [
         *_choose_scenario(made, selection, problems),
         *_choose_allocation(made, selection, problems),
-        *late,
+        *others,
     ]
     _merge_world(made, folder, all_changes, problems)
-    apply_changes(root, all_changes, problems)
+    late = []
+    for change in all_changes:
+        if leads_to_copy(root, change.path):
+            late.append(change)
+        else:
+            apply_changes(root, [change], problems)
+    made.root = replicate(root, made.places, problems)
+    apply_changes(made.root, late, problems)
     return made, problems
 
 

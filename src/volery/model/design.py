@@ -35,7 +35,7 @@ class _DesignParameter(Record):
         made: DesignParameter = super().read(node, path, reading)
         for text in made.paths:
             steps: Path = tuple(text.split("."))
-            if reading.root.at(steps) is None:
+            if reading.stated.at(steps) is None and reading.root.at(steps) is None:
                 what = f"there is no {text!r} in the model"
                 reading.problems.add((*path, "paths"), what, rule=rules.BAD_CHANGE)
         return made

@@ -34,6 +34,7 @@ from volery.model.fields import (
     SPEED,
     TEXT,
     TIME,
+    VEHICLE,
     VOLTAGE,
     Key,
     ListOf,
@@ -50,6 +51,9 @@ from volery.model.fields import (
 )
 from volery.model.reading import Reading
 from volery.model.text import Node, Path
+
+MOST_COPIES = 1000
+"""The greatest `count` of a vehicle."""
 
 VEHICLE_KINDS = ("multirotor", "rover")
 VEHICLE_NAMES = ("mavros", "roscopter", "pprzros")
@@ -95,11 +99,11 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """A point on the ground: the name of a place, metres from the origin, or WGS-84 degrees."""
+    """A point on the ground: a place, WGS-84 degrees, or metres from either or from the origin."""
 
     place: Annotated[str | None, TEXT, "Name of a place of the environment."] = None
-    east_m: Annotated[float | None, LENGTH, "Distance east of the origin."] = None
-    north_m: Annotated[float | None, LENGTH, "Distance north of the origin."] = None
+    east_m: Annotated[float | None, LENGTH, "Distance east of that point, or of the origin."] = None
+    north_m: Annotated[float | None, LENGTH, "Distance north of that point, or of the origin."] = None
     latitude: Annotated[float | None, LATITUDE, "WGS-84 latitude."] = None
     longitude: Annotated[float | None, LONGITUDE, "WGS-84 longitude."] = None
 
@@ -109,6 +113,9 @@ class NamedPoint(Point):
     """A named point on the ground."""
 
     role: Annotated[str, TEXT, "Free text that components may choose places by, such as `hospital`."] = ""
+    per: Annotated[
+        str | None, VEHICLE, "A vehicle with a `count`: a place for each, `spacing` beside one another."
+    ] = None
 
 
 class Geography:
@@ -145,20 +152,30 @@ class Geography:
     def place(self, path: Path, name: str, point: Point) -> Place | None:
         """Return where the *point* at *path* is; None after reporting a problem."""
         stated = {one.name for one in fields(Point) if getattr(point, one.name) is not None}
+        start, moved = stated - {"east_m", "north_m"}, stated & {"east_m", "north_m"}
         frame = self.frame
-        if stated == {"place"} and point.place is not None:
-            known = self.reading.known(path, point.place, "place", self.places)
-            return self.places[point.place] if known else None
-        if stated == {"latitude", "longitude"} and point.latitude is not None and point.longitude is not None:
+        if start == {"place"} and point.place is not None:
+            if not self.reading.known(path, point.place, "place", self.places):
+                return None
+            base = self.places[point.place]
+            if not moved:
+                return base
+            east, north = base.east_m, base.north_m
+        elif (
+            start == {"latitude", "longitude"} and point.latitude is not None and point.longitude is not None
+        ):
             east, north, _ = frame.to_enu(point.latitude, point.longitude, frame.amsl)
-            latitude, longitude = point.latitude, point.longitude
-        elif stated <= {"east_m", "north_m"} and stated:
-            east, north = point.east_m or 0.0, point.north_m or 0.0
-            latitude, longitude, _ = frame.from_enu((east, north, 0.0))
+        elif moved and not start:
+            east = north = 0.0
         else:
             what = "a point is {east, north} from the origin, {latitude, longitude}, or the name of a place"
             self.reading.problems.add(path, what)
             return None
+        if moved:
+            east, north = east + (point.east_m or 0.0), north + (point.north_m or 0.0)
+            latitude, longitude, _ = frame.from_enu((east, north, 0.0))
+        else:
+            latitude, longitude = point.latitude or 0.0, point.longitude or 0.0
         if hypot(east, north) > FARTHEST_M:
             away = hypot(east, north) / 1000.0
             what = f"{away:.0f} km from the origin; at most {FARTHEST_M / 1000:.0f} km make sense"
@@ -381,6 +398,41 @@ class Vehicle:
 
 
 @dataclass(frozen=True, slots=True)
+class Spacing:
+    """The distance between two copies of a vehicle that would stand at one point."""
+
+    east_m: Annotated[float, LENGTH, "Distance east."] = 0.0
+    north_m: Annotated[float, LENGTH, "Distance north."] = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleText(Vehicle):
+    """A drone or a rover with its autopilot, or a number of them."""
+
+    at: Annotated[
+        Place,
+        ListOf(PLACE, bare=True),
+        "Where it stands at the start. With a `count`, a list of points is taken in turn.",
+    ]
+    count: Annotated[
+        int | None,
+        Whole(least=1, most=MOST_COPIES),
+        "A number of them, `NAME_1`, `NAME_2` and so on, each with what belongs to it.",
+    ] = None
+    spacing: Annotated[
+        Spacing, Record(Spacing), "Distance between those that would stand at one point; by default 3 m east."
+    ] = Spacing()
+
+
+class _Vehicle(Record):
+    """A vehicle. A number of vehicles has been replaced by its copies when it is read."""
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return Record(VehicleText).schema(definitions)
+
+
+@dataclass(frozen=True, slots=True)
 class Orders:
     """Orders that requesters place."""
 
@@ -432,7 +484,7 @@ class Environment:
     ] = ()
     wind: Annotated[Wind, Shorter(Record(Wind), key="speed"), "Wind over all of the world."] = Wind()
     vehicles: Annotated[
-        tuple[Vehicle, ...], MapOf(Record(Vehicle), values_only=True), "Drones and rovers, by name."
+        tuple[Vehicle, ...], MapOf(_Vehicle(Vehicle), values_only=True), "Drones and rovers, by name."
     ] = ()
     workload: Annotated[
         Workload, _Resolved(Record(WorkloadText), _workload), "What is requested from the system."

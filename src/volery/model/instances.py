@@ -24,6 +24,7 @@ from volery.model.components import (
 from volery.model.fields import (
     ANYTHING,
     TEXT,
+    VEHICLE,
     Key,
     ListOf,
     MapOf,
@@ -280,6 +281,9 @@ class Instance:
     remap: Annotated[
         Mapping[str, str], MapOf(TEXT, free=True), "Names of ROS topics and services, and their replacements."
     ] = field(default_factory=dict)
+    per: Annotated[str | None, VEHICLE, "The vehicle that it belongs to: with a `count`, one for each."] = (
+        None
+    )
     where: Location | None = field(default=None, compare=False)
 
     @property

@@ -110,6 +110,7 @@ class Provenance:
 class Reading:
     """The tree that is read, what it is checked against, and the problems found so far.
 
+    ``stated`` is the tree before a number of vehicles is replaced by the copies.
     ``provenances`` are those of quantities that state one, by their paths.
     """
 
@@ -117,6 +118,7 @@ class Reading:
     problems: Problems
     vocabulary: Vocabulary
     folder: FilePath
+    stated: Node
     provenances: dict[Path, Provenance] = field(default_factory=dict)
     _results: dict[Callable[[Any], Any], Any] = field(default_factory=dict)
 

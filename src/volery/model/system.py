@@ -84,6 +84,9 @@ class Processor:
     ] = "fixed-priority"
     quantum_ns: Annotated[Ns | None, PERIOD, "Time slice of round-robin; by default, the kernel's."] = None
     carried_by: Annotated[str | None, VEHICLE, "The vehicle that carries it."] = None
+    per: Annotated[str | None, VEHICLE, "The vehicle that it belongs to: with a `count`, one for each."] = (
+        None
+    )
     powered_by: Annotated[
         str | None,
         Reference("vehicle", lambda reading: reading.names(("environment", "vehicles")), none=MAINS),
@@ -151,6 +154,9 @@ class Network:
     bandwidth_bit_s: Annotated[float, BANDWIDTH, "Bandwidth, shared by all that is sent."]
     latency_ns: Annotated[Ns, TIME, "Time from the end of a transmission to its arrival."] = 0
     loss: Annotated[float, LOSS, "Probability that one transmission is lost."] = 0.0
+    per: Annotated[str | None, VEHICLE, "The vehicle that it belongs to: with a `count`, one for each."] = (
+        None
+    )
     where: Location | None = field(default=None, compare=False)
 
 

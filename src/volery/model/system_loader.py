@@ -135,7 +135,7 @@ def load(
     source = model if isinstance(model, ModelBuilder) else model_file(model)
     folder = source.folder if isinstance(source, ModelBuilder) else source.parent
     made, problems = assemble(source, selection)
-    reading = Reading(made.root, problems, vocabulary, folder)
+    reading = Reading(made.root, problems, vocabulary, folder, made.stated)
     catalogues = _read_catalogues(reading)
     _, document = read_child(DOCUMENT, made.root, (), reading)
     if document is None:

@@ -68,11 +68,17 @@ class Problems:
         self, path: Path, what: str, where: Location | None = None, rule: Rule = rules.WRONG_VALUE
     ) -> None:
         """Report that *what* is wrong at *path*, which stands at *where*; the same problem counts once."""
-        for copy, origin in self._origins.items():
-            if path[: len(copy)] == copy:
-                path = origin + path[len(copy) :]
+        path = self._origin(path)
         error = ModelError(what, written(path), where or self._locate(path), rule.code)
         self._found.setdefault(str(error), error)
+
+    def _origin(self, path: Path) -> Path:
+        """Return where the value at *path* was copied from, *path* itself if it is stated there."""
+        for length in range(len(path), 0, -1):
+            origin = self._origins.get(path[:length])
+            if origin is not None:
+                return self._origin(origin + path[length:])
+        return path
 
     def copied(self, path: Path, origin: Path | None) -> None:
         """Report problems at *path* as problems at *origin*, from which its value was copied.
@@ -89,6 +95,7 @@ class Problems:
 
     def warn(self, path: Path, what: str, rule: Rule) -> None:
         """Report that *what* is doubtful at *path*; the model is valid nevertheless."""
+        path = self._origin(path)
         self._warnings[Finding(rule, what, written(path), self._locate(path))] = None
 
     @property
@@ -98,7 +105,7 @@ class Problems:
 
     def where(self, path: Path) -> Location | None:
         """Return the location of *path*."""
-        return self._locate(path)
+        return self._locate(self._origin(path))
 
     def raise_if_any(self) -> None:
         """Raise the problems, if any: a ``ModelError``, or one ``CollectedModelError`` for several."""

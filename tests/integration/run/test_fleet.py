@@ -11,7 +11,19 @@ from typing import Any
 
 import pytest
 
-from volery import AMSL, AboveHome, Drone, Fence, Fleet, Limits, Position, Rover, connect_fleet
+from volery import (
+    AMSL,
+    AboveHome,
+    Drone,
+    Fence,
+    Fleet,
+    Limits,
+    Options,
+    Position,
+    Rover,
+    connect_fleet,
+    simulate,
+)
 from volery.base.errors import (
     CapabilityError,
     FleetError,
@@ -236,3 +248,56 @@ def test_four_on_sockets_two_of_them_behind_one_port() -> None:
         assert fleet["d"].position.latitude == pytest.approx(46.0825, abs=3e-5)  # it was not meant
         fleet.land()
         assert not any(drone.armed for drone in fleet.values())
+
+
+# -- a number of vehicles of a model
+
+HOPS = """\
+volery: 1
+name: hops
+components:
+  Hop: {language: python, path: hop.py, requires: {drone: Drone}, active: true}
+  Watch: {language: python, path: hop.py, requires: {drones: "Drone[]"}, active: true}
+application:
+  hop: {is: Hop, drone: drone}
+  watch: {is: Watch, drones: drone}
+platform:
+  processors:
+    ground: {is: intel-i5-3470, frequency: 3 GHz}
+    onboard: {is: rpi4-cortex-a72, frequency: 1500 MHz, carried_by: drone}
+allocations: {all: {hop: onboard, watch: ground}}
+environment:
+  vehicles: {drone: {count: 3, kind: multirotor, autopilot: ardupilot, at: {east: 0, north: 0}}}
+requirements: {away: {observe: drone.distance, max: 1 m}}
+run: {duration: 6 s}
+"""
+HOP = """\
+import volery
+class Hop:
+    def __init__(self, drone):
+        self.drone = drone
+    def run(self):
+        self.drone.arm()
+class Watch:
+    def __init__(self, drones):
+        self.drones = drones
+    def run(self):
+        for drone in self.drones:
+            drone.wait_ready()
+            volery.note("seen", str(drone.name), "ready")
+"""
+
+
+@pytest.mark.parametrize("count", [1, 3, 5])
+def test_a_model_runs_with_any_number_of_vehicles(tmp_path: Any, count: int) -> None:
+    (tmp_path / "model.yaml").write_text(HOPS)
+    (tmp_path / "hop.py").write_text(HOP)
+    changes = (f"environment.vehicles.drone.count={count}",)
+    run = simulate(tmp_path, Options(record="summary"), overrides=changes)
+    names = [f"drone_{i}" for i in range(1, count + 1)]
+    assert run.record.outcome.status == "completed"
+    assert list(run.record.requirements) == [f"away_{i}" for i in range(1, count + 1)]
+    assert [name for name in run.record.components if name.startswith("hop")] == [
+        f"hop_{i}" for i in range(1, count + 1)
+    ]
+    assert list(run.record.vehicles) == names
