@@ -241,6 +241,7 @@ application:
     arguments: [--quiet]
     namespace: /one
     node_name: other_name
+    per: drone_1
     remap: {words: /words}
   written: {is: Written}
 memory_spaces: {space: {memory: 100 MB, description: shared}}
