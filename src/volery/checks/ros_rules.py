@@ -105,7 +105,7 @@ _SUBSCRIBES = re.compile(r"[Ss]ubscri|wait_for_message")
 def _subscribed_in(file: Path) -> list[str] | None:
     """Return the topics that a Python file subscribes to by constant names; None if that cannot be seen."""
     try:
-        tree = ast.parse(file.read_text(encoding="utf-8"))
+        tree = ast.parse(file.read_bytes())
     except (
         OSError,
         ValueError,

@@ -80,7 +80,7 @@ def entry_points(folder: Path) -> list[EntryPoint]:
 def _of_setup_py(folder: Path) -> Iterator[str]:
     """Yield all texts of ``setup.py`` in lists or alone, with variables of the file put in."""
     try:
-        tree = ast.parse((folder / "setup.py").read_text(encoding="utf-8", errors="replace"))
+        tree = ast.parse((folder / "setup.py").read_bytes())
     except (OSError, SyntaxError, ValueError, RecursionError):
         return
     known = {

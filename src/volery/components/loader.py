@@ -174,10 +174,10 @@ def parse(path: Path, where: Location | None = None) -> SourceFile:
         ModelError: The file is missing, is not Python or is nested too deeply.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_bytes()  # Python itself reads a byte-order mark and a declared encoding
     except FileNotFoundError as error:
         raise ModelError(f"no file {path}", where=where) from error
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         raise ModelError(f"{path} cannot be read: {error}", where=where) from error
     try:
         return SourceFile(path, ast.parse(text, filename=str(path)))

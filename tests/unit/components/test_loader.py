@@ -471,6 +471,22 @@ def test_python_2_is_refused_by_name(bench, line, name):
     assert str(raised.value).endswith(f"node.py:{at}: Python 2: line {at} is {name}; convert it with 2to3")
 
 
+@pytest.mark.parametrize(
+    "source", [b"\xef\xbb\xbfx = 'caf\xc3\xa9'\r\n", b"# -*- coding: latin-1 -*-\nx = 'caf\xe9'\n"]
+)
+def test_a_file_has_the_encoding_that_python_reads(bench, source):
+    script = bench.write("node.py", "")
+    script.write_bytes(source)
+    assert parse(script).tree.body[0].value.value == "caf\xe9"
+
+
+def test_a_file_without_its_encoding_names_the_line(bench):
+    script = bench.write("node.py", "")
+    script.write_bytes(b"x = 'caf\xe9'\n")
+    with pytest.raises(ModelError, match=r"node\.py:1: not Python: .*'utf-8' codec"):
+        parse(script)
+
+
 def test_another_mistake_is_no_python_2(bench):
     with pytest.raises(ModelError, match=r"node\.py:1: not Python: invalid syntax"):
         parse(bench.write("node.py", "x = = 1\n"))

@@ -216,7 +216,7 @@ def _imported(file: Path) -> list[str]:
     """
     found: dict[str, None] = {}
     try:
-        tree = ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
+        tree = ast.parse(file.read_bytes(), filename=str(file))
     except (OSError, ValueError, SyntaxError, RecursionError):
         return []
     for node in ast.walk(tree):

@@ -211,8 +211,8 @@ def _records(system: System) -> dict[str, _Record]:
     found: dict[str, _Record] = {}
     for file in (file for folder in folders for file in sorted(folder.glob("*.py"))):
         try:
-            tree = ast.parse(file.read_text(encoding="utf-8"))
-        except (OSError, SyntaxError, UnicodeDecodeError):
+            tree = ast.parse(file.read_bytes())
+        except (OSError, SyntaxError, ValueError):
             continue  # loading it says what is wrong
         for node in tree.body:
             if isinstance(node, ast.ClassDef) and _is_dataclass(node):
