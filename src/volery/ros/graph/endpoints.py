@@ -358,6 +358,7 @@ class EmbeddedSubscription:
 
 
 HANDLER_FAILED = "its handler "
+NO_SERVER = "no node serves it"
 """Beginning of the problem of a call that the server has failed."""
 ROSPY_FAILED = "responded with an error"
 """Part of the same problem in the words of rospy's client."""
@@ -375,11 +376,13 @@ class ServiceError(VoleryError):
         service: Name of the service.
         what: What happened.
         by_server: Whether the server itself has ended the call with an error.
+        no_server: Whether no node served it.
     """
 
     def __init__(self, name: str, what: str) -> None:
         self.service, self.what = name, what
         self.by_server = what.startswith(HANDLER_FAILED) or ROSPY_FAILED in what
+        self.no_server = what.startswith(NO_SERVER)
         super().__init__(f"service {name}: {what}")
 
 
@@ -527,7 +530,7 @@ class EmbeddedClient:
         if server is None:
             self._node.want(SERVICE, self.name, self.type).count += 1
             hint = did_you_mean(self.name, services)
-            raise ServiceError(self.name, f"no node serves it{hint}; there is {choices(services)}")
+            raise ServiceError(self.name, f"{NO_SERVER}{hint}; there is {choices(services)}")
         if server.type != self.type:
             raise ServiceError(self.name, f"{server.node.name} serves it as {server.type}, not {self.type}")
         return server

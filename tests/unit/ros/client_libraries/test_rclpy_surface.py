@@ -273,6 +273,25 @@ out(future.result().message)
     assert said(stage, text) == ["tick", "tick", "open"]
 
 
+def test_a_request_without_a_server_is_never_answered(stage: Stage) -> None:
+    text = """
+from rclpy.action import ActionClient
+from example_interfaces.action import Fibonacci
+from std_srvs.srv import Trigger
+asked = [n.create_client(Trigger, "t").call_async(Trigger.Request()),
+         ActionClient(n, Fibonacci, "f").send_goal_async(Fibonacci.Goal(order=1))]
+for future in asked:
+    future.add_done_callback(lambda one: out(one.result()))
+    rclpy.spin_until_future_complete(n, future, timeout_sec=1.0)
+    out(future.done())
+try:
+    n.create_client(Trigger, "t").call(Trigger.Request(), timeout_sec=1.0)
+except TimeoutError:
+    out("late")
+"""
+    assert said(stage, text) == [False, False, "late"]
+
+
 def test_a_goal_has_the_states_and_the_codes_of_ros(stage: Stage) -> None:
     text = """
 from rclpy.action import ActionClient, ActionServer, CancelResponse

@@ -371,7 +371,7 @@ class Client:
         return self._made.wait(None if timeout_sec is None or timeout_sec < 0 else from_seconds(timeout_sec))
 
     def call_async(self, request: Any) -> Future:
-        """Send a request; return the future of its response."""
+        """Send a request; return the future of its response, which never comes if there is no server."""
         return self._send(request, self._node.executor)
 
     def _send(self, request: Any, executor: Executor | None) -> Future:
@@ -389,6 +389,8 @@ class Client:
             try:
                 response = self._made.call(sent)
             except ServiceError as error:
+                if error.no_server:
+                    return  # as in ROS 2: the request is lost, and what was not served is named after the run
                 failure = error
                 self._enqueue(lambda: future.set_exception(failure))
             else:
