@@ -303,10 +303,23 @@ def _prism(text: PrismText, path: Path, reading: Reading) -> Prism | None:
         corners = _circle(text.centre, text.radius_m)
     elif len(text.corners) >= 3 and text.centre is None and text.radius_m is None:
         corners = tuple((corner.east_m, corner.north_m) for corner in text.corners)
+        if _on_a_line(corners):
+            reading.problems.add(
+                path, "its corners lie on one line and enclose nothing; give at least three others"
+            )
     else:
         reading.problems.add(path, "give at least three corners, or a centre and a radius")
         return None
     return Prism(str(path[-1]), corners, text.floor_m, ceiling)
+
+
+def _on_a_line(corners: tuple[tuple[float, float], ...]) -> bool:
+    """Return whether all corners, in metres, lie within a millimetre of a line."""
+    (east, north), *others = corners
+    far_east, far_north = max(others, key=lambda one: hypot(one[0] - east, one[1] - north))
+    along_east, along_north = far_east - east, far_north - north
+    length = hypot(along_east, along_north)
+    return all(abs(along_east * (n - north) - along_north * (e - east)) <= 0.001 * length for e, n in others)
 
 
 def _circle(centre: Place, radius: float) -> tuple[tuple[float, float], ...]:

@@ -28,6 +28,15 @@ SPOILT = {
         "platform.processors.ground.is",
         ["this key is missing"],
     ),
+    "a zone that encloses nothing": (
+        (
+            "prison: {centre: {east: 50 m, north: 50 m}, radius: 20 m,",
+            "prison: {corners: [{east: 1 m, north: 1 m}, {east: 9 m, north: 5 m}, {east: 5 m, north: 3 m}],",
+        ),
+        "prison: {",
+        "environment.no_fly_zones.prison",
+        ["its corners lie on one line and enclose nothing"],
+    ),
     "no version": (("volery: 1\n", ""), "name: hosp", "volery", ["this key is missing"]),
     "another version": (("volery: 1\n", "volery: 2\n"), "volery: 2", "volery", ["2 is not one of 1"]),
     "text for a number": (
