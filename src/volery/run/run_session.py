@@ -6,7 +6,7 @@ import gc
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from threading import Event
+from threading import Event, Thread, current_thread
 from typing import Any
 
 from volery.base.errors import CapabilityError, UsageError, choices
@@ -121,7 +121,7 @@ class RunSession:
         self._kernel = VirtualKernel(pace=options.pace, watchdog_s=PATIENCE_S)
         self._ending = Ending(self._kernel)
         self._result: Run | None = None
-        self._started = False
+        self._thread: Thread | None = None
         self._goes_on = Event()
         self._goes_on.set()
         try:
@@ -158,7 +158,7 @@ class RunSession:
 
         Without *kinds* it gets every event. It must not block, and what it raises ends the run.
         """
-        self._recording.stream.tap(_Chosen(listener, kinds) if kinds else listener)
+        self._recording.stream.tap_guarded(_Chosen(listener, kinds) if kinds else listener, _raise)
 
     # -- steering
 
@@ -175,12 +175,13 @@ class RunSession:
         """Let virtual time pass, at most *duration* ns; return whether the run goes on after it.
 
         Raises:
-            UsageError: *duration* is not above 0.
+            UsageError: *duration* is not a whole number above 0, or another thread began the run.
         """
-        if duration <= 0:
-            raise UsageError(f"a step of {duration} ns; give more than 0")
+        if not isinstance(duration, int) or duration <= 0:
+            raise UsageError(f"a step of {duration} ns; give a whole number above 0")
         if self._result is not None:
             return False
+        self._check_thread()
         with self._ending.signals():  # a closed terminal does not end the writing of the record either
             try:
                 self._begin()
@@ -214,7 +215,13 @@ class RunSession:
         self._goes_on.set()
 
     def stop(self, reason: str = "stopped") -> Run:
-        """End the run in order: components are cancelled, vehicles brought to rest. Return the run."""
+        """End the run in order: components are cancelled, vehicles brought to rest. Return the run.
+
+        Raises:
+            UsageError: Another thread began the run.
+        """
+        if self._result is None:
+            self._check_thread()
         self._goes_on.set()
         if self._result is None:
             self._begin()
@@ -289,14 +296,18 @@ class RunSession:
 
     def _begin(self) -> None:
         """Start everything, once."""
-        if self._started:
+        if self._thread is not None:
             return
-        self._started = True
+        self._thread = current_thread()
         ending = self._ending
         self._kernel.call_at(
             self._system.limits.duration_ns, lambda: ending.begin("completed", "its time is up")
         )
         self._start()
+
+    def _check_thread(self) -> None:
+        if self._thread not in (None, current_thread()):  # tasks cannot move to another thread
+            raise UsageError("another thread began this run: step, run and stop it there; pause() is for all")
 
     def _start(self) -> None:
         self._built.start()
@@ -368,6 +379,10 @@ class GraphSession(RunSession):
     def leave(self) -> list[str]:
         """See ``RunSession``."""
         return [] if self._distributed is None else self._distributed.close()
+
+
+def _raise(error: Exception) -> None:
+    raise error
 
 
 class _Chosen:

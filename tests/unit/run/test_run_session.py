@@ -127,3 +127,41 @@ def test_what_is_wrong_is_said_before_anything_starts(model):
         RunSession(model, Options(out=None), allocation="none")
     with pytest.raises(ModelError, match="duration"):
         RunSession(model, Options(out=None), overrides=["run.duration=blue"])
+
+
+def test_what_a_tap_raises_ends_the_run(model):
+    def refuse(event):
+        raise ValueError("no")
+
+    session = RunSession(model)
+    session.tap(refuse)
+    with pytest.raises(ValueError, match="no"):
+        session.run()
+    assert not session.running
+    assert not session.result.ok
+    assert not session.step(S)
+
+
+def test_a_step_is_a_whole_number_of_nanoseconds(model):
+    session = RunSession(model)
+    for wrong in (0, -1, 0.5 * S, "1"):
+        with pytest.raises(UsageError, match="give a whole number above 0"):
+            session.step(wrong)
+    assert session.now == 0
+
+
+def test_another_thread_cannot_step_or_stop_it(model):
+    session, said = RunSession(model), []
+
+    def misuse():
+        for use in (lambda: session.step(S), session.run, session.stop):
+            with pytest.raises(UsageError, match="another thread began this run") as raised:
+                use()
+            said.append(raised)
+
+    session.step(S)
+    thread = Thread(target=misuse)
+    thread.start()
+    thread.join()
+    assert len(said) == 3
+    assert session.stop().record.outcome.status == "interrupted"
