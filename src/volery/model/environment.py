@@ -29,6 +29,7 @@ from volery.model.fields import (
     LENGTH,
     LONGITUDE,
     NUMBER,
+    PERIOD,
     RATE,
     SHARE,
     SPEED,
@@ -50,6 +51,7 @@ from volery.model.fields import (
     read_child,
 )
 from volery.model.reading import Reading
+from volery.model.resources import POWER
 from volery.model.text import Node, Path
 
 MOST_COPIES = 1000
@@ -72,7 +74,11 @@ _ENVIRONMENT: Path = ("environment",)
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A named point on the ground. ``role`` is free text that components may choose places by."""
+    """A named point on the ground. ``role`` is free text that components may choose places by.
+
+    A vehicle that stands there disarmed gets a full battery after ``battery_swap_ns``, and ``charging_w``
+    into the one it has.
+    """
 
     name: str
     latitude: float
@@ -81,6 +87,8 @@ class Place:
     east_m: float
     north_m: float
     role: str = ""
+    battery_swap_ns: Ns | None = None
+    charging_w: float = 0.0
 
     @property
     def position(self) -> Position:
@@ -113,6 +121,12 @@ class NamedPoint(Point):
     """A named point on the ground."""
 
     role: Annotated[str, TEXT, "Free text that components may choose places by, such as `hospital`."] = ""
+    battery_swap_ns: Annotated[
+        Ns | None, PERIOD, "A vehicle that stands there disarmed has a full battery after this time."
+    ] = None
+    charging_w: Annotated[float, POWER, "Power into the battery of a vehicle that stands there disarmed."] = (
+        0.0
+    )
     per: Annotated[
         str | None, VEHICLE, "A vehicle with a `count`: a place for each, `spacing` beside one another."
     ] = None
@@ -146,7 +160,7 @@ class Geography:
             found = self.place((*path, name), name, point)
             if found is not None:
                 at = found.latitude, found.longitude, found.amsl_m, found.east_m, found.north_m
-                self.places[name] = Place(name, *at, point.role)
+                self.places[name] = Place(name, *at, point.role, point.battery_swap_ns, point.charging_w)
         self.places = {name: self.places[name] for name in points if name in self.places}
 
     def place(self, path: Path, name: str, point: Point) -> Place | None:

@@ -280,6 +280,7 @@ class RunSession:
             self._recording.stream.tap(reporter)
         self._feed = PowerFeed(kernel, platform, self._fleet)
         self._fleet.sample()
+        self._fleet.serve_batteries(environment.places.values())
         affected = Affected(
             kernel,
             self._fleet,

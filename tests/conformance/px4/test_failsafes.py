@@ -25,7 +25,7 @@ def hovering(rig: Any) -> float:
 def test_a_critical_battery_holds_and_then_acts(action: int, mode: str, bench: Any) -> None:
     rig = bench(parameters={"COM_LOW_BAT_ACT": action, "BAT_EMERGEN_THR": 0.02})
     since = hovering(rig)
-    rig.flight.drain_battery(0.06)
+    rig.flight.set_charge(0.06)
     rig.run(1.0)
     assert rig.vehicle.mode.name == LOITER
     assert "Preflight Fail: low battery\t" in rig.texts(since)
@@ -38,9 +38,9 @@ def test_a_battery_that_falls_further_does_not_hold_a_second_time(bench: Any) ->
     """The delay of COM_FAIL_ACT_T is used up once: from critical to emergency the landing goes on."""
     rig = bench(parameters={"COM_LOW_BAT_ACT": 2})
     since = hovering(rig)
-    rig.flight.drain_battery(0.06)
+    rig.flight.set_charge(0.06)
     rig.run_until(lambda: rig.vehicle.mode.name == LAND, within=10.0)
-    rig.flight.drain_battery(0.03)
+    rig.flight.set_charge(0.03)
     seen = set()
     for _ in range(30):
         rig.run(0.1)
@@ -52,7 +52,7 @@ def test_a_battery_that_falls_further_does_not_hold_a_second_time(bench: Any) ->
 def test_a_battery_that_only_warns(bench: Any) -> None:
     rig = bench(parameters={"COM_LOW_BAT_ACT": 0})
     since = hovering(rig)
-    rig.flight.drain_battery(0.06)
+    rig.flight.set_charge(0.06)
     rig.run(8.0)
     assert rig.vehicle.mode.name == LOITER
     assert "Preflight Fail: low battery\t" in rig.texts(since)

@@ -21,6 +21,7 @@ from volery import (
     Options,
     Position,
     Rover,
+    RunSession,
     connect_fleet,
     simulate,
 )
@@ -37,6 +38,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
 from volery.run.assembly.simulated_fleet import fleet_of
 from volery.run.assembly.simulated_vehicles import parse_simulated
+from volery.trace.events import Text
 from volery.vehicles.address import parse
 
 HOME = Position(46.0825, -103.8995, AMSL(900))
@@ -301,3 +303,57 @@ def test_a_model_runs_with_any_number_of_vehicles(tmp_path: Any, count: int) -> 
         f"hop_{i}" for i in range(1, count + 1)
     ]
     assert list(run.record.vehicles) == names
+
+
+SHUTTLE = """\
+volery: 1
+name: shuttle
+components:
+  Shuttle: {language: python, path: hop.py, requires: {drone: Drone}, active: true}
+application: {shuttle: {is: Shuttle, drone: drone_1}}
+platform: {processors: {onboard: {is: rpi4-cortex-a72, frequency: 1500 MHz, carried_by: drone_1}}}
+allocations: {all: {shuttle: onboard}}
+environment:
+  places: {port: {east: 1 m, north: 0, battery_swap: 20 s}, field: {east: 30 m, north: 0}}
+  vehicles: {drone_1: {kind: multirotor, autopilot: ardupilot, at: port, battery: 0.5 Ah}}
+requirements: {trips: {observe: note.trip.flown, min: 4}, battery: {observe: drone_1.battery_min, min: 0.5}}
+run: {duration: 4 min, until: {observe: note.trip.flown, min: 4}}
+"""
+SHUTTLE_CODE = """\
+import time
+import volery
+class Shuttle:
+    def __init__(self, drone):
+        self.drone = drone
+    def run(self):
+        self.drone.wait_ready()
+        for trip in range(4):
+            self.drone.takeoff(4)
+            self.drone.land()
+            volery.note("trip", str(trip), "flown")
+            time.sleep(22)
+"""
+
+
+def _shuttle(folder: Any, *changes: str) -> tuple[Any, list[str]]:
+    (folder / "model.yaml").write_text(SHUTTLE)
+    (folder / "hop.py").write_text(SHUTTLE_CODE)
+    session = RunSession(folder, Options(record="summary"), overrides=changes)
+    told: list[str] = []
+    session.tap(lambda event: told.append(event.text), Text)
+    return session.run(), [one for one in told if "swapped" in one]
+
+
+@pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
+def test_a_battery_is_swapped_where_a_vehicle_stands(tmp_path: Any, autopilot: str) -> None:
+    run, told = _shuttle(tmp_path, f"environment.vehicles.drone_1.autopilot={autopilot}")
+    assert run.record.requirements["trips"].met
+    assert run.record.requirements["battery"].met
+    assert len(told) == 3
+    assert all(one.startswith("battery swapped at port: ") for one in told)
+
+
+def test_without_a_swap_the_battery_does_not_last(tmp_path: Any) -> None:
+    run, told = _shuttle(tmp_path, "environment.places.port.battery_swap=", "run.duration=100 s")
+    assert not run.record.requirements["battery"].met
+    assert told == []

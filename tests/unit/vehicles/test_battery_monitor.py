@@ -163,7 +163,7 @@ def test_a_drone_that_is_left_hovering_lands_with_its_reserve(autopilot: str) ->
 
     def flight() -> None:
         stage.drone.takeoff(10)
-        stage.flight.drain_battery(0.16)
+        stage.flight.set_charge(0.16)
         stage.sleep(90.0)
 
     stage.perform(flight)

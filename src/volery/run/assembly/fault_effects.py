@@ -172,7 +172,7 @@ def _drift(flight: Any, fault: GpsDrift, active: bool) -> None:
 
 def _drain(flight: Any, fault: BatteryLow, active: bool) -> None:
     if active:
-        flight.drain_battery(fault.charge)
+        flight.set_charge(fault.charge)
 
 
 def _cut_link(fault: LinkCut, affected: Affected, active: bool) -> None:

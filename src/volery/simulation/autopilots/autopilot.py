@@ -68,6 +68,10 @@ class Failsafe(NamedTuple):
     ends: VehicleAction = do_nothing
 
 
+_GAUGE_RESET: Ns = 20 * MS
+"""From another battery to the reset of its gauge, which is not to count the old one."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class PeriodicWork:
     """What a firmware does at fixed intervals."""
@@ -317,6 +321,19 @@ class Autopilot:
             elif was and not tripped:
                 vehicle.failsafes.active.discard(failsafe.name)
                 failsafe.ends(vehicle)
+
+    def swap_battery(self) -> None:
+        """Fly on a full battery from now on.
+
+        Its gauge and its failsafes begin anew, as after a power cycle; nothing else is restarted.
+        """
+        self._flight.set_charge(1.0)
+        self._kernel.call_at(self._kernel.now() + _GAUGE_RESET, self._reset_gauge)
+
+    def _reset_gauge(self) -> None:
+        self.vehicle.reports.gauge_offset_mah = 0.0
+        for name in [one for one in self.vehicle.failsafes.active if "battery" in one]:
+            self.vehicle.failsafes.active.discard(name)
 
     # -- for recorders
 

@@ -423,8 +423,8 @@ class Flight:
         """Inject or clear a fault: the magnetometer gives no new samples."""
         self._world.set_input(self._body, U_MAG_BLOCKED, float(blocked))
 
-    def drain_battery(self, left: float) -> None:
-        """Inject a fault: only the fraction *left* of the charge remains."""
+    def set_charge(self, left: float) -> None:
+        """Set the fraction *left* of the battery's charge: a fault, charging, or another battery."""
         if not 0.0 <= left <= 1.0:
             raise UsageError(f"a battery with {left} left: 0 to 1")
         self._world.set_input(self._body, S_CHARGE, self.capacity_as * (1.0 - left))

@@ -53,7 +53,7 @@ class SimulatedFaults:
         left = vehicle.estimate.battery_left
         if not (self.emptied or drains):
             if self._charge is not None:
-                vehicle.flight.drain_battery(self._charge)
+                vehicle.flight.set_charge(self._charge)
                 self._charge = None
             return
         if self._charge is None:
@@ -64,4 +64,4 @@ class SimulatedFaults:
             armed_for = to_seconds(now - vehicle.arming.armed_at)
             share = 1.0 - armed_for / max(1.0, drain)
             wanted = min(self._charge, max(ALMOST_EMPTY, least / 100.0, share))
-        vehicle.flight.drain_battery(wanted)
+        vehicle.flight.set_charge(wanted)

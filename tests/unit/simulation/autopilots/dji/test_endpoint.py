@@ -342,13 +342,13 @@ def test_a_low_battery_sends_it_home_and_a_setpoint_does_not_stop_it(apron: Make
     def body() -> None:
         yard.fly()
         yard.keep_sending(8.0, "ENUvelocity_yawrate", 4.0, 0.0, 0.0, 0.0)
-        yard.flight.drain_battery(0.25)
+        yard.flight.set_charge(0.25)
         yard.wait(8.0)
         assert yard.mode == 6  # it has told, and waits
         yard.until(lambda: yard.mode == 15, within=5.0)
         yard.keep_sending(0.5, "ENUvelocity_yawrate", 4.0, 0.0, 0.0, 0.0)
         assert yard.mode == 15
-        yard.flight.drain_battery(0.08)
+        yard.flight.set_charge(0.08)
         yard.until(lambda: yard.mode == 33, within=3.0)
         assert not yard.task(GO_HOME)  # a critical battery overrides the SDK
         assert not yard.task(LAND)

@@ -289,7 +289,7 @@ def test_a_low_battery_is_its_own_business() -> None:
 
     def mission(drone: Drone) -> None:
         drone.takeoff(6.0)
-        flown.later(3.0, lambda: flown.fleet.flights["d"].drain_battery(0.2))
+        flown.later(3.0, lambda: flown.fleet.flights["d"].set_charge(0.2))
         with pytest.raises(Failsafe, match="NAVI_GO_HOME"):
             drone.goto(at(90.0, 0.0, 6.0))
         assert "NAVI_GO_HOME" in drone.come_to_rest()
