@@ -7,22 +7,27 @@ An instance depends neither on the model nor on a language. The run states its `
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from traceback import walk_stack, walk_tb
 from types import FrameType
 from typing import Protocol
 
+from greenlet import GreenletExit
+
 from volery.base.errors import ComponentError, VoleryError
 from volery.base.time import Ns
 from volery.cost import FREE, STEPS_PER_NS, Cost, Pricing
 from volery.kernel.api import Kernel
-from volery.kernel.task import ComputeResource, ExecutionContext, Scope, Task
+from volery.kernel.task import Cancelled, ComputeResource, ExecutionContext, Scope, Task
 from volery.kernel.waiting import Lock, Signal, executing_in
 from volery.trace.events import Charge, Failure
 
 COMPONENT_MARK = "__volery_user__"
 """A name in every module of a component, by which its frames are recognised in a traceback."""
+
+_ENDS_OF_TASKS = (Cancelled, GreenletExit, KeyboardInterrupt)
+"""What the kernel and the operator raise in a task, and no error of its code."""
 
 OnFailure = Callable[[str, Exception], None]
 """Called with the name of a component whose flow of control has ended with an error, and the error."""
@@ -164,12 +169,18 @@ class Instance:
             amount, self._uncharged = self._uncharged, 0
             self._record_charge("code", Cost(amount))
 
-    def component_error(self, error: Exception, doing: str) -> ComponentError:
+    def component_error(self, error: BaseException, doing: str) -> ComponentError:
         """Record an error of the component's code in ``doing``; return the error to raise instead."""
         wrapped = ComponentError(self.name, f"{doing} raised {describe(error)}")
-        with self.kernel as kernel:
-            kernel.record(Failure(kernel.now(), self.name, wrapped.what))
+        self._record_failure(wrapped.what)
         return wrapped
+
+    def _record_failure(self, what: str) -> None:
+        """Record a failure, after the time that the code has computed; at once if its task is cancelled."""
+        with suppress(Cancelled), self.kernel:
+            pass
+        with self.kernel.guard:
+            self.kernel.record(Failure(self.kernel.now(), self.name, what))
 
     def run_guarded(self, body: Callable[[], object], doing: str) -> bool:
         """Run component code at the root of a task; record and report its errors.
@@ -187,10 +198,11 @@ class Instance:
                 return True
             self.report_exit(status, end)
         except VoleryError as error:
-            with self.kernel as kernel:
-                kernel.record(Failure(kernel.now(), self.name, str(error)))
+            self._record_failure(str(error))
             self.on_failure(self.name, error)
-        except Exception as error:
+        except _ENDS_OF_TASKS:
+            raise
+        except BaseException as error:
             wrapped = self.component_error(error, doing)
             wrapped.__cause__ = error
             self.on_failure(self.name, wrapped)
@@ -204,24 +216,24 @@ class Instance:
             body()
         except SystemExit:
             pass
-        except Exception as error:
+        except _ENDS_OF_TASKS:
+            raise
+        except BaseException as error:
             self.report_thread(error, f"thread {name}")
 
-    def report_thread(self, error: Exception, doing: str) -> None:
+    def report_thread(self, error: BaseException, doing: str) -> None:
         """Record and report what ended one flow of control in ``doing``, while others go on."""
         if isinstance(error, VoleryError):
-            with self.kernel as kernel:
-                kernel.record(Failure(kernel.now(), self.name, str(error)))
+            self._record_failure(str(error))
+            self.on_thread_failure(self.name, error)
         else:
-            error = self.component_error(error, doing)
-        self.on_thread_failure(self.name, error)
+            self.on_thread_failure(self.name, self.component_error(error, doing))
 
     def report_exit(self, status: int, end: SystemExit | None = None) -> None:
         """Record and report that the component has ended with an exit status that is not 0."""
-        text = f": {end.code}" if end is not None and isinstance(end.code, str) else ""
+        text = f": {_encodable(end.code)}" if end is not None and isinstance(end.code, str) else ""
         what = f"ended with exit status {status}{text}{place_of(end) if end is not None else ''}"
-        with self.kernel as kernel:
-            kernel.record(Failure(kernel.now(), self.name, what))
+        self._record_failure(what)
         self.on_failure(self.name, ComponentError(self.name, what))
 
     @contextmanager
@@ -263,6 +275,11 @@ class ForeignError(Exception):
         super().__init__(f"{kind}: {what}" if what else kind)
 
 
+def _encodable(text: str) -> str:
+    """Return a text that UTF-8 can carry: the bytes of a file's name that Python could not decode cannot."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
 def exit_status(end: SystemExit) -> int:
     """Return the exit status of a process that ends by ``sys.exit()``, as Python does."""
     if end.code is None:
@@ -278,7 +295,12 @@ def describe(error: BaseException) -> str:
     """
     if isinstance(error, ForeignError):
         return str(error)
-    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    name = type(error).__name__
+    try:
+        words = _encodable(str(error))
+    except Exception as fault:  # its own method fails
+        words = f"(its __str__ raised {type(fault).__name__})"
+    text = f"{name}: {words}" if words else name
     if type(error).__module__ == "termios":
         text = f"termios.{text}: the file reads keys of a terminal, and a component has none; {_NO_KEYS}"
     return f"{text}{place_of(error)}"

@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from os.path import realpath
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -208,7 +209,7 @@ def stated_texts(root: Node, key: str) -> list[str]:
 
 def is_inside(file: FilePath, folders: Iterable[FilePath]) -> bool:
     """Return whether *file*, with its symbolic links followed, is in one of the *folders*."""
-    real = file.resolve()
+    real = FilePath(realpath(file))  # ``resolve`` raises for a link to itself; reading it says so
     return any(real.is_relative_to(folder.resolve()) for folder in folders)
 
 

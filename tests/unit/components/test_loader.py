@@ -21,7 +21,7 @@ from volery.cost.instrumentation import StepCounter
 from volery.kernel.virtual import VirtualKernel
 from volery.ros.client_libraries.library_base import library_module
 from volery.ros.messages import Workspace, modules
-from volery.trace.events import Text
+from volery.trace.events import Failure, Text
 
 
 class RecordingHost(Host):
@@ -382,6 +382,24 @@ def test_the_exit_status_decides_whether_it_has_failed(bench, end, reported):
     assert bool(bench.failures) == bool(reported)
     if reported:
         assert re.fullmatch(reported, str(bench.failures[0][1]))
+
+
+@pytest.mark.parametrize(
+    ("words", "shown"),
+    [
+        ("'no link'", "no link"),
+        ("'\\udc80'", r"\\udc80"),
+        ("1 / 0", r"\(its __str__ raised ZeroDivisionError\)"),
+    ],
+)
+@pytest.mark.parametrize("base", ["Exception", "BaseException"])
+def test_an_error_that_makes_its_own_text_is_reported(bench, base, words, shown):
+    counted = Workbench(bench.folder, StepCounter())
+    text = f"class Lost({base}):\n    def __str__(self):\n        return {words}\nraise Lost\n"
+    counted.start(counted.write("node.py", text))
+    counted.kernel.run(S)
+    assert re.fullmatch(rf"node: run raised Lost: {shown} \(node\.py:4\)", str(counted.failures[0][1]))
+    assert [event.who for event in counted.events if isinstance(event, Failure)] == ["node"]
 
 
 def test_the_end_waits_for_threads_and_then_calls_what_is_left(bench):

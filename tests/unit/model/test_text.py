@@ -264,6 +264,8 @@ def test_files_outside_of_the_models_folders_are_refused(tmp_path: Path) -> None
     (inside / "link.py").symlink_to(elsewhere / "secret.py")
     assert is_inside(inside / "own.py", [inside])
     assert not is_inside(inside / "link.py", [inside])
+    (inside / "loop.py").symlink_to("loop.py")
+    assert is_inside(inside / "loop.py", [inside])
     assert is_inside(inside / "link.py", [inside, elsewhere])
     assert not is_inside(inside / ".." / "other" / "secret.py", [inside])
     assert outside("link.py").startswith(

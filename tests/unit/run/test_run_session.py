@@ -165,3 +165,13 @@ def test_another_thread_cannot_step_or_stop_it(model):
     thread.join()
     assert len(said) == 3
     assert session.stop().record.outcome.status == "interrupted"
+
+
+def test_a_script_whose_error_computes_its_text_has_failed(model):
+    (model.parent / "counter.py").write_text(
+        "class Lost(Exception):\n    def __str__(self):\n        return 'no link'\n\nraise Lost\n"
+    )
+    model.write_text(MODEL.replace("language: python", "language: rospy"))
+    run = RunSession(model, Options("code")).run()
+    assert not run.ok
+    assert str(run.error) == "counter: run raised Lost: no link (counter.py:5)"
