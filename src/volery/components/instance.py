@@ -198,7 +198,7 @@ class Instance:
                 return True
             self.report_exit(status, end)
         except VoleryError as error:
-            self._record_failure(str(error))
+            self._record_failure(self._words_of(error))
             self.on_failure(self.name, error)
         except _ENDS_OF_TASKS:
             raise
@@ -224,10 +224,14 @@ class Instance:
     def report_thread(self, error: BaseException, doing: str) -> None:
         """Record and report what ended one flow of control in ``doing``, while others go on."""
         if isinstance(error, VoleryError):
-            self._record_failure(str(error))
+            self._record_failure(self._words_of(error))
             self.on_thread_failure(self.name, error)
         else:
             self.on_thread_failure(self.name, self.component_error(error, doing))
+
+    def _words_of(self, error: VoleryError) -> str:
+        """Return the text of an error without this component's name, which stands before it."""
+        return str(error).removeprefix(f"{self.name}: ")
 
     def report_exit(self, status: int, end: SystemExit | None = None) -> None:
         """Record and report that the component has ended with an exit status that is not 0."""

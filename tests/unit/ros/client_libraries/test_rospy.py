@@ -193,6 +193,39 @@ out("still here")
     assert len([event for event in stage.of(Text) if "bad callback" in event.text]) >= 3
 
 
+def test_a_callback_that_raises_what_is_no_exception_is_reported(stage: Any) -> None:
+    stage.component(
+        "talker",
+        """
+import rospy
+from std_msgs.msg import String
+rospy.init_node("talker")
+words = rospy.Publisher("chatter", String, queue_size=1)
+rospy.sleep(1)
+words.publish("a")
+""",
+    )
+    stage.component(
+        "listener",
+        """
+import rospy
+from std_msgs.msg import String
+class Odd(BaseException):
+    def __str__(self):
+        raise RuntimeError("no words")
+rospy.init_node("listener")
+def fail(data):
+    raise Odd
+rospy.Subscriber("chatter", String, fail)
+rospy.sleep(3)
+out("still here")
+""",
+    )
+    assert stage.run() == ["still here"]
+    [failure] = stage.of(Failure)
+    assert "raised Odd: (its __str__ raised RuntimeError) (line " in failure.what
+
+
 def test_time_outs(stage: Any) -> None:
     stage.component(
         "n",

@@ -11,10 +11,12 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, NamedTuple, Self
 
+from greenlet import GreenletExit
+
 from volery.base.errors import ComponentError, VoleryError
 from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Kernel
-from volery.kernel.task import Scope
+from volery.kernel.task import Cancelled, Scope
 from volery.kernel.waiting import Signal, current_task, poll, read_clock
 from volery.ros.client_libraries.library_base import (
     WARNING,
@@ -187,13 +189,15 @@ class Session:
                 self.callbacks += 1
         except ROSInterruptException:
             pass
-        except Exception as error:
+        except (Cancelled, GreenletExit, KeyboardInterrupt, SystemExit):
+            raise
+        except BaseException as error:
             self.report_failure(what, error)
             if counted:
                 self.callbacks += 1
                 self.failed_callbacks += 1
 
-    def report_failure(self, what: str, error: Exception) -> None:
+    def report_failure(self, what: str, error: BaseException) -> None:
         """Log what a callback has raised; each text is a failure of the component once."""
         text = f"{what} raised {_description(error)}"
         self.log(ERROR, f"bad callback: {text}")
@@ -211,14 +215,18 @@ class Session:
             raise ComponentError(self.node.context.component, what)
 
 
-def _description(error: Exception) -> str:
+def _description(error: BaseException) -> str:
     if isinstance(error, VoleryError):
         return str(error)
     traceback = error.__traceback__
     while traceback is not None and traceback.tb_next is not None:
         traceback = traceback.tb_next
     where = f" (line {traceback.tb_lineno})" if traceback is not None else ""
-    return f"{type(error).__name__}: {error}{where}"
+    try:
+        words = str(error)
+    except Exception as fault:  # its own method fails
+        words = f"(its __str__ raised {type(fault).__name__})"
+    return f"{type(error).__name__}: {words}{where}"
 
 
 @dataclass(eq=False)
