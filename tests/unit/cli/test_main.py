@@ -419,8 +419,10 @@ def test_a_shell_completes_nouns_verbs_and_options(typed, offered):
 
 
 def test_completion_is_installed_for_the_shell_of_the_user(tmp_path):
+    # The shell is found among the parents: bash stays there for the command after it, where it else became it.
+    command = f'"$0" -c "{VOLERY}" --install-completion bash; exit $?'
     done = subprocess.run(
-        [*("bash", "-c", f'"$0" -c "{VOLERY}" --install-completion bash', sys.executable)],
+        ["bash", "-c", command, sys.executable],
         env={**os.environ, "HOME": str(tmp_path)},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
