@@ -419,7 +419,7 @@ def test_a_shell_completes_nouns_verbs_and_options(typed, offered):
 
 
 def test_completion_is_installed_for_the_shell_of_the_user(tmp_path):
-    # The shell is found among the parents: bash stays there for the command after it, where it else became it.
+    # The shell is found among the parents; without a second command bash would not stay one.
     command = f'"$0" -c "{VOLERY}" --install-completion bash; exit $?'
     done = subprocess.run(
         ["bash", "-c", command, sys.executable],
