@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from volery import Options, simulate
-from volery.run import simulate as simulation
+from volery.run import run_session
 from volery.trace.events import VehicleState
 from volery.trace.reader import read
 
@@ -179,7 +179,7 @@ def test_a_component_that_raises_in_the_air(tmp_path, one_drone):
 
 @pytest.mark.parametrize("fidelity", ["times", "code"])
 def test_an_endless_loop_is_named_with_its_line(tmp_path, monkeypatch, fidelity, one_drone):
-    monkeypatch.setattr(simulation, "PATIENCE_S", 2.0)
+    monkeypatch.setattr(run_session, "PATIENCE_S", 2.0)
     run = simulate(one_drone(tmp_path, FREEZE), Options(fidelity, out=tmp_path / "out"))
     outcome = record(run.folder)["outcome"]
     assert outcome["status"] == "failed"

@@ -6,7 +6,7 @@ import pytest
 
 from volery import Options, simulate
 from volery.cost import load_catalogue
-from volery.run import simulate as simulation
+from volery.run import run_session
 from volery.run.assembly.simulated_fleet import SimulatedFleet
 
 pytestmark = pytest.mark.integration
@@ -34,7 +34,7 @@ def flown(delivery):
             fleets.append(self)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulation, "SimulatedFleet", Kept)
+        patch.setattr(run_session, "SimulatedFleet", Kept)
         run = simulate(delivery, Options(fidelity="code", seed=7), scenario="pocket")
     (fleet,) = fleets
     return run.record, {name: flight.truth() for name, flight in fleet.flights.items()}
