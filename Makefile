@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 # where it is set, as in many containers, each of the hundreds of programs that tests start compiles all its modules
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test check bench docs wheel clean
+.PHONY: demo test test-all check bench docs wheel clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/volery.stamp ## parcels across a city, two allocations side by side, a report
@@ -21,11 +21,14 @@ test: $(VENV)/test.stamp ## all tests, against real sockets, clients and a brows
 	$(BIN)/pytest -n auto --dist worksteal --durations=5 -m "not integration" || status=1; \
 	echo "real ROS, of whose time most is waiting, beside the other integration tests; its result comes last"; \
 	$(BIN)/pytest --durations=5 tests/integration/transports >$(VENV)/transports.log 2>&1 & transports=$$!; \
-	$(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=5 -m integration tests/integration \
+	$(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=5 -m "integration and not long" tests/integration \
 		--ignore tests/integration/transports || status=1; \
 	wait $$transports || status=1; \
 	cat $(VENV)/transports.log; \
 	exit $$status
+
+test-all: test ## the same and what computes for minutes: the modules of a wheel, compiled
+	$(BIN)/pytest -m long
 
 CHECKS := check-style check-types check-types-of-scripts check-layers check-words check-pages
 
