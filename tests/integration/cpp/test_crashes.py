@@ -83,7 +83,7 @@ def test_a_program_that_fails_starts_again(run_model):
     assert outcome.run.record.outcome.status == "failed"
     assert outcome.trace.complete
     failures = [(one.at // S, one.what) for one in outcome.of(Failure)]
-    assert failures == [(at, "crash: ended with exit status 3") for at in (3, 7)]
+    assert failures == [(at, "ended with exit status 3") for at in (3, 7)]
     said = [(one.at // S, one.text) for one in outcome.of(Text) if one.source == "crash"]
     assert [at for at, text in said if text == "and now: status"] == [2, 6]
 
