@@ -243,7 +243,7 @@ def compiled_modules() -> Iterator[str]:
 C_LIBRARY = re.compile(r"a?(sin|cos|tan)h?|atan2|cbrt|pow|exp\w*|log\w*")
 """Functions of ``math`` whose last bit depends on the processor."""
 UNTRACED = (
-    *(f"src/volery/{name}/" for name in ("analysis", "calibration", "report", "testing")),
+    *(f"src/volery/{name}/" for name in ("analysis", "calibration", "explore", "report", "testing")),
     "src/volery/base/units.py",  # exact fractions
     "src/volery/control/digital_twin.py",  # these two judge recordings
     "src/volery/control/tuning.py",

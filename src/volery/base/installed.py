@@ -74,6 +74,9 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "ros": ("rosbags", "lz4"),
     "report": ("jinja2",),
     "control": ("matplotlib", "pyulog"),
+    "explore": ("scipy", "optuna", "SALib", "pandas", "pyarrow"),
+    "dask": ("distributed",),
+    "ray": ("ray",),
 }
 """Modules that each extra installs, as in ``pyproject.toml``."""
 
