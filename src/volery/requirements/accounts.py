@@ -7,22 +7,30 @@ argument.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
+from math import fsum, isnan
 from typing import Any, NamedTuple
 
-from volery.base.time import Ns, to_seconds
+from volery.base.time import Ns, S, to_seconds
+from volery.model.reading import NOTE_PREFIX
 from volery.requirements.added_observables import AddedInRun, load_added
 from volery.requirements.ledgers import (
     ChainLedger,
     ComponentLedger,
+    Distribution,
     EnergyLaw,
+    NetworkLedger,
+    Quantities,
     VehicleLedger,
     known,
     linear_energy,
     processor_energy,
 )
 from volery.requirements.record import (
+    DELIVERY,
+    DELIVERY_KIND,
     ComponentRecord,
     FailureRecord,
     LawRecord,
@@ -53,11 +61,13 @@ from volery.trace.events import (
     Record,
     Slice,
     Text,
+    Transmission,
     Unserved,
     VehicleState,
     Verdict,
 )
 
+APPLICATION = "application"
 FRAMEWORK = "volery"
 """The source of texts of the framework: its warnings become warnings of the record."""
 WARNING = 4
@@ -96,6 +106,9 @@ class Accounts:
         self._added = tuple(AddedInRun(name, made, setup) for name, made in load_added().items())
         self._verdicts: dict[str, Verdict] = {}
         self._chains = {one.name: ChainLedger(one) for one in setup.chains}
+        self._networks = {one.name: NetworkLedger() for one in setup.networks}
+        self._collisions: Counter[str] = Counter()
+        self._lost_messages = 0
         self._demands = Demands()
         self._preemptions: dict[tuple[str, str, str], int] = {}
         self._failures: list[Failure] = []
@@ -107,6 +120,7 @@ class Accounts:
             Slice: self._slice,
             Preemption: self._preemption,
             Message: self._message,
+            Transmission: self._transmission,
             Charge: self._charge,
             Activation: self._activation,
             Call: self._call,
@@ -161,8 +175,16 @@ class Accounts:
     def _message(self, event: Message) -> None:
         for chain in self._chains.values():
             chain.message(event)
+        if event.received == NONE:
+            self._lost_messages += 1
         at = event.sent if event.received == NONE else event.received
         self.last = at if at > self.last else self.last
+
+    def _transmission(self, event: Transmission) -> None:
+        ledger = self._networks.get(event.network)
+        if ledger is not None:
+            ledger.transmission(event)
+        self._other(event)
 
     def _charge(self, event: Charge) -> None:
         at, component, processor = event[:3]
@@ -206,6 +228,7 @@ class Accounts:
         self._other(event)
 
     def _collision(self, event: Collision) -> None:
+        self._collisions[event.vehicle] += 1
         self._failure(Failure(event.at, event.vehicle, str(event)))
 
     def _verdict(self, event: Verdict) -> None:
@@ -272,6 +295,87 @@ class Accounts:
             wall_s=wall,
             real_time_factor=elapsed / wall if wall else None,
         )
+
+    def observables(self, ended: Ns) -> dict[str, float]:
+        """Return every quantity that requirements may bound, by its name, for a run that ended at *ended*.
+
+        Equal to what ``make_observer`` observes, at no cost for each event. What was not observed is missing.
+        Quantities of single operations and of the requirements of other packages are missing as well, unless
+        a requirement is about them.
+        """
+        found = {
+            f"{subject}.{quantity}": value
+            for subject, quantities in self._quantities(ended)
+            for quantity, value in quantities.items()
+            if value is not None
+        }
+        for verdict in self._verdicts.values():
+            if not isnan(verdict.observed):
+                found.setdefault(verdict.observable, verdict.observed)
+        return found
+
+    def _quantities(self, ended: Ns) -> Iterator[tuple[str, Quantities]]:
+        """Yield each subject with what was observed of it."""
+        elapsed = to_seconds(ended)
+        failures = Counter(one.who for one in self._failures)
+        for name in self._declared:
+            ledger = self._components[name]
+            joules = ledger.energy(self._processors.get(ledger.processor), self._energy)
+            yield name, ledger.quantities(elapsed, joules) | {"failures": float(failures[name])}
+        energies = []
+        for name, known_as in self._processors.items():
+            energies.append(processor_energy(known_as, self._components.values(), elapsed, self._energy))
+            busy = to_seconds(self._busy[name])
+            utilisation = busy / (elapsed * known_as.cores) if elapsed else None
+            yield name, {"utilisation": utilisation, "energy": energies[-1]}
+        for name, network in self._networks.items():
+            yield name, network.quantities(ended)
+        for name, vehicle in self._vehicles.items():
+            yield name, vehicle.quantities() | {"collisions": float(self._collisions[name])}
+        for name, chain in self._chains.items():
+            yield name, chain.latencies.seconds("latency")
+        noted = self._noted()
+        for kind, quantities in noted.items():
+            yield f"{NOTE_PREFIX}.{kind}", quantities
+        parcels = noted.get(DELIVERY_KIND, {})
+        delivery = {
+            name: parcels.get(words, None if "." in words else 0.0) for name, words in DELIVERY.items()
+        }
+        computing = [one for one in energies if one is not None]
+        yield (
+            APPLICATION,
+            {
+                **delivery,
+                "computing_energy": fsum(computing) if len(computing) == len(energies) > 0 else None,
+                "messages_lost": float(self._lost_messages),
+                "failures": float(len(self._failures) - self._collisions.total()),
+            },
+        )
+        for one in self._added:
+            values = one.record(ended).values
+            for name, value in values.items():
+                subject, _, quantity = name.rpartition(".")
+                yield subject, {quantity: value}
+
+    def _noted(self) -> dict[str, Quantities]:
+        """Return, by kind, how many subjects each state was noted of, and the times to it."""
+        found: dict[str, Quantities] = {}
+        for kind, subjects in self._notes.items():
+            spreads: dict[str, Distribution] = {}
+            for steps in subjects.values():
+                for state in dict.fromkeys(step.state for step in steps):
+                    entered = next(step.at for step in steps if step.state == state)
+                    spreads.setdefault(state, Distribution()).add(entered - steps[0].at)
+            found[kind] = {
+                name: value
+                for state, spread in spreads.items()
+                for name, value in (
+                    (state, float(spread.count)),
+                    (f"{state}.time_max", spread.largest / S),
+                    (f"{state}.time_mean", spread.total / spread.count / S),
+                )
+            }
+        return found
 
     def _component_records(self) -> dict[str, ComponentRecord]:
         """Return the records of components, without the framework's own tasks, which are not set up."""

@@ -15,9 +15,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from math import fsum, hypot, isnan, sqrt
+from math import fsum, hypot, isnan, nan, sqrt
 
-from volery.base.time import Ns, to_seconds
+from volery.base.time import Ns, S, to_seconds
 from volery.requirements.record import (
     ChainRecord,
     ComponentRecord,
@@ -28,9 +28,27 @@ from volery.requirements.record import (
     VehicleRecord,
 )
 from volery.trace.attachments import ChainSetup, ComponentSetup, ProcessorSetup, VehicleSetup
-from volery.trace.events import NONE, Activation, Call, Charge, Message, Operation, VehicleState
+from volery.trace.events import NONE, Activation, Call, Charge, Message, Operation, Transmission, VehicleState
 
 _BITS = 10
+
+
+PERIOD_TOLERANCE = 0.1
+"""A release is in time if it is at most this share of the period late."""
+
+LANDINGS = ("land", "return_home")
+"""Operations that end on the ground. The landing at the end of a run, ``come_to_rest``, is not judged."""
+
+AT_THE_END = "come_to_rest"
+"""Operation by which the run itself brings a vehicle down when its components have ended."""
+
+TRAVELS = ("goto", "drive")
+"""Operations that go to a point."""
+
+OK = "ok"
+
+Quantities = dict[str, float | None]
+"""What was observed of one subject, by the names of the observables; None where nothing was."""
 
 
 class Distribution:
@@ -67,6 +85,13 @@ class Distribution:
             if seen >= wanted:
                 return min(_upper_edge(bucket), self.largest)
         return self.largest
+
+    def seconds(self, name: str) -> Quantities:
+        """Return *name*, its mean and its 95 % quantile in seconds."""
+        if not self.count:
+            return {name: None, f"{name}_mean": None, f"{name}_p95": None}
+        mean, p95 = self.total / self.count, self.quantile(0.95) or 0
+        return {name: self.largest / S, f"{name}_mean": mean / S, f"{name}_p95": p95 / S}
 
 
 def _upper_edge(bucket: int) -> Ns:
@@ -112,6 +137,9 @@ class ComponentLedger:
     charges: int = 0  # other than ROS calls
     ros_calls: dict[str, int] = field(default_factory=dict)
     misses: int = 0
+    deadlines: int = 0  # activations with one
+    late: int = 0  # releases later than the promised period
+    released: Ns = NONE  # the latest release of a component with a period
     activations: Distribution = field(default_factory=Distribution)
     calls: Distribution = field(default_factory=Distribution)
 
@@ -131,8 +159,14 @@ class ComponentLedger:
     def activation(self, event: Activation) -> None:
         """Add an activation that ended."""
         self.activations.add(event.finished - event.released)
-        if event.deadline != NONE and event.finished > event.deadline:
-            self.misses += 1
+        if event.deadline != NONE:
+            self.deadlines += 1
+            self.misses += event.finished > event.deadline
+        period = self.setup.period
+        if period != NONE:
+            if self.released != NONE:
+                self.late += event.released - self.released > round(period * (1.0 + PERIOD_TOLERANCE))
+            self.released = max(self.released, event.released)
 
     def call(self, event: Call) -> None:
         """Add a call that the component served."""
@@ -166,6 +200,21 @@ class ComponentLedger:
             response_s=self._response(),
             response_bound_s=None if response_bound is None else to_seconds(response_bound),
         )
+
+    def quantities(self, elapsed_s: float, energy_j: float | None) -> Quantities:
+        """Return all that can be observed of it but its failures."""
+        executed = to_seconds(self.executed)
+        return {
+            **self.responses().seconds("response_time"),
+            "deadline_misses": float(self.misses) if self.deadlines else None,
+            "period_violations": None if self.released == NONE else float(self.late),
+            "activations": float(self.activations.count),
+            "cpu_time": executed if elapsed_s else None,
+            "utilisation": executed / elapsed_s if elapsed_s else None,
+            **self.calls.seconds("call_time"),
+            "calls": float(self.calls.count),
+            "energy": energy_j,
+        }
 
     def responses(self) -> Distribution:
         """Return its response times: a passive component responds to calls, an active one to releases."""
@@ -207,6 +256,7 @@ class VehicleLedger:
     airborne: Ns = 0
     joules: float = 0.0
     metered: bool = False
+    least_battery: float = nan
     operations: list[Operation] = field(default_factory=list)
 
     def state(self, event: VehicleState) -> None:
@@ -216,6 +266,8 @@ class VehicleLedger:
         z = event.where()[2]
         if not event.armed and not isnan(z):
             self.ground = z
+        if not event.battery >= self.least_battery and not isnan(event.battery):
+            self.least_battery = event.battery
         self.last = event
 
     def _between(self, before: VehicleState, after: VehicleState) -> None:
@@ -234,9 +286,27 @@ class VehicleLedger:
             self.metered = True
             self.joules += watts * to_seconds(elapsed)
 
+    def quantities(self) -> Quantities:
+        """Return all that can be observed of it but its collisions."""
+        landings = [one for one in self.operations if one.operation in LANDINGS and one.outcome == OK]
+        travels = [one for one in self.operations if one.operation in TRAVELS and one.outcome == OK]
+        failed = [one for one in self.operations if one.outcome != OK and one.operation != AT_THE_END]
+        observed = self.last is not None
+        return {
+            "landing_offset": largest([one.true_horizontal for one in landings]),
+            "goto_error": largest([one.true_horizontal for one in travels]),
+            "goto_error_vertical": largest([one.true_vertical for one in travels]),
+            "goto_error_by_estimate": largest([one.estimate_horizontal for one in travels]),
+            "battery_min": known(self.least_battery),
+            "distance": self.distance if observed else None,
+            "airborne_time": to_seconds(self.airborne) if observed else None,
+            "energy": self.joules if observed and self.metered else None,
+            "failures": float(len(failed)),
+        }
+
     def record(self) -> VehicleRecord:
         """Return the record."""
-        done = [one for one in self.operations if one.outcome == "ok"]
+        done = [one for one in self.operations if one.outcome == OK]
         last = self.last
         return VehicleRecord(
             autopilot=self.setup.autopilot,
@@ -290,6 +360,31 @@ def largest(values: list[float]) -> float | None:
     """Return the greatest absolute value; None if all are NaN or there are none."""
     sizes = [abs(value) for value in values if not isnan(value)]
     return max(sizes, default=None)
+
+
+@dataclass
+class NetworkLedger:
+    """Transmissions over one network."""
+
+    occupied: Ns = 0
+    lost: int = 0
+    delays: Distribution = field(default_factory=Distribution)
+
+    def transmission(self, event: Transmission) -> None:
+        """Add a transmission that arrived or was lost."""
+        self.occupied += event.occupied
+        if event.received == NONE:
+            self.lost += 1
+        else:
+            self.delays.add(event.received - event.sent)
+
+    def quantities(self, elapsed: Ns) -> Quantities:
+        """Return all that can be observed of it."""
+        return {
+            "utilisation": min(1.0, self.occupied / elapsed) if elapsed else None,
+            **self.delays.seconds("delay"),
+            "lost": float(self.lost),
+        }
 
 
 _REMEMBERED = 256

@@ -26,6 +26,11 @@ from volery.requirements.added_observables import (
     subjects_of,
 )
 from volery.requirements.ledgers import (
+    AT_THE_END,
+    LANDINGS,
+    OK,
+    PERIOD_TOLERANCE,
+    TRAVELS,
     ChainLedger,
     ComponentLedger,
     Distribution,
@@ -33,7 +38,7 @@ from volery.requirements.ledgers import (
     linear_energy,
     processor_energy,
 )
-from volery.requirements.record import DELIVERY_KIND
+from volery.requirements.record import DELIVERY, DELIVERY_KIND
 from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
 from volery.trace.events import (
     NONE,
@@ -50,20 +55,6 @@ from volery.trace.events import (
     Transmission,
     VehicleState,
 )
-
-PERIOD_TOLERANCE = 0.1
-"""A release is in time if it is at most this share of the period late."""
-
-LANDINGS = ("land", "return_home")
-"""Operations that end on the ground. The landing at the end of a run, ``come_to_rest``, is not judged."""
-
-AT_THE_END = "come_to_rest"
-"""Operation by which the run itself brings a vehicle down when its components have ended."""
-
-TRAVELS = ("goto", "drive")
-"""Operations that go to a point."""
-
-OK = "ok"
 
 
 @dataclass(frozen=True)
@@ -424,15 +415,6 @@ def _latency(reading: Callable[[Distribution], float | None]) -> Make:
 
 # -- the table
 
-_DELIVERY = {
-    "ordered": ("ordered", ""),
-    "delivered": ("delivered", ""),
-    "undelivered": ("failed", ""),
-    "delivery_time_max": ("delivered", "time_max"),
-    "delivery_time_mean": ("delivered", "time_mean"),
-}
-"""State and quantity of the notes that a delivery has names of its own for."""
-
 TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
     (
         "component",
@@ -567,11 +549,11 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
         (
             "application",
             quantity,
-            "s" if words[1] else "",
-            f"the same as `{'.'.join((NOTE_PREFIX, DELIVERY_KIND, *filter(None, words)))}`",
-            _of_a_delivery(*words),
+            "s" if "." in words else "",
+            f"the same as `{NOTE_PREFIX}.{DELIVERY_KIND}.{words}`",
+            _of_a_delivery(*words.partition(".")[::2]),
         )
-        for quantity, words in _DELIVERY.items()
+        for quantity, words in DELIVERY.items()
     ),
     (
         "application",

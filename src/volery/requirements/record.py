@@ -21,6 +21,15 @@ DELIVERY_KIND: Final = "parcel"
 """Kind of the notes of a delivery. Version 1 of ``run.json`` had no others, and ``application.delivered`` and
 its like are about them."""
 
+DELIVERY: Final = {
+    "ordered": "ordered",
+    "delivered": "delivered",
+    "undelivered": "failed",
+    "delivery_time_max": "delivered.time_max",
+    "delivery_time_mean": "delivered.time_mean",
+}
+"""Quantities of the application that are other names for those of a delivery's notes."""
+
 Status = Literal["completed", "interrupted", "failed", "unfinished"]
 """``interrupted`` by the user; ``failed``: something raised; ``unfinished``: killed, known from its trace."""
 

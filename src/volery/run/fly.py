@@ -211,6 +211,7 @@ class _Flight:
             tuple(left),
             tuple(self._recording.problems),
             tuple(self._recording.notes),
+            self._recording.accounts.observables(kernel.now()),
         )
 
     def _fly(self, vehicle: Vehicle) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -173,6 +173,8 @@ class Run:
         left: Names of tasks that did not end when they were cancelled.
         problems: Files of the run folder that could not be written, in words.
         notes: Documents that were left out because an optional dependency is missing, in words.
+        observables: Every observed quantity by its name, such as ``drone_1.energy``, in SI units. What was
+            not observed is missing; quantities of single operations are there if a requirement bounds them.
     """
 
     record: RunRecord
@@ -181,6 +183,7 @@ class Run:
     left: tuple[str, ...] = ()
     problems: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    observables: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def completed(self) -> bool:

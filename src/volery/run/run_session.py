@@ -334,6 +334,7 @@ class RunSession:
             tuple(left),
             tuple(self._recording.problems),
             tuple(self._recording.notes),
+            self._recording.accounts.observables(now),
         )
 
 

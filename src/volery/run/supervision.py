@@ -204,7 +204,15 @@ def recover_run(
     record = recording.finish("failed", str(error), ended, observers.verdicts(ended))
     if cut is not None:
         cut.unlink()
-    return Run(record, recording.folder, error, (), tuple(recording.problems), tuple(recording.notes))
+    return Run(
+        record,
+        recording.folder,
+        error,
+        (),
+        tuple(recording.problems),
+        tuple(recording.notes),
+        recording.accounts.observables(ended),
+    )
 
 
 def _set_aside(out: Path) -> Path | None:

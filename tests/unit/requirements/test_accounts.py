@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import replace
-from math import nan
+from math import isnan, nan
 from pathlib import Path
 
 import pytest
@@ -10,7 +10,9 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.requirements.accounts import Accounts, Circumstances
+from volery.requirements.added_observables import subjects_of
 from volery.requirements.ledgers import linear_energy
+from volery.requirements.observables import all_observables, make_observer
 from volery.requirements.record import RunRecord, read_record, write_record
 from volery.testing.sample_run import sample_events, sample_setup
 from volery.trace.attachments import ComponentSetup, ProcessorSetup, RequirementSetup, RunSetup, VehicleSetup
@@ -347,3 +349,23 @@ def test_a_run_json_that_is_none(tmp_path: Path) -> None:
         read_record(tmp_path)
     with pytest.raises(UsageError, match="cannot write"):
         write_record(books(), tmp_path / "none")
+
+
+def test_accounts_come_to_what_every_observer_observes():
+    """The rows of a campaign hold every observable; observers of all of them would double its time."""
+    setup, accounts = sample_setup(), Accounts(sample_setup())
+    observers = {
+        f"{subject}.{one.quantity}": make_observer(f"{subject}.{one.quantity}", setup)
+        for one in all_observables()
+        for subject in subjects_of(setup).get(one.subject, ())
+    }
+    for event in sample_events():
+        accounts(event)
+        for observer in observers.values():
+            observer(event)
+    found = accounts.observables(accounts.last)
+    notes = {name: found.pop(name) for name in list(found) if name.startswith("note.")}
+    values = {name: observer.value(accounts.last) for name, observer in observers.items()}
+    assert found == {name: value for name, value in values.items() if not isnan(value)}
+    assert len(found) > 100
+    assert {name: make_observer(name, setup) for name in notes}
