@@ -17,7 +17,7 @@ from volery.cost import ProcessorPrices, load_catalogue
 from volery.model.environment import Vehicle
 from volery.model.instances import Instance
 from volery.model.system import System
-from volery.run.assembly.simulated_fleet import body_of
+from volery.run.assembly.bodies import body_of
 from volery.simulation.world.body_specs import Multirotor
 from volery.simulation.world.dynamics import battery_current, cell_voltage
 
@@ -143,13 +143,15 @@ def _energy(system: System, prices: ProcessorPrices, used: Utilisation, cores: i
     )
 
 
+def _reserve(system: System, vehicle: Vehicle) -> float:
+    """Return the share of the charge that a requirement wants to be left; 0 without one."""
+    wanted = f"{vehicle.name}.{RESERVE_OBSERVABLE}"
+    bounds = (one.bound for one in system.requirements if (one.observe, one.relation) == (wanted, "min"))
+    return max(bounds, default=0.0)
+
+
 def _endurance(system: System, vehicle: Vehicle, energy: Sequence[Energy]) -> Endurance:
-    reserve = max(
-        (one.bound for one in system.requirements
-         if one.observe == f"{vehicle.name}.{RESERVE_OBSERVABLE}" and one.relation == "min"),
-        default=0.0,
-    )  # fmt: skip
-    body = body_of(vehicle)
+    body, reserve = body_of(vehicle), _reserve(system, vehicle)
     if not isinstance(body, Multirotor):
         why = "the power of a rover depends on its way; simulate it"
         return Endurance(vehicle.name, None, None, reserve, None, why)
@@ -161,6 +163,37 @@ def _endurance(system: System, vehicle: Vehicle, energy: Sequence[Energy]) -> En
     seconds = hover_time(body, watts, reserve)
     longest = to_seconds(system.limits.duration_ns)
     return Endurance(vehicle.name, seconds, watts, reserve, seconds >= longest)
+
+
+@dataclass(frozen=True)
+class Hover:
+    """What a multirotor's airframe gives in hover, without computers: command, power and time.
+
+    ``throttle`` is the motor command 0..1 on a full battery; ``seconds`` until ``reserve`` of the charge.
+    """
+
+    vehicle: str
+    frame: str
+    mass_kg: float
+    throttle: float
+    watts: float
+    seconds: float
+    reserve: float
+
+
+def hovers(system: System) -> tuple[Hover, ...]:
+    """Return how each vehicle hovers whose airframe or payload the model states."""
+    found = []
+    for vehicle in system.vehicles:
+        if vehicle.airframe is None and not vehicle.payload_kg:
+            continue
+        body, reserve = body_of(vehicle), _reserve(system, vehicle)
+        assert isinstance(body, Multirotor)  # no other has an airframe
+        seconds = hover_time(body, body.hover_power, reserve)
+        mass = body.mass + body.payload
+        made = (body.frame or "quad-x", mass, body.hover_throttle, body.hover_power, seconds, reserve)
+        found.append(Hover(vehicle.name, *made))
+    return tuple(found)
 
 
 def hover_time(body: Multirotor, watts: float, reserve: float) -> float:

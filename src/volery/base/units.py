@@ -76,6 +76,8 @@ def _table() -> dict[str, Quantity]:
         "Ah": ("m", Fraction(3600), (1, 0, 0, 1, 0, 0)),
         "C": ("", Fraction(1), (1, 0, 0, 1, 0, 0)),
         "V": ("m", Fraction(1), (-3, 2, 1, -1, 0, 0)),
+        "Ohm": ("m k", Fraction(1), (-3, 2, 1, -2, 0, 0)),
+        "Ω": ("m k", Fraction(1), (-3, 2, 1, -2, 0, 0)),
         "bit": ("k M G", Fraction(1), (0, 0, 0, 0, 1, 0)),
         "B": ("k M G", Fraction(8), (0, 0, 0, 0, 1, 0)),
         "rad": ("m", Fraction(1), (0, 0, 0, 0, 0, 1)),
@@ -109,8 +111,15 @@ POWER = Kind("power", "W", "2.7 W or 300 mW")
 VOLTAGE = Kind("voltage", "V", "14.8 V")
 BANDWIDTH = Kind("bandwidth", "bit/s", "57600 bit/s or 20 Mbit/s")
 DATA_SIZE = Kind("size", "B", "96 B or 12 kB")
+MASS = Kind("mass", "kg", "2.4 kg or 350 g")
+FORCE = Kind("force", "N", "12 N")
+AREA = Kind("area", "m^2", "0.05 m^2")
+RESISTANCE = Kind("resistance", "Ohm", "12 mOhm")
 RATIO = Kind("ratio", "1", "0.5 % or 0.005")
-KINDS = (TIME, FREQUENCY, LENGTH, SPEED, ANGLE, ENERGY, POWER, CHARGE, VOLTAGE, BANDWIDTH, DATA_SIZE, RATIO)
+KINDS = (
+    TIME, FREQUENCY, LENGTH, SPEED, ANGLE, ENERGY, POWER, CHARGE, VOLTAGE, BANDWIDTH, DATA_SIZE, MASS, FORCE,
+    AREA, RESISTANCE, RATIO,
+)  # fmt: skip
 
 
 def unit(text: str) -> Quantity:

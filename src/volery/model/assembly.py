@@ -323,6 +323,7 @@ def assemble(model: FilePath | ModelBuilder, selection: Selection) -> tuple[Asse
             apply_changes(root, [change], problems)
     made.root = replicate(root, made.places, problems)
     apply_changes(made.root, late, problems)
+    _merge_airframes(made, folder, problems)
     return made, problems
 
 
@@ -427,6 +428,40 @@ def _merge_world(made: Assembly, folder: FilePath, all_changes: list[Change], pr
             problems.add(("environment", key), what, node.where, rules.UNKNOWN_KEY)
             continue
         environment.value[key] = _under(environment.value.get(key), node)
+
+
+def _merge_airframes(made: Assembly, folder: FilePath, problems: Problems) -> None:
+    """Replace the name of an airframe's file by what the file states, with the model's own entries on top."""
+    files_read: dict[str, Node] = {}
+    vehicles = made.root.at(("environment", "vehicles"))
+    for name, vehicle in vehicles.items.items() if vehicles else ():
+        stated = vehicle.child("airframe")
+        said = stated if stated is None or isinstance(stated.value, str) else stated.child("file")
+        if stated is None or said is None or not isinstance(said.value, str):
+            continue
+        file, path = said.value, ("environment", "vehicles", name, "airframe")
+        if not _allowed(made.root, folder, folder / file):
+            problems.add(path, outside(file), said.where, rules.OUTSIDE)
+            vehicle.items.pop("airframe")
+            continue
+        if file not in files_read:
+            what = "an airframe is a mapping that states its frame, mass, arm, propellers, motors and battery"
+            files_read[file], text = _read_mapping(folder / file, file, what, said.where, path)
+            made.sources = (*made.sources, Source(file, text))
+        vehicle.items["airframe"] = _on_top(
+            stated if isinstance(stated.value, dict) else Node({"file": said}, stated.where), files_read[file]
+        )
+
+
+def _on_top(own: Node, below: Node) -> Node:
+    """Return a tree with the entries of another one on top, mapping by mapping."""
+    if not isinstance(own.value, dict) or not isinstance(below.value, dict):
+        return own
+    both = {
+        key: _on_top(node, below.items[key]) if key in below.items else node
+        for key, node in own.items.items()
+    }
+    return Node({**below.items, **both}, below.where)
 
 
 def _listed(known: list[str]) -> str:

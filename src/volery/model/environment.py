@@ -14,15 +14,15 @@ from math import hypot, inf, pi
 from typing import Annotated, Any
 
 from volery.base.elementary import cos, sin
-from volery.base.errors import Location
+from volery.base.errors import Location, choices
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns
+from volery.model.airframes import AIRFRAME, BATTERY, LOAD, Airframe, Battery
 from volery.model.faults import FAULT, Fault
 from volery.model.fields import (
     ADDED_SENSOR,
     AUTOPILOT,
-    CHARGE,
     DISTANCE,
     HEADING,
     LATITUDE,
@@ -31,12 +31,10 @@ from volery.model.fields import (
     NUMBER,
     PERIOD,
     RATE,
-    SHARE,
     SPEED,
     TEXT,
     TIME,
     VEHICLE,
-    VOLTAGE,
     Key,
     ListOf,
     MapOf,
@@ -362,17 +360,6 @@ class Wind:
 
 
 @dataclass(frozen=True, slots=True)
-class Battery:
-    """A battery. Written as its capacity alone, or as a mapping."""
-
-    capacity_coulomb: Annotated[float, CHARGE, "Capacity when full."]
-    charge: Annotated[float, SHARE, "Share of the capacity that is left at the start."] = 1.0
-    voltage_v: Annotated[
-        float | None, VOLTAGE, "Nominal voltage; that of the vehicle's kind if it is not given."
-    ] = None
-
-
-@dataclass(frozen=True, slots=True)
 class Vehicle:
     """A drone or a rover with its autopilot.
 
@@ -386,9 +373,7 @@ class Vehicle:
     at: Annotated[Place, PLACE, "Where it stands at the start."]
     heading_deg: Annotated[float, HEADING, "Heading at the start, clockwise from north."] = 0.0
     battery: Annotated[
-        Battery | None,
-        Shorter(Record(Battery), key="capacity"),
-        "Its battery; that of its kind if it is not given.",
+        Battery | None, BATTERY, "Its battery; that of its airframe or its kind if it is not given."
     ] = None
     sensors: Annotated[
         str,
@@ -420,6 +405,12 @@ class Vehicle:
         MapOf(Whole(least=0, most=3000), free=True),
         "Where the pilot's transmitter rests: pulse widths in microseconds by channel, from 1.",
     ] = field(default_factory=dict)
+    airframe: Annotated[
+        Airframe | None,
+        AIRFRAME,
+        "Airframe of a multirotor, as a rule the name of its file; by default a usual quadrotor of 3 kg.",
+    ] = None
+    payload_kg: Annotated[float, LOAD, "Mass that it carries from the start, beside its own."] = 0.0
     processor: str | None = None
     where: Location | None = field(default=None, compare=False)
 
@@ -453,6 +444,27 @@ class VehicleText(Vehicle):
 
 class _Vehicle(Record):
     """A vehicle. A number of vehicles has been replaced by its copies when it is read."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Vehicle:
+        """See ``Syntax``. An airframe must be one that the autopilot flies, with the payload."""
+        made: Vehicle = super().read(node, path, reading)
+        problems, airframe = reading.problems, made.airframe
+        if made.kind != "multirotor" and (airframe is not None or made.payload_kg):
+            key = "payload" if airframe is None else "airframe"
+            here = reading.where((*path, *(("payload",) if airframe is None else ("airframe", "file"))))
+            problems.add((*path, key), f"a {made.kind} has no {key}; only a multirotor has one", here)
+        elif airframe is not None:
+            flying = sorted(reading.vocabulary.airframes)
+            if made.autopilot not in flying:
+                what = f"a simulated {made.autopilot} flies its own airframe; {choices(flying)} fly others"
+                problems.add((*path, "airframe"), what, reading.where((*path, "airframe", "file")))
+            if made.payload_kg > airframe.spare_kg >= 0.0:
+                what = (
+                    f"{made.payload_kg:g} kg are too heavy: beside its own {airframe.mass_kg:g} kg it lifts "
+                    f"{airframe.spare_kg:.2g} kg at most"
+                )
+                problems.add((*path, "payload"), what)
+        return made
 
     def schema(self, definitions: Schema) -> Schema:
         """See ``Syntax``."""

@@ -35,7 +35,7 @@ SHORT = "x-short"
 _LONGEST_SHOWN = 200
 """Characters of a value in a message."""
 _NAME = r"^[A-Za-z_][A-Za-z0-9_-]*$"
-_UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s|m|deg|coulomb|v|w|j|b)$")
+_UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s|m2|m|deg|coulomb|kg|ohm|v|w|j|b)$")
 
 
 class WrongValueError(ValueError):

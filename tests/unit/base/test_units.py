@@ -58,7 +58,7 @@ def test_times_are_exact_nanoseconds(written, ns):
 @pytest.mark.parametrize(
     ("written", "pieces"),
     [
-        ("2 kg", ["'2 kg' is in kg", "a time such as 2 ms, 1.5 s or 15 min is expected"]),
+        ("2 kg", ["'2 kg' is a mass", "a time such as 2 ms, 1.5 s or 15 min is expected"]),
         ("3 m", ["'3 m' is a length", "a time such as"]),
         (5, ["'5' is a number without a unit", "a time such as"]),
         ("soon", ["'soon' is not a number with a unit"]),

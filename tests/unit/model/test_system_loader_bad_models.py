@@ -73,7 +73,7 @@ SPOILT = {
         ("latency: 20 ms", "latency: 20 kg"),
         "latency: 20 kg",
         "platform.networks.radio.latency",
-        ["'20 kg' is in kg", "a time such as 2 ms, 1.5 s or 15 min is expected"],
+        ["'20 kg' is a mass", "a time such as 2 ms, 1.5 s or 15 min is expected"],
     ),
     "no unit": (
         ("latency: 20 ms", "latency: 20"),
@@ -600,7 +600,7 @@ def test_a_world_file_holds_geography_only(workshop):
         ),
         ("enviroment.wind=1 m/s", "no key of a model named 'enviroment' (did you mean 'environment'?)"),
         ("platform.processors.onboard.freq=1 GHz", "no key of platform.processors.onboard named 'freq'"),
-        ("platform.processors.onboard.frequency=2 kg", "'2 kg' is in kg"),
+        ("platform.processors.onboard.frequency=2 kg", "'2 kg' is a mass"),
         (
             "platform.processors.onboard.frequency=5 GHz",
             "5000 MHz is outside what is known of rpi4-cortex-a72",

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from volery.base.errors import UsageError, choices
 from volery.cli.command import BAD_INPUT, OK, Commands
-from volery.cli.console import Output, make_table
+from volery.cli.console import Output, make_table, number_column
 from volery.cli.options import Model, Overrides
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def _show(output: Output, checked: CheckedModel) -> None:
             output.complain(f"volery: {_line(one)}")
     system = checked.system
     if system is not None and not checked.errors:
-        output.show(_summary(system), _instances(system), *_readiness(checked.missing))
+        output.show(_summary(system), _instances(system), *_hovers(system), *_readiness(checked.missing))
     said = [
         Text(f"⚠ {_line(one)}", style="yellow") for one in checked.findings if one.rule.level == "warning"
     ]
@@ -153,6 +153,28 @@ def _instances(system: System) -> Table:
         node = f"node on {vehicle.processor}" if vehicle.processor else "no node on a computer"
         listed.add_row(vehicle.name, vehicle.kind, vehicle.autopilot, node, vehicle.at.name)
     return listed
+
+
+def _hovers(system: System) -> Iterable[Table]:
+    """Yield what the airframes of the model give in hover."""
+    from volery.analysis.budgets import hovers
+
+    listed = make_table(
+        "in hover",
+        "frame",
+        number_column("mass"),
+        number_column("throttle"),
+        number_column("power"),
+        number_column("for"),
+        "until the charge left is",
+    )
+    for one in hovers(system):
+        figures = f"{one.mass_kg:.4g} kg", f"{one.throttle:.0%}", f"{one.watts:.0f} W"
+        listed.add_row(
+            one.vehicle, one.frame, *figures, f"{one.seconds / 60.0:.1f} min", f"{one.reserve:.0%}"
+        )
+    if listed.row_count:
+        yield listed
 
 
 def _readiness(missing: dict[str, tuple[Finding, ...]]) -> Iterable[Text]:

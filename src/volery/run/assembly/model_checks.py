@@ -48,6 +48,7 @@ def vocabulary() -> Vocabulary:
         all_observables(),
         _kinds,
         frozenset(sensors.names()),
+        frozenset(name for name in autopilots if firmwares.load(name).airframes),
     )
 
 

@@ -24,21 +24,19 @@ from volery.kernel.api import Kernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Codec, Link
 from volery.links.wire_faults import FaultyLink, WireFaults, faulty_pair
-from volery.model.environment import Battery as BatteryModel
 from volery.model.environment import Environment, Place, Prism
 from volery.model.environment import Vehicle as VehicleModel
 from volery.model.environment import Wind as WindModel
+from volery.run.assembly.bodies import body_of
 from volery.run.assembly.simulated_vehicles import LINK_DELAY, SimulatedVehicle
 from volery.run.result import SAMPLING_PERIOD, VehicleProgress
 from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily, firmwares
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
-from volery.simulation.world.body_specs import Battery, BodySpec, Multirotor, Rover
 from volery.simulation.world.environment_models import Wind
 from volery.simulation.world.scene import Scene, Solid
 from volery.simulation.world.world import Truth, World
 from volery.trace.events import Collision, Text, ignore
 
-CELL_NOMINAL_VOLTS = 3.7
 NOTICE = 5
 """MAVLink severity."""
 
@@ -290,24 +288,6 @@ def wind_of(model: WindModel) -> Wind:
     return Wind(
         east=model.speed_m_s * sin(towards), north=model.speed_m_s * cos(towards), gust=model.gusts_m_s
     )
-
-
-def body_of(vehicle: VehicleModel) -> BodySpec:
-    """Return the body of a vehicle at its place in the model."""
-    kind = Multirotor if vehicle.kind == "multirotor" else Rover
-    usual = kind().battery
-    return kind(
-        at=(vehicle.at.east_m, vehicle.at.north_m, 0.0),
-        heading_deg=vehicle.heading_deg,
-        sensors=vehicle.sensors,
-        added_sensors=vehicle.added_sensors,
-        battery=_battery(vehicle.battery, usual) if vehicle.battery else usual,
-    )
-
-
-def _battery(model: BatteryModel, usual: Battery) -> Battery:
-    cells = usual.cells if model.voltage_v is None else max(1, round(model.voltage_v / CELL_NOMINAL_VOLTS))
-    return Battery(model.capacity_coulomb / 3600.0, cells, usual.resistance_ohm, model.charge)
 
 
 def fleet_of(kernel: Kernel, wanted: Sequence[SimulatedVehicle], seed: int) -> SimulatedFleet:

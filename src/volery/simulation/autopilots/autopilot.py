@@ -129,6 +129,8 @@ class FirmwareFamily:
     """Links that ``volery vehicle serve`` opens unless addresses are given."""
     versions: Mapping[str, Mapping[str, Firmware]] = field(default_factory=dict)
     """``kinds`` of each version, the newest last; empty where there is one only."""
+    airframes: bool = False
+    """Whether it can be configured for the airframe of a model."""
 
     def of_version(self, version: str) -> FirmwareFamily:
         """Return the family with the firmwares of one version; of the newest if *version* is empty.

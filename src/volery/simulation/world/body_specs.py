@@ -9,6 +9,7 @@ multirotor flies some seven minutes on a charge.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi, radians, sqrt
 
@@ -52,6 +53,7 @@ from volery.simulation.world.state_layout import (
     P_ROTOR_SPIN,
     P_ROTOR_X,
     P_ROTOR_Y,
+    P_ROTORS,
     P_SKID_STEERED,
     P_SPEED_DECAY,
     P_SPIN_DAMPING,
@@ -73,6 +75,8 @@ from volery.simulation.world.state_layout import (
 
 AIR_DENSITY = 1.225  # [kg/m^3], ISA at sea level
 STANDARD_GRAVITY = 9.80665  # [m/s^2], CGPM 1901
+MOST_COMMAND = 0.95
+"""Greatest motor command that autopilots give: ArduPilot's MOT_SPIN_MAX."""
 
 
 _MULTIROTOR_POSITIVE = (
@@ -158,9 +162,38 @@ def x_frame(arm: float) -> tuple[Rotor, Rotor, Rotor, Rotor]:
     return Rotor(side, -side, -1), Rotor(-side, side, -1), Rotor(side, side, 1), Rotor(-side, -side, 1)
 
 
+FRAMES: Mapping[str, tuple[tuple[float, int], ...]] = {
+    "quad-x": ((45.0, -1), (-135.0, -1), (-45.0, 1), (135.0, 1)),
+    "quad-plus": ((90.0, -1), (-90.0, -1), (0.0, 1), (180.0, 1)),
+    "hexa-x": ((90.0, 1), (-90.0, -1), (-30.0, 1), (150.0, -1), (30.0, -1), (-150.0, 1)),
+    "hexa-plus": ((0.0, 1), (180.0, -1), (-120.0, 1), (60.0, -1), (-60.0, -1), (120.0, 1)),
+    "octo-x": (
+        (22.5, 1), (-157.5, 1), (67.5, -1), (157.5, -1), (-22.5, -1), (-112.5, -1), (-67.5, 1), (112.5, 1)
+    ),
+    "octo-plus": (
+        (0.0, 1), (180.0, 1), (45.0, -1), (135.0, -1), (-45.0, -1), (-135.0, -1), (-90.0, 1), (90.0, 1)
+    ),
+}  # fmt: skip
+"""Rotors in ArduPilot's motor order (AP_MotorsMatrix): angle clockwise from the nose [degrees], spin."""
+
+
+def frame_rotors(frame: str, arm: float) -> tuple[Rotor, ...]:
+    """Return the rotors of a frame, one of ``FRAMES``.
+
+    Args:
+        frame: Name of the frame.
+        arm: Distance of the rotors from the centre [m].
+    """
+    found = []
+    for degrees, spin in FRAMES[frame]:
+        s, c = sine_cosine(radians(degrees))
+        found.append(Rotor(arm * c, -arm * s, spin))
+    return tuple(found)
+
+
 @dataclass(frozen=True)
 class Multirotor:
-    """A body with four rotors.
+    """A body with four, six or eight rotors.
 
     Args:
         at: Initial position east, north, up about the world's origin [m]; the height is the ground's.
@@ -170,7 +203,10 @@ class Multirotor:
         battery: The battery.
         mass: Mass [kg].
         inertia: Principal moments of inertia about forward, left, up [kg m^2].
-        rotors: The four rotors.
+        rotors: The rotors, in the order of the motors.
+        frame: Name of the frame in ``FRAMES``, for which the autopilot is configured; empty: the usual
+            body, for which it is configured by default.
+        payload: Mass that it carries from the start, beside its own [kg].
         thrust_coefficient: k_T in thrust = k_T w^2 [N s^2].
         propeller_diameter: Diameter [m].
         figure_of_merit: Ideal over real induced power of a rotor in hover, 0..1.
@@ -192,7 +228,9 @@ class Multirotor:
     battery: Battery = Battery()
     mass: float = 3.0
     inertia: Vector = (0.040, 0.040, 0.089)
-    rotors: tuple[Rotor, Rotor, Rotor, Rotor] = field(default_factory=lambda: x_frame(0.25))
+    rotors: tuple[Rotor, ...] = field(default_factory=lambda: x_frame(0.25))
+    frame: str = ""
+    payload: float = 0.0
     thrust_coefficient: float = 4.0e-5
     propeller_diameter: float = 0.35
     figure_of_merit: float = 0.6
@@ -208,6 +246,11 @@ class Multirotor:
 
     def __post_init__(self) -> None:
         _above_zero("multirotor", self, _MULTIROTOR_POSITIVE)
+        if self.payload > self.spare_lift:
+            raise UsageError(
+                f"a payload of {self.payload:g} kg is too heavy: beside {self.mass:g} kg of its own "
+                f"it can lift {max(0.0, self.spare_lift):.2g} kg"
+            )
 
     @property
     def reach(self) -> float:
@@ -228,13 +271,52 @@ class Multirotor:
     @property
     def hover_speed(self) -> float:
         """Rotor speed at which the thrust equals the weight [rad/s]."""
-        return sqrt(self.mass * STANDARD_GRAVITY / (4.0 * self.thrust_coefficient))
+        return sqrt(self.weight / (len(self.rotors) * self.thrust_coefficient))
+
+    @property
+    def weight(self) -> float:
+        """Weight with the payload that it carries from the start [N]."""
+        return (self.mass + self.payload) * STANDARD_GRAVITY
+
+    @property
+    def hover_throttle(self) -> float:
+        """Motor command 0..1 in hover, with a full battery."""
+        return self.hover_speed / self.top_speed
+
+    @property
+    def spare_lift(self) -> float:
+        """Payload with which it hovers on a full battery at ``MOST_COMMAND`` [kg]; may be negative."""
+        command = MOST_COMMAND * self.top_speed
+        return len(self.rotors) * self.thrust_coefficient * command * command / STANDARD_GRAVITY - self.mass
+
+    @property
+    def authority(self) -> Vector:
+        """Angular acceleration for a difference of full thrust between motors, about forward, left, up."""
+        full = self.thrust_coefficient * self.top_speed * self.top_speed
+        reach = max(max(abs(one.forward), abs(one.left)) for one in self.rotors)
+        roll = sum(one.left * one.left for one in self.rotors) / reach
+        pitch = sum(one.forward * one.forward for one in self.rotors) / reach
+        yaw = len(self.rotors) * self.torque_coefficient / self.thrust_coefficient
+        return (
+            full * roll / self.inertia[0], full * pitch / self.inertia[1], full * yaw / self.inertia[2]
+        )  # fmt: skip
+
+    def top_level_speed(self, tilt: float) -> float:
+        """Return the speed of level flight at a tilt [rad], against the drag of ``dynamics`` [m/s]."""
+        s, c = sine_cosine(tilt)
+        low, high = 0.0, 200.0
+        for _ in range(60):
+            speed = 0.5 * (low + high)
+            drag = (self.drag_linear + self.drag_quadratic * speed) * speed
+            low, high = (speed, high) if drag * c < self.weight * s else (low, speed)
+        return low
 
     @property
     def hover_power(self) -> float:
-        """Electrical power in hover, without payload [W]."""
+        """Electrical power in hover, without computers [W]."""
         speed = self.hover_speed
-        return 4.0 * self.torque_coefficient * speed * speed * speed / self.efficiency + self.idle_power
+        shaft = len(self.rotors) * self.torque_coefficient * speed * speed * speed
+        return shaft / self.efficiency + self.idle_power
 
     @property
     def hover_current(self) -> float:
@@ -311,6 +393,7 @@ def _decay_in_half_a_step(lag: float) -> float:
 
 def _fill_multirotor(row: Array, spec: Multirotor) -> None:
     weight = spec.mass * STANDARD_GRAVITY
+    row[P_ROTORS] = len(spec.rotors)
     row[P_KIND] = MULTIROTOR
     row[P_INERTIA : P_INERTIA + 3] = spec.inertia
     row[P_SPIN_DAMPING] = spec.spin_damping
@@ -355,7 +438,7 @@ def fill_parameters(row: Array, spec: BodySpec, frame: LocalFrame, wind: Wind) -
         frame: The world's local frame, which gives the magnetic field.
         wind: The wind, which gives the correlation time of gusts.
     """
-    row[P_MASS] = spec.mass
+    row[P_MASS] = spec.mass + (spec.payload if isinstance(spec, Multirotor) else 0.0)
     row[P_REACH] = spec.reach
     row[P_DRAG_LINEAR] = spec.drag_linear
     row[P_DRAG_QUADRATIC] = spec.drag_quadratic

@@ -39,6 +39,8 @@ from volery.simulation.world.state_layout import (
     P_KIND,
     P_MASS,
     P_REACH,
+    P_ROTORS,
+    ROTORS,
     S_AMPS,
     S_ATTITUDE,
     S_CHARGE,
@@ -171,7 +173,7 @@ def _settle_multirotor(row: Array) -> None:
         for axis in range(3):
             row[S_VELOCITY + axis] = 0.0
             row[S_RATES + axis] = 0.0
-        for i in range(4):
+        for i in range(int(row[P_ROTORS])):
             if row[S_ROTORS + i] < _STANDING_ROTOR:
                 row[S_ROTORS + i] = 0.0
 
@@ -284,7 +286,7 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
     scene = SceneArrays(bodies.solids, bodies.edges, bodies.cells, bodies.lattice)
     flying = row[P_KIND] == MULTIROTOR
     if flying and row[S_COLLISIONS] > 0.0:  # its blades are broken
-        for i in range(4):
+        for i in range(int(row[P_ROTORS])):
             row[W_THROTTLE + i] = 0.0
     for axis in range(3):
         row[W_LAST_VELOCITY + axis] = row[S_VELOCITY + axis]
@@ -355,7 +357,7 @@ def _compose(digest: str) -> Callable[..., int]:
                 start_body(bodies, body, row)
             goal = goal_of(bodies, body)
             while reached[body] < goal:
-                for i in range(4):
+                for i in range(ROTORS):
                     row[W_THROTTLE + i] = row[U_THROTTLE + i]
                 step_body(bodies, body, row)
             finite = finite and is_finite(row)

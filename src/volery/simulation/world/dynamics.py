@@ -11,7 +11,7 @@ Battery: Thevenin's circuit without its RC branch (Tremblay and Dessaint, World 
 * Voltage and current are those of the power at the end of a step, and hold over the next one.
 * Beyond the battery's largest power (OCV^2 / 4R) the current stays at OCV / 2R: the battery browns out.
 
-Multirotor: a rigid body under four rotors, drag, gravity and the ground.
+Multirotor: a rigid body under its rotors, drag, gravity and the ground.
 
 * Rigid body: m v' = m g + R F, q' = q (0, w) / 2, I w' = M - w x I w (Newton and Euler), I diagonal.
 * Rotor: w' = (u w_top V / V_full - w) / T, thrust k_T w^2, reaction torque k_Q w^2 with k_Q = k_T^1.5 / (FM
@@ -75,6 +75,7 @@ from volery.simulation.world.state_layout import (
     P_ROTOR_SPIN,
     P_ROTOR_X,
     P_ROTOR_Y,
+    P_ROTORS,
     P_SKID_STEERED,
     P_SPEED_DECAY,
     P_SPIN_DAMPING,
@@ -156,7 +157,7 @@ _REBOUND = 3.0  # damping of a rising foot over that of a sinking one: no bounce
 def electrical_power(row: Array) -> float:
     """Return the power [W] that rotors, autopilot and payload draw."""
     cubes = 0.0
-    for i in range(4):
+    for i in range(int(row[P_ROTORS])):
         speed = row[S_ROTORS + i]
         cubes += speed * speed * speed
     shaft = row[P_TORQUE] * cubes
@@ -262,7 +263,7 @@ def turn_rotors(row: Array, at: int, to: int) -> None:
     Exact, because motor commands and voltage hold over a step.
     """
     top = row[P_MAX_ROTOR_SPEED] * row[S_VOLTS] / row[P_FULL_VOLTS]
-    for i in range(4):
+    for i in range(int(row[P_ROTORS])):
         target = row[W_THROTTLE + i] * top
         row[to + S_ROTORS + i] = target + row[P_ROTOR_DECAY] * (row[at + S_ROTORS + i] - target)
 
@@ -280,7 +281,7 @@ def _add_rotor_and_air_loads(row: Array) -> None:
     lift, turning = 0.0, 0.0
     for axis in range(3):
         row[W_TORQUE + axis] = 0.0
-    for i in range(4):
+    for i in range(int(row[P_ROTORS])):
         turning += row[W_STATE + S_ROTORS + i]
         square = row[W_STATE + S_ROTORS + i] * row[W_STATE + S_ROTORS + i]
         thrust = row[P_THRUST] * square * row[U_MOTOR_HEALTH + i]
@@ -294,7 +295,7 @@ def _add_rotor_and_air_loads(row: Array) -> None:
     ae, an, au = row[W_ROTATION + 2], row[W_ROTATION + 5], row[W_ROTATION + 8]
     along = ve * ae + vn * an + vu * au
     plane = sqrt(max(0.0, ve * ve + vn * vn + vu * vu - along * along))
-    momentum = row[P_DRAG_LINEAR] * turning / (4.0 * row[P_HOVER_SPEED])
+    momentum = row[P_DRAG_LINEAR] * turning / (row[P_ROTORS] * row[P_HOVER_SPEED])
     drag = momentum + row[P_DRAG_QUADRATIC] * plane
     lift -= row[P_DRAG_QUADRATIC] * (abs(along) - plane) * along
     if along > 0.0:
@@ -345,7 +346,7 @@ def multirotor_slope(row: Array) -> None:
 def total_thrust(row: Array) -> float:
     """Return the thrust of all rotors [N]."""
     squares = 0.0
-    for i in range(4):
+    for i in range(int(row[P_ROTORS])):
         squares += row[S_ROTORS + i] * row[S_ROTORS + i]
     thrust: float = row[P_THRUST] * squares
     return thrust

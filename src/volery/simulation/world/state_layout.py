@@ -67,7 +67,9 @@ ENU = "east, north, up"
 FLU = "forward, left, up"
 NED = "north, east, down"
 FRD = "forward, right, down"
-MOTORS = "motor 0 to motor 3"
+ROTORS = 8
+"""The most rotors of a body; those that it lacks stand still."""
+MOTORS = "motor 0 to motor 7"
 
 WORLD_LAYOUT = Layout()
 _add = WORLD_LAYOUT.add
@@ -80,7 +82,7 @@ S_RATES = _add("S_RATES", "rad/s", "body rates", 3, FLU)
 MOTION = WORLD_LAYOUT.end
 """Number of columns that are integrated by their slopes; they are the first of a row."""
 S_ROTORS = _add(
-    "S_ROTORS", "rad/s", "rotor speeds; rover: steering angle [rad], wheel speed [m/s], 0, 0", 4, MOTORS
+    "S_ROTORS", "rad/s", "rotor speeds; rover: steering angle [rad], wheel speed [m/s], 0 …", ROTORS, MOTORS
 )
 ADVANCED = WORLD_LAYOUT.end
 """Number of columns that describe motion and rotors; they are the first of a row."""
@@ -112,12 +114,12 @@ U_THROTTLE = _add(
     "U_THROTTLE",
     "1",
     "motor commands 0..1 without an autopilot; rover: steering, throttle -1..1",
-    4,
+    ROTORS,
     MOTORS,
 )
 U_PAYLOAD = _add("U_PAYLOAD", "W", "electrical power of the on-board computers")
 U_WIND = _add("U_WIND", "m/s", "mean velocity of the air", 3, ENU)
-U_MOTOR_HEALTH = _add("U_MOTOR_HEALTH", "1", "factor 0..1 on rotor thrust", 4, MOTORS)
+U_MOTOR_HEALTH = _add("U_MOTOR_HEALTH", "1", "factor 0..1 on rotor thrust", ROTORS, MOTORS)
 U_GPS_BLOCKED = _add("U_GPS_BLOCKED", "1", "1: the receiver sees no satellites")
 U_GUST = _add("U_GUST", "m/s", "standard deviation of gusts")
 U_BARO_BLOCKED = _add("U_BARO_BLOCKED", "1", "1: the barometer gives no new samples")
@@ -197,10 +199,15 @@ P_MAX_RANGE = _add("P_MAX_RANGE", "m", "reach of the range finder")
 P_PERFECT = _add("P_PERFECT", "1", "1: sensors without error, and the estimate is the true state")
 
 # --- parameters of multirotors ---
-P_ROTOR_X = _add("P_ROTOR_X", "m", "rotor positions forward of the centre", 4, MOTORS)
-P_ROTOR_Y = _add("P_ROTOR_Y", "m", "rotor positions left of the centre", 4, MOTORS)
+P_ROTORS = _add("P_ROTORS", "1", "number of rotors")
+P_ROTOR_X = _add("P_ROTOR_X", "m", "rotor positions forward of the centre", ROTORS, MOTORS)
+P_ROTOR_Y = _add("P_ROTOR_Y", "m", "rotor positions left of the centre", ROTORS, MOTORS)
 P_ROTOR_SPIN = _add(
-    "P_ROTOR_SPIN", "1", "+1: reaction torque about up (rotor turns clockwise from above), or -1", 4, MOTORS
+    "P_ROTOR_SPIN",
+    "1",
+    "+1: reaction torque about up (rotor turns clockwise from above), or -1",
+    ROTORS,
+    MOTORS,
 )
 P_THRUST = _add("P_THRUST", "N s^2", "k_T in thrust = k_T w^2")
 P_TORQUE = _add("P_TORQUE", "N m s^2", "k_Q in torque = k_Q w^2")
@@ -229,7 +236,7 @@ W_FORCE = _add("W_FORCE", "N", "force without gravity", 3, ENU)
 W_TORQUE = _add("W_TORQUE", "N m", "torque", 3, FLU)
 W_AIR_VELOCITY = _add("W_AIR_VELOCITY", "m/s", "velocity of the air, constant over a step", 3, ENU)
 W_GROUND = _add("W_GROUND", "m", "height of the ground, constant over a step, up")
-W_THROTTLE = _add("W_THROTTLE", "1", "motor commands of a step, as U_THROTTLE", 4, MOTORS)
+W_THROTTLE = _add("W_THROTTLE", "1", "motor commands of a step, as U_THROTTLE", ROTORS, MOTORS)
 W_LAST_VELOCITY = _add("W_LAST_VELOCITY", "m/s", "velocity before the step", 3, ENU)
 WORLD = WORLD_LAYOUT.end
 """Number of columns of the world; the flight stack's columns begin here."""

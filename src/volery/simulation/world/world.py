@@ -28,6 +28,7 @@ from volery.simulation.world.state_layout import (
     ACTIVE_STEPS,
     OCTETS,
     P_CAPACITY,
+    ROTORS,
     S_AMPS,
     S_ATTITUDE,
     S_CHARGE,
@@ -71,7 +72,7 @@ class Truth(NamedTuple):
         velocity: East, north, up [m/s].
         attitude: Quaternion (w, x, y, z) from body (forward, left, up) to east, north, up.
         rates: Body rates about forward, left, up [rad/s].
-        rotors: Rotor speeds [rad/s]; rover: steering angle [rad], wheel speed [m/s], 0, 0.
+        rotors: Rotor speeds [rad/s], 0 beyond their number; rover: steering angle [rad], wheel speed [m/s].
         battery_left: Fraction of the charge left, 0..1.
         charge_as: Charge drawn so far [A s].
         energy_j: Energy drawn so far [J].
@@ -90,7 +91,7 @@ class Truth(NamedTuple):
     velocity: Vector
     attitude: Quaternion
     rates: Vector
-    rotors: tuple[float, float, float, float]
+    rotors: tuple[float, ...]
     battery_left: float
     charge_as: float
     energy_j: float
@@ -140,7 +141,7 @@ def _initial_arrays(
     for row, spec in zip(rows, specs, strict=True):
         fill_parameters(row, spec, frame, wind)
         fill_state(row, spec, scene.standing_height(spec.at[0], spec.at[1]))
-        row[U_MOTOR_HEALTH : U_MOTOR_HEALTH + 4] = 1.0
+        row[U_MOTOR_HEALTH : U_MOTOR_HEALTH + ROTORS] = 1.0
         row[U_WIND : U_WIND + 3] = wind.east, wind.north, wind.up
         row[U_GUST] = wind.gust
     keys = [key(seed, f"world/body/{index}") for index in range(len(specs))]
@@ -254,7 +255,7 @@ class World:
             row[S_VELOCITY : S_VELOCITY + 3],
             row[S_ATTITUDE : S_ATTITUDE + 4],
             row[S_RATES : S_RATES + 3],
-            row[S_ROTORS : S_ROTORS + 4],
+            row[S_ROTORS : S_ROTORS + ROTORS],
             max(0.0, 1.0 - row[S_CHARGE] / capacity),
             row[S_CHARGE],
             row[S_ENERGY],

@@ -5,8 +5,10 @@ import pytest
 from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
-from volery.model.environment import Battery, Place, Vehicle, Wind
-from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings, body_of
+from volery.model.airframes import Battery
+from volery.model.environment import Place, Vehicle, Wind
+from volery.run.assembly.bodies import body_of
+from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings
 from volery.simulation.world.body_specs import Multirotor, Rover
 from volery.trace.events import Text
 

@@ -116,7 +116,7 @@ def test_the_rotors_of_a_landed_body_come_to_a_stop(clock, frame):
     assert world.truth(0).rotors[0] > 10.0
     world.set_input(0, U_THROTTLE, 0.0, 0.0, 0.0, 0.0)
     clock.wait(5)
-    assert world.truth(0).rotors == (0.0, 0.0, 0.0, 0.0)
+    assert not any(world.truth(0).rotors)
 
 
 def test_a_state_that_is_not_a_number_is_reported(clock, frame):

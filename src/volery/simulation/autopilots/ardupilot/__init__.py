@@ -12,7 +12,7 @@ _KINDS = {
     name: {"multirotor": copter(version), "rover": rover(version)} for name, version in VERSIONS.items()
 }
 
-FIRMWARE = FirmwareFamily("ardupilot", [*_KINDS.values()][-1], versions=_KINDS)
+FIRMWARE = FirmwareFamily("ardupilot", [*_KINDS.values()][-1], versions=_KINDS, airframes=True)
 """Entry point of the firmware, by kind of vehicle."""
 
 __all__ = ["FIRMWARE"]

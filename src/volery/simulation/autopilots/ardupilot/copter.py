@@ -160,6 +160,9 @@ OPTION_MODES = {
 ALIGNS_ABOVE = 2.5
 """Height of the in-flight yaw alignment [m]."""
 
+FRAME_NAMES = {4: "QUAD", 6: "HEXA", 8: "OCTA"}
+"""Name of the frame class by the number of rotors."""
+
 MODES = {
     mode.number: mode
     for mode in (
@@ -376,7 +379,7 @@ def send_banner(vehicle: Vehicle, version: Version) -> None:
     """Send the status texts that follow a parameter list request."""
     shape = {0: "PLUS", 1: "X"}.get(round(vehicle.parameters["FRAME_TYPE"]), "X")
     send_version(vehicle, "ArduCopter", version)
-    vehicle.send_text(INFO, f"Frame: QUAD/{shape}")
+    vehicle.send_text(INFO, f"Frame: {FRAME_NAMES[vehicle.flight.rotors]}/{shape}")
 
 
 @cache

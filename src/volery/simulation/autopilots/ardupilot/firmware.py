@@ -29,9 +29,10 @@ from volery.simulation.autopilots.ardupilot.commands import go_to_item
 from volery.simulation.autopilots.ardupilot.fence import fence_status
 from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
 from volery.simulation.autopilots.ardupilot.mount import attitude_status
+from volery.simulation.autopilots.ardupilot.parameters import LEAST_HOVER, MOST_HOVER
 from volery.simulation.autopilots.ardupilot.sensor_status import Health, sys_status
 from volery.simulation.autopilots.ardupilot.versions import Version
-from volery.simulation.autopilots.flight_stack.flight import Flight
+from volery.simulation.autopilots.flight_stack.flight import Flight, hover_collective
 from volery.simulation.autopilots.mavlink import messages
 from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.mavlink.firmware import (
@@ -46,8 +47,16 @@ from volery.simulation.autopilots.mavlink.firmware import (
     TelemetryPolicy,
 )
 from volery.simulation.autopilots.mavlink.log_service import LogPolicy
-from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED, Command, Handler
+from volery.simulation.autopilots.mavlink.messages import (
+    ACCEPTED,
+    DENIED,
+    FAILED,
+    Command,
+    Handler,
+    vehicle_type,
+)
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
+from volery.simulation.world.body_specs import Multirotor
 
 SEND_BANNER = 42_428
 
@@ -260,9 +269,23 @@ def send_version(vehicle: Vehicle, name: str, version: Version) -> None:
     vehicle.send_text(INFO, f"{board_id(vehicle)}1f6d2a48adfda4")
 
 
+FRAME_CLASSES = {4: 1, 6: 2, 8: 3}
+"""FRAME_CLASS by the number of rotors."""
+PLUS, X = 0, 1
+"""FRAME_TYPE."""
+
+
 def own_parameters(system: int, flight: Flight) -> dict[str, float]:
-    """Return the parameters that follow from the system id and the battery."""
-    return {"SYSID_THISMAV": system, "BATT_CAPACITY": flight.spec.battery.capacity_ah * 1000.0}
+    """Return the parameters that follow from the system id, the battery and the airframe."""
+    own = {"SYSID_THISMAV": system, "BATT_CAPACITY": flight.spec.battery.capacity_ah * 1000.0}
+    spec = flight.spec
+    if not isinstance(spec, Multirotor) or not spec.frame:
+        return own
+    return own | {
+        "FRAME_CLASS": FRAME_CLASSES[len(spec.rotors)],
+        "FRAME_TYPE": PLUS if spec.frame.endswith("plus") else X,
+        "MOT_THST_HOVER": round(min(MOST_HOVER, max(LEAST_HOVER, hover_collective(spec))), 4),
+    }
 
 
 def refuse_interval(vehicle: Vehicle, number: int) -> int:
@@ -297,7 +320,9 @@ def builders(
         "AUTOPILOT_VERSION": lambda vehicle: telemetry.autopilot_version(
             version, capabilities, board_id(vehicle).encode()
         ),
-        "HEARTBEAT": lambda vehicle: telemetry.heartbeat(vehicle, kind, system_status(vehicle)),
+        "HEARTBEAT": lambda vehicle: telemetry.heartbeat(
+            vehicle, vehicle_type(vehicle, kind), system_status(vehicle)
+        ),
         "HIGH_LATENCY2": high_latency.report(kind, sensors),
         "SYS_STATUS": sensors,
     }

@@ -11,7 +11,14 @@ from math import hypot
 from volery.simulation.autopilots.ardupilot import airspeed, sensor_status, telemetry
 from volery.simulation.autopilots.ardupilot.modes import NOTICE
 from volery.simulation.autopilots.mavlink.firmware import Builder
-from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, boot_ms
+from volery.simulation.autopilots.mavlink.messages import (
+    ACCEPTED,
+    FAILED,
+    Command,
+    Fields,
+    boot_ms,
+    vehicle_type,
+)
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CONTROL_HIGH_LATENCY = 2600
@@ -68,7 +75,7 @@ def report(kind: int, system_status: Builder) -> Builder:
         healthy = status["onboard_control_sensors_health"]
         return {
             "timestamp": boot_ms(vehicle),
-            "type": kind,
+            "type": vehicle_type(vehicle, kind),
             "autopilot": 3,
             "custom_mode": vehicle.mode.number,
             "latitude": round(latitude * 1e7),

@@ -6,7 +6,7 @@ tested in ArduPilot's order, clockwise from the front; a rover's throttle really
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import isfinite
 
 from volery.base.time import from_seconds
@@ -16,6 +16,7 @@ from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command
 from volery.simulation.autopilots.state_groups import MotorTestState
 from volery.simulation.autopilots.vehicle_state import OFF, Vehicle
+from volery.simulation.world.body_specs import FRAMES, Multirotor
 
 MOTOR_TEST = 209
 PERCENT, PULSE, PILOT = 0, 1, 2
@@ -105,6 +106,15 @@ def _pulse(vehicle: Vehicle, test: MotorTestState) -> float | None:
     return pulse if SHORTEST_PULSE <= pulse <= LONGEST_PULSE else None
 
 
+def _order(vehicle: Vehicle) -> Sequence[int]:
+    """Return the motors in the order of the test, from 0."""
+    spec = vehicle.flight.spec
+    if isinstance(spec, Multirotor) and spec.frame:
+        angles = [angle % 360.0 for angle, _ in FRAMES[spec.frame]]
+        return sorted(range(len(angles)), key=angles.__getitem__)
+    return ORDER_OF_PLUS if round(vehicle.parameters["FRAME_TYPE"]) == PLUS else ORDER
+
+
 def turn_tested_motor(vehicle: Vehicle) -> bool:
     """Turn the motor whose test it is, at each tick, and return whether a test runs."""
     test, now = vehicle.outputs.motor_test, vehicle.kernel.now()
@@ -124,7 +134,7 @@ def turn_tested_motor(vehicle: Vehicle) -> bool:
         vehicle.send_text(INFO, "finished motor test")
         vehicle.disarm()
         return False
-    order = ORDER_OF_PLUS if round(vehicle.parameters["FRAME_TYPE"]) == PLUS else ORDER
+    order = _order(vehicle)
     if 1 <= test.motor <= len(order):
         share = min(1.0, max(0.0, pulse / 1000.0 - 1.0))
         vehicle.drive(Setpoint(Control.MOTOR, motor=order[test.motor - 1], throttle=share))

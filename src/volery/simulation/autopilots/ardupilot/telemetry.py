@@ -394,7 +394,7 @@ def rc_channels_raw(vehicle: Vehicle) -> Fields:
 
 def rc_channels_scaled(vehicle: Vehicle) -> Fields:
     """Return RC_CHANNELS_SCALED: steering and throttle outputs in 1/10000."""
-    steering, throttle, _, _ = vehicle.estimate.motors
+    steering, throttle = vehicle.estimate.motors
     return {
         "time_boot_ms": boot_ms(vehicle),
         "chan1_scaled": round(steering * 10_000.0),
@@ -405,14 +405,10 @@ def rc_channels_scaled(vehicle: Vehicle) -> Fields:
 
 def servo_output(vehicle: Vehicle) -> Fields:
     """Return SERVO_OUTPUT_RAW."""
-    first, second, third, fourth = vehicle.estimate.motor_pwm
     return {
         "time_usec": to_uint32(boot_us(vehicle)),
         "port": 0,
-        "servo1_raw": first,
-        "servo2_raw": second,
-        "servo3_raw": third,
-        "servo4_raw": fourth,
+        **{f"servo{motor}_raw": pulse for motor, pulse in enumerate(vehicle.estimate.motor_pwm, start=1)},
         **{f"servo{channel}_raw": pulse for channel, pulse in vehicle.outputs.servos.items()},
     }
 

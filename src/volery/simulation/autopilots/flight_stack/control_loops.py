@@ -59,6 +59,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_POSITION,
     K_RATE_DERIVATIVE,
     K_RATE_INTEGRAL,
+    K_RATE_TUNING,
     K_RATES,
     K_SPEED_INTEGRAL,
     K_SPOOL,
@@ -84,6 +85,7 @@ from volery.simulation.world.state_layout import (
     P_ROTOR_SPIN,
     P_ROTOR_X,
     P_ROTOR_Y,
+    P_ROTORS,
     P_SKID_STEERED,
     P_WHEELBASE,
     S_VOLTS,
@@ -202,6 +204,13 @@ def motor_output(thrust: float, volts_share: float) -> float:
     return _SPIN_MIN + (_SPIN_MAX - _SPIN_MIN) * min(1.0, curve / volts_share)
 
 
+def thrust_share(command: float) -> float:
+    """Return the share of full thrust for which ``motor_output`` gives a motor command, at full voltage."""
+    curve = clip((command - _SPIN_MIN) / (_SPIN_MAX - _SPIN_MIN), 0.0, 1.0)
+    share: float = _EXPO * curve * curve + (1.0 - _EXPO) * curve
+    return share
+
+
 @numeric
 def _volts_share(row: Array) -> float:
     """Return the filtered voltage over that of full thrust: one grid step."""
@@ -220,10 +229,11 @@ def _volts_share(row: Array) -> float:
 def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
     """Write motor commands from three torques and the collective."""
     reach = 1e-9
-    for i in range(4):
+    count = int(row[P_ROTORS])
+    for i in range(count):
         reach = max(reach, abs(row[P_ROTOR_X + i]), abs(row[P_ROTOR_Y + i]))
     low, high = 0.0, 0.0
-    for i in range(4):
+    for i in range(count):
         share = (roll * row[P_ROTOR_Y + i] + pitch * row[P_ROTOR_X + i]) / reach
         row[K_MOTORS + i] = share
         low, high = min(low, share), max(high, share)
@@ -235,17 +245,17 @@ def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
     share = _volts_share(row)
     room = max(min(collective + low, 1.0 - collective - high), _YAW_ROOM * 0.5)
     yaw = clip(yaw, -room, room)
-    for i in range(4):
+    for i in range(count):
         thrust = collective + scale * row[K_MOTORS + i] - yaw * row[P_ROTOR_SPIN + i]
         row[K_MOTORS + i] = motor_output(thrust, share)
 
 
 @numeric
 def run_attitude_loops(row: Array, control: int) -> None:
-    """Run one grid step of the inner loops, from target attitude and collective to four motor commands."""
+    """Run one grid step of the inner loops, from target attitude and collective to motor commands."""
     if control in (OFF, IDLE, MOTOR):
         idle = _SPIN_ARM if control == IDLE else 0.0
-        for i in range(4):
+        for i in range(int(row[P_ROTORS])):
             row[K_MOTORS + i] = min(idle, row[K_MOTORS + i] + STEP_S / _SPOOL_TIME)
         for axis in range(3):
             row[K_RATE_INTEGRAL + axis] = 0.0
@@ -266,6 +276,11 @@ def run_attitude_loops(row: Array, control: int) -> None:
     pitch = _torque(row, 1, pitch_rate)
     yaw = _filtered_yaw_torque(row, yaw_rate) if row[C_YAW_P] > 0.0 else _torque(row, 2, yaw_rate)
     spool = row[K_SPOOL]
+    roll, pitch, yaw = (
+        roll * row[K_RATE_TUNING],
+        pitch * row[K_RATE_TUNING + 1],
+        yaw * row[K_RATE_TUNING + 2],
+    )
     _mix(row, roll * spool, pitch * spool, yaw * spool)
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.base.time import Ns
+from volery.simulation.autopilots.flight_stack.control_loops import thrust_share
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_AIDED,
     C_COASTS,
@@ -27,7 +28,9 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_YAW_P,
     FLIGHT,
     HOLD_HEADING,
+    K_HOVER_THROTTLE,
     K_POSITION,
+    K_RATE_TUNING,
     K_STORED_HOVER,
     YAW_ANGLE,
     YAW_ANGLE_AND_RATE,
@@ -46,6 +49,7 @@ from volery.simulation.world.scene import Scene
 from volery.simulation.world.sensors import Measurement, Sensor, Sigma, declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
     P_CELLS,
+    P_MASS,
     P_RESISTANCE,
     S_CHARGE,
     S_GUST,
@@ -226,7 +230,11 @@ class Flight:
         """True for a multirotor, False for a rover."""
         self.capacity_as = self.spec.battery.capacity_ah * 3600.0
         """Capacity of the battery [A s]."""
-        self._airframe = Airframe(self.frame, self.flying, self.capacity_as, sensor_suite(self.spec.sensors))
+        self.rotors = len(self.spec.rotors) if isinstance(self.spec, Multirotor) else 0
+        """Number of rotors; 0 for a rover."""
+        self._airframe = Airframe(
+            self.frame, self.flying, self.rotors, self.capacity_as, sensor_suite(self.spec.sensors)
+        )
         self._row = memoryview(world.arrays.rows[body])
         self._latest: Estimate | None = None
         self._driven: tuple[float, ...] = ()
@@ -263,6 +271,15 @@ class Flight:
         if row != self._driven:
             self._driven = row
             self._world.set_input(self._body, C_CONTROL, *row)
+
+    @property
+    def mass(self) -> float:
+        """Mass with what the vehicle carries now [kg]."""
+        return self._row[P_MASS]
+
+    def carry(self, load: float) -> None:
+        """Carry a mass beside the vehicle's own [kg], at its centre, in place of what it carried before."""
+        self._world.set_input(self._body, P_MASS, self.spec.mass + load)
 
     def last_collision(self) -> Collision | None:
         """Return how the body last hit something that stands in the world; ``None``: it has not."""
@@ -462,6 +479,25 @@ class Flight:
         return declared_sigma(self.spec.sensors)
 
 
+def hover_collective(spec: Multirotor) -> float:
+    """Return the collective 0..1 with which a multirotor hovers on a full battery."""
+    return thrust_share(spec.hover_throttle)
+
+
+def rate_tuning(spec: Multirotor) -> Vector:
+    """Return the factors on the outputs of the rate loops, about forward, right and down.
+
+    They make the loops of a body with another authority as fast as those of the usual one, and slower with
+    slower rotors: as after an automatic tuning.
+    """
+    if not spec.frame:
+        return 1.0, 1.0, 1.0
+    usual = Multirotor()
+    lag = usual.rotor_lag / spec.rotor_lag
+    roll, pitch, yaw = (lag * its / own for its, own in zip(usual.authority, spec.authority, strict=True))
+    return roll, pitch, yaw
+
+
 def make_world(
     now: Callable[[], Ns],
     specs: Sequence[BodySpec],
@@ -491,4 +527,9 @@ def make_world(
         scene=scene,
         columns=FLIGHT,
     )
+    for row, spec in zip(world.arrays.rows, specs, strict=True):
+        if isinstance(spec, Multirotor):
+            row[K_RATE_TUNING : K_RATE_TUNING + 3] = rate_tuning(spec)
+            if spec.frame:
+                row[K_HOVER_THROTTLE] = row[K_STORED_HOVER] = hover_collective(spec)
     return world, [Flight(world, body) for body in range(len(specs))]

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from math import inf, sqrt
-from struct import Struct
+from struct import Struct, unpack_from
 
 from volery.base.frames import LocalFrame, Quaternion, Vector
 from volery.base.time import Ns
@@ -30,6 +30,7 @@ from volery.simulation.world.state_layout import (
     MOTORS,
     NED,
     OCTETS,
+    ROTORS,
     S_AMPS,
     S_CHARGE,
     S_ENERGY,
@@ -136,11 +137,12 @@ K_SIGMA = _add(
     "horizontal, vertical position; the same of velocity",
 )
 K_HEADING_ERROR = _add("K_HEADING_ERROR", "rad", "last magnetometer heading less the estimate")
-K_MOTORS = _add("K_MOTORS", "1", "motor commands 0..1; rover: steering, throttle -1..1, 0, 0", 4, MOTORS)
+K_MOTORS = _add("K_MOTORS", "1", "motor commands 0..1; rover: steering, throttle -1..1", ROTORS, MOTORS)
 K_LANDED = _add("K_LANDED", "1", "1: the landed detector reports landed")
 K_THROTTLE = _add("K_THROTTLE", "1", "collective 0..1; rover: throttle -1..1")
 K_HOVER_THROTTLE = _add("K_HOVER_THROTTLE", "1", "learnt collective in hover")
 K_STORED_HOVER = _add("K_STORED_HOVER", "1", "the same, from a start and with a learning that are given")
+K_RATE_TUNING = _add("K_RATE_TUNING", "1", "factor on the outputs of the rate loops", 3, FRD)
 K_TARGET = _add("K_TARGET", "m", "shaped target position about the world's origin", 3, NED)
 K_TARGET_VELOCITY = _add("K_TARGET_VELOCITY", "m/s", "shaped; rover: the first is the forward speed", 3, NED)
 K_TARGET_ACCEL = _add("K_TARGET_ACCEL", "m/s^2", "shaped", 3, NED)
@@ -219,6 +221,7 @@ class Airframe:
 
     frame: LocalFrame
     flying: bool
+    rotors: int
     capacity_as: float
     sensors: SensorSuite
     _origin: tuple[Vector, Vector] | None = None
@@ -455,17 +458,16 @@ class Estimate:
         return self._row[S_ENERGY]
 
     @property
-    def motors(self) -> tuple[float, float, float, float]:
-        """Motor commands 0..1; rover: steering (right positive) and throttle -1..1, 0, 0."""
-        return self._four(K_MOTORS)
+    def motors(self) -> tuple[float, ...]:
+        """Motor commands 0..1; rover: steering (right positive) and throttle -1..1."""
+        return unpack_from(f"{self._about.rotors or 2}d", self._octets, OCTETS * K_MOTORS)
 
     @property
-    def motor_pwm(self) -> tuple[int, int, int, int]:
+    def motor_pwm(self) -> tuple[int, ...]:
         """Motor outputs as pulse widths [us], 1000 to 2000; rover: steering and throttle about 1500."""
         if self._about.flying:
-            first, second, third, fourth = (round(1000.0 + 1000.0 * motor) for motor in self.motors)
-            return first, second, third, fourth
-        steering, throttle, _, _ = self.motors
+            return tuple(round(1000.0 + 1000.0 * motor) for motor in self.motors)
+        steering, throttle = self.motors
         return round(1500.0 + 500.0 * steering), 0, round(1500.0 + 500.0 * throttle), 0
 
     @property

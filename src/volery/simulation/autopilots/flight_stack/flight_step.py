@@ -42,6 +42,7 @@ from volery.simulation.world.state_layout import (
     BODIES_ARGUMENTS,
     MULTIROTOR,
     P_KIND,
+    P_ROTORS,
     S_STARTED,
     W_THROTTLE,
     Array,
@@ -74,7 +75,7 @@ def _control(row: Array, k: int) -> None:
         guide_multirotor(row)
         detect_landing(row, control)
     run_attitude_loops(row, control)
-    for i in range(4):
+    for i in range(int(row[P_ROTORS])):
         row[W_THROTTLE + i] = row[K_MOTORS + i]
 
 

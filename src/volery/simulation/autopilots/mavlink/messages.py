@@ -49,6 +49,15 @@ def to_uint32(value: int) -> int:
     return value & 0xFFFF_FFFF
 
 
+MULTIROTORS = {4: 2, 6: 13, 8: 14}
+"""MAV_TYPE by the number of rotors: quadrotor, hexarotor, octorotor."""
+
+
+def vehicle_type(vehicle: Vehicle, kind: int) -> int:
+    """Return the MAV_TYPE of a vehicle: that of its rotors, *kind* of one without."""
+    return MULTIROTORS.get(vehicle.flight.rotors, kind)
+
+
 def boot_ms(vehicle: Vehicle) -> int:
     """Return the field ``time_boot_ms``, which begins anew after 49.7 days."""
     return to_uint32(vehicle.uptime() // MS)

@@ -18,7 +18,9 @@ _KINDS = {
     name: {"multirotor": copter(version), "rover": rover(version)} for name, version in VERSIONS.items()
 }
 
-FIRMWARE = FirmwareFamily("px4", _KINDS[[*_KINDS][-1]], default_links=DEFAULT_LINKS, versions=_KINDS)
+FIRMWARE = FirmwareFamily(
+    "px4", _KINDS[[*_KINDS][-1]], default_links=DEFAULT_LINKS, versions=_KINDS, airframes=True
+)
 """Entry point of the firmware, by kind of vehicle."""
 
 __all__ = ["FIRMWARE"]

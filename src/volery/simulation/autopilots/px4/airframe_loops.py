@@ -1,6 +1,7 @@
 """Position and velocity loops of PX4 that fly the recorded airframe, SIH's quadrotor.
 
-Its drag is large: the integral winds up against it on a long leg, and the leg ends too far by what it has to
+A vehicle with an airframe of its own has that one's drag and hover thrust, and else the same loops. SIH's
+drag is large: the integral winds up against it on a long leg, and the leg ends too far by what it has to
 unwind. Position and velocity are those that EKF2 states; they differ from the flown ones by the errors of
 ``estimate_error``. As in PX4 1.14: PositionControl, TakeoffHandling, MulticopterHoverThrustEstimator.
 """
@@ -36,14 +37,17 @@ from volery.simulation.autopilots.px4.loop_state import (
     E_RATE,
     E_VELOCITY,
     G_DOWN,
+    G_DRAG,
     G_FAST,
     G_HOVER,
     G_INTEGRAL,
     G_LEAN,
+    G_OWN_HOVER,
     G_PLACE,
     G_RAMP,
     G_SLOPE,
     G_SPEED,
+    G_SQUARE_DRAG,
     G_UP,
     GRAVITY,
     I_ACCEL,
@@ -193,7 +197,7 @@ def _fly(
     if not _free(row, 2, place, speed) and not stuck:
         row[A_INTEGRAL + 2] += row[G_INTEGRAL + 2] * miss[2] * SUBSTEP
     row[A_INTEGRAL + 2] = clip(row[A_INTEGRAL + 2], -GRAVITY, GRAVITY)
-    given = thrust / HOVER
+    given = thrust / row[G_OWN_HOVER]
     _move(row, north * given, east * given, GRAVITY * (1.0 - given))
     _estimate_hover(row, thrust, down)
 
@@ -206,9 +210,11 @@ def _move(row: Array, north: float, east: float, down: float) -> None:
     row[A_THRUST + 2] += SUBSTEP / THRUST_LAG * (down - row[E_PUSH + 2] - row[A_THRUST + 2])
     if row[A_GROUNDED] > 0.0 and row[A_THRUST + 2] < 0.0:
         row[A_GROUNDED] = 0.0
+    north, east, down = row[A_FLOWN], row[A_FLOWN + 1], row[A_FLOWN + 2]
+    drag = row[G_DRAG] + row[G_SQUARE_DRAG] * sqrt(north * north + east * east + down * down)
     for axis in range(3):
         before = row[A_FLOWN + axis]
-        accel = row[A_THRUST + axis] - DRAG * before
+        accel = row[A_THRUST + axis] - drag * before
         if row[A_GROUNDED] > 0.0:
             before, accel = 0.0, 0.0
         row[A_ACCEL + axis] = accel

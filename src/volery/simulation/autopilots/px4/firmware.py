@@ -24,7 +24,7 @@ from volery.simulation.autopilots.mavlink.firmware import (
     TelemetryPolicy,
 )
 from volery.simulation.autopilots.mavlink.log_service import LogPolicy
-from volery.simulation.autopilots.mavlink.messages import DENIED, FAILED, Handler
+from volery.simulation.autopilots.mavlink.messages import DENIED, FAILED, MULTIROTORS, Handler
 from volery.simulation.autopilots.px4 import files, geofence, mission, telemetry, ulog
 from volery.simulation.autopilots.px4.commands import DO_SET_MODE, MESSAGE_HANDLERS, set_mode
 from volery.simulation.autopilots.px4.follow_target import on_follow_target
@@ -40,6 +40,7 @@ from volery.simulation.autopilots.vehicle_state import (
     VehicleAction,
     VehicleRules,
 )
+from volery.simulation.world.body_specs import Multirotor
 
 ORIGIN: Ns = 6_200 * MS
 """First position; recorded from 6.4 s on."""
@@ -82,9 +83,36 @@ def on_position(vehicle: Vehicle) -> None:
     commander_of(vehicle).reported = commander_of(vehicle).checks()
 
 
-def own_parameters(system: int, _flight: Flight) -> Mapping[str, float]:
-    """Return the parameters that follow from the system id."""
-    return {"MAV_SYS_ID": system}
+AIRFRAMES = {
+    "quad-x": 4001,
+    "quad-plus": 5001,
+    "hexa-x": 6001,
+    "hexa-plus": 7001,
+    "octo-x": 8001,
+    "octo-plus": 9001,
+}
+"""SYS_AUTOSTART of the generic airframes."""
+LEAST_HOVER, MOST_HOVER = 0.1, 0.8
+"""Limits of MPC_THR_HOVER."""
+
+
+def own_parameters(system: int, flight: Flight) -> Mapping[str, float]:
+    """Return the parameters that follow from the system id and the airframe."""
+    own: dict[str, float] = {"MAV_SYS_ID": system}
+    spec = flight.spec
+    if not isinstance(spec, Multirotor) or not spec.frame:
+        return own
+    own |= {
+        "CA_ROTOR_COUNT": len(spec.rotors),
+        "MAV_TYPE": MULTIROTORS[len(spec.rotors)],
+        "MPC_THR_HOVER": round(min(MOST_HOVER, max(LEAST_HOVER, spec.hover_throttle)), 4),
+        "SYS_AUTOSTART": AIRFRAMES[spec.frame],
+    }
+    for number, rotor in enumerate(spec.rotors):
+        own[f"CA_ROTOR{number}_PX"] = rotor.forward
+        own[f"CA_ROTOR{number}_PY"] = -rotor.left
+        own[f"CA_ROTOR{number}_KM"] = -0.05 * rotor.spin
+    return own
 
 
 def _every(rates: Mapping[float, Sequence[str]]) -> dict[str, Ns]:

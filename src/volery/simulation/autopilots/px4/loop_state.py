@@ -56,6 +56,11 @@ G_RAMP = _add("G_RAMP", "s", "MPC_TKO_RAMP_T")
 G_HOVER = _add("G_HOVER", "1", "MPC_THR_HOVER")
 G_TURN = _add("G_TURN", "rad/s", "MPC_YAWRAUTO_MAX")
 
+# --- constants of the airframe ---
+G_DRAG = _add("G_DRAG", "1/s", "its linear drag over its mass")
+G_SQUARE_DRAG = _add("G_SQUARE_DRAG", "1/m", "its quadratic drag over its mass")
+G_OWN_HOVER = _add("G_OWN_HOVER", "1", "thrust with which it really hovers")
+
 # --- trajectory ---
 T_POSITION = _add("T_POSITION", "m", "of the trajectory", 3, NED)
 T_VELOCITY = _add("T_VELOCITY", "m/s", "of the trajectory", 3, NED)

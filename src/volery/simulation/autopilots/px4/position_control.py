@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Sequence
-from math import dist, inf, nan, radians, remainder, tau
+from math import dist, hypot, inf, nan, radians, remainder, sqrt, tau
 from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -60,6 +60,7 @@ from volery.simulation.autopilots.px4.loop_state import (
 )
 from volery.simulation.autopilots.px4.loop_step import fly_px4_loops
 from volery.simulation.autopilots.vehicle_state import IDLE, Vehicle
+from volery.simulation.world.body_specs import Multirotor
 
 FOLLOW_LEAD = 0.25
 """Time by which the flight stack is behind a set velocity [s], of which the shaping of the velocity is
@@ -155,7 +156,18 @@ def gains_of(vehicle: Vehicle, automatic: bool) -> tuple[float, ...]:
         p["MPC_TKO_RAMP_T"],
         p["MPC_THR_HOVER"],
         radians(max(0.0, p["MPC_YAWRAUTO_MAX"])),
+        *airframe_of(vehicle),
     )
+
+
+def airframe_of(vehicle: Vehicle) -> Vector:
+    """Return linear drag over mass [1/s], quadratic drag over mass [1/m] and hover thrust of the airframe."""
+    spec = vehicle.flight.spec
+    if not isinstance(spec, Multirotor) or not spec.frame:
+        return DRAG, 0.0, HOVER
+    mass = vehicle.flight.mass
+    hover = spec.hover_throttle * sqrt(mass / (spec.mass + spec.payload))
+    return spec.drag_linear / mass, spec.drag_quadratic / mass, min(1.0, hover)
 
 
 def settling(uptime: Ns) -> tuple[int, int]:
@@ -189,8 +201,9 @@ class PositionLoops:
         self._span = np.zeros(2, dtype=np.int64)
         self._advance: Action | None = None
         """Machine code that advances the state over the span; ``None``: nothing has flown yet."""
-        self._tuned: tuple[int, bool] | None = None
-        """Number of parameter changes, and whether a trajectory was followed, when the gains were written."""
+        self._tuned: tuple[int, bool, float] | None = None
+        """Number of parameter changes, whether a trajectory was followed, and the mass, when the gains were
+        written."""
         self._trajectory = False
         """Whether the trajectory is where the vehicle is."""
         self._last: Ns = -RESTART_AFTER - 1
@@ -199,7 +212,7 @@ class PositionLoops:
     def lifts_off(self) -> bool:
         """Whether the thrust on the ground is more than PX4's landed detector takes for a landed vehicle."""
         return self._row[A_GROUNDED] > 0.0 and self._row[A_THRUST + 2] < GRAVITY * (
-            1.0 - LANDED_THRUST / HOVER
+            1.0 - LANDED_THRUST / airframe_of(self._vehicle)[2]
         )
 
     def fly_to(self, point: Vector, cruise: Cruise, yaw: float | None = None) -> None:
@@ -286,13 +299,16 @@ class PositionLoops:
             _write(row, A_THRUST, (0.0, 0.0, GRAVITY))
         else:
             flown = [v - error for v, error in zip(velocity, row[E_VELOCITY : E_VELOCITY + 3], strict=True)]
-            thrust = [DRAG * v for v in flown]
+            linear, square, _ = airframe_of(self._vehicle)
+            drag = linear + square * hypot(*flown)
+            thrust = [drag * v for v in flown]
             _write(row, A_MOVING, velocity)
             _write(row, A_FLOWN, flown)
             _write(row, A_THRUST, thrust)
             _write(row, A_INTEGRAL, thrust)
         row[A_GROUNDED], row[A_RAMP] = float(grounded), float(not grounded)
-        _write(row, A_HOVER, (HOVER, HOVER, FIRST_VARIANCE))
+        hover = airframe_of(self._vehicle)[2]
+        _write(row, A_HOVER, (hover, hover, FIRST_VARIANCE))
 
     def _settle(self, advance: Action) -> None:
         """Let the errors of the estimate become those of a filter that has run since the boot."""
@@ -308,7 +324,7 @@ class PositionLoops:
         here, velocity = estimate.position, estimate.velocity
         _write(row, I_YAW, (nan if yaw is None else yaw, nan if yaw_rate is None else yaw_rate))
         row[I_NOISY] = float(self._noisy)
-        tuned = vehicle.parameters.changes, row[I_TASK] != DIRECT
+        tuned = vehicle.parameters.changes, row[I_TASK] != DIRECT, vehicle.flight.mass
         if tuned != self._tuned:
             self._tuned = tuned
             _write(row, G_JERK, gains_of(vehicle, tuned[1]))

@@ -21,6 +21,7 @@ from volery.simulation.autopilots.mavlink.messages import (
     to_int16,
     to_uint16,
     to_uint32,
+    vehicle_type,
 )
 from volery.simulation.autopilots.mavlink.microservices import FENCE, MISSION, RALLY
 from volery.simulation.autopilots.px4 import modes
@@ -355,7 +356,7 @@ def heartbeat(vehicle: Vehicle, kind: int) -> Fields:
     if commander.terminated:
         state = TERMINATED
     return {
-        "type": kind,
+        "type": vehicle_type(vehicle, kind),
         "autopilot": 12,
         "base_mode": base | (ARMED if vehicle.armed else 0),
         "custom_mode": mode.number,
@@ -448,9 +449,9 @@ def estimator_status(vehicle: Vehicle) -> Fields:
 
 def servo_output(vehicle: Vehicle) -> Fields:
     """Return SERVO_OUTPUT_RAW; 900 us is off."""
-    pulses = vehicle.estimate.motor_pwm if vehicle.armed else (900,) * 4
+    pulses = vehicle.estimate.motor_pwm if vehicle.armed else ()
     fields: Fields = {"time_usec": to_uint32(boot_us(vehicle)), "port": 0}
-    for place, pulse in enumerate((*pulses, *([900] * 12)), start=1):
+    for place, pulse in enumerate((*pulses, *([900] * (16 - len(pulses)))), start=1):
         fields[f"servo{place}_raw"] = pulse
     return fields
 

@@ -25,7 +25,7 @@ from volery.simulation.autopilots.px4.loop_state import (
     E_POSITION,
     E_STATES,
     G_JERK,
-    G_TURN,
+    G_OWN_HOVER,
     GRAVITY,
     I_AT_VEHICLE,
     I_DOWN,
@@ -71,9 +71,9 @@ def airborne() -> Array:
     """Return the state of an aircraft that hovers."""
     row = np.zeros(LOOP_COLUMNS)
     tuning = SimpleNamespace(tilt=0.785, speed=12.0, speed_up=3.0, speed_down=1.5)
-    vehicle: Any = SimpleNamespace(parameters=PARAMETERS, tuning=tuning)
+    vehicle: Any = SimpleNamespace(parameters=PARAMETERS, tuning=tuning, flight=SimpleNamespace(spec=None))
     gains = gains_of(vehicle, automatic=True)
-    assert G_JERK + len(gains) == G_TURN + 1
+    assert G_JERK + len(gains) == G_OWN_HOVER + 1
     row[G_JERK : G_JERK + len(gains)] = gains
     row[[I_SPEED, I_UP, I_DOWN, I_LIFT]] = 5.0, 3.0, 1.5, 4.0
     row[[A_RAMP, A_HOVER, A_HOVER + 1]] = 1.0, HOVER, HOVER
