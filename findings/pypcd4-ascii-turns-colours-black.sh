@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # pypcd4 1.5.1: saved as ASCII, every coloured point is black.
 #
-# A PCD colour is packed into the bits of a float, which makes numbers like 2.3e-38. `save` in `Encoding.ASCII` writes floats with ten
-# decimals, so the text is 0.0000000000 for every colour; both binary encodings keep them. Times of day in seconds survive
-# the ten decimals, and so do coordinates: only the colours show it.
+# A PCD colour is packed into the bits of a float, which makes numbers like 2.3e-38. `save` in `Encoding.ASCII` writes floats
+# with ten decimals, so the text is 0.0000000000 for every colour; both binary encodings keep them. Coordinates and times of
+# day survive the ten decimals: only the colours show it.
 # Seen: BINARY [255 128 7], ASCII [0 0 0]
 set -euo pipefail
 folder=$(mktemp -d)

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # pysbf2 1.0.7: the coefficients of the Galileo ionosphere are read as zero, whatever the satellites say.
 #
-# Septentrio's GALIon block holds a_i0 as a float in units of 1e-22 W/(m2 Hz), for instance 54. pysbf2 multiplies by 1e-22 and then
-# rounds every scaled value to twelve decimals, which leaves 0.0 for any number that a float can hold there. The
-# model run with it has no ionosphere. `scaling=False` gives 54.0.
+# Septentrio's GALIon block holds a_i0 as a float in units of 1e-22 W/(m2 Hz), for instance 54. pysbf2 multiplies by 1e-22
+# and then rounds every scaled value to twelve decimals, which leaves 0.0 for any coefficient that a satellite sends. A
+# correction computed of it has no ionosphere. `scaling=False` gives 54.0.
 # Seen: a_i0 0.0 a_i1 0.0, without scaling 54.0 0.25
 set -euo pipefail
 folder=$(mktemp -d)
