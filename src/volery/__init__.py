@@ -48,6 +48,8 @@ if TYPE_CHECKING:
     from volery.components.component_api import note as note
     from volery.components.component_api import now as now
     from volery.components.component_api import sleep as sleep
+    from volery.explore.campaign import Campaign as Campaign
+    from volery.explore.campaign import explore as explore
     from volery.model.builder import ModelBuilder as ModelBuilder
     from volery.run.asynchronous import connect_async as connect_async
     from volery.run.connect import attach as attach

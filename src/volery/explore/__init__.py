@@ -1,1 +1,23 @@
-"""Design-space exploration: campaigns of many runs over seeds and variants of a model, and what they show."""
+"""Design-space exploration: campaigns of many runs over seeds and variants of a model, and what they show.
+
+``volery.explore(...)`` runs a campaign. The function and this package share a name: the package is callable.
+"""
+
+from __future__ import annotations
+
+import sys
+from types import ModuleType
+from typing import Any
+
+
+class _Callable(ModuleType):
+    """A package that may be called as the function of its name."""
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        """See ``volery.explore.campaign.explore``."""
+        from volery.explore.campaign import explore  # noqa: PLC0415  # the package must be light to import
+
+        return explore(*arguments, **options)
+
+
+sys.modules[__name__].__class__ = _Callable

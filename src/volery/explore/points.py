@@ -15,6 +15,9 @@ ALLOCATION: Final = "allocation"
 SELECTED: Final = (SCENARIO, ALLOCATION)
 """Keys of a point that name a scenario or an allocation; every other key is a path of the model."""
 
+PATHS: Final = ", "
+"""Joins the paths of a key that sets several to one value."""
+
 COMPLETED: Final = "completed"
 FAILED: Final = "failed"
 INVALID: Final = "invalid"
@@ -35,6 +38,7 @@ class Point:
     Attributes:
         values: What the variant sets: values by their paths in the model, such as
             ``platform.processors.onboard.frequency``, and names by the keys ``scenario`` and ``allocation``.
+            A key with several paths, joined by a comma, sets all of them.
         seed: Seed of the run.
     """
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from volery.base.errors import Location
 from volery.model import rules
-from volery.model.fields import ANYTHING, TEXT, ListOf, MapOf, Record, Schema, Syntax, WrongValueError
+from volery.model.fields import AS_WRITTEN, TEXT, ListOf, MapOf, Record, Schema, Syntax, WrongValueError
 from volery.model.reading import Reading
 from volery.model.text import Node, Path
 
@@ -22,7 +22,7 @@ class DesignParameter:
         ListOf(TEXT, least=1, bare=True),
         "What it sets: paths such as `platform.processors.onboard.frequency`.",
     ]
-    values: Annotated[tuple[Any, ...], ListOf(ANYTHING, least=1), "Its choices."]
+    values: Annotated[tuple[Any, ...], ListOf(AS_WRITTEN, least=1), "Its choices."]
     description: Annotated[str, TEXT, "What it is for."] = ""
     where: Location | None = field(default=None, compare=False)
 

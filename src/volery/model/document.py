@@ -14,6 +14,7 @@ from volery.model.design import DESIGN_PARAMETERS, SUPPRESSIONS, DesignParameter
 from volery.model.environment import Environment
 from volery.model.fields import (
     ANYTHING,
+    AS_WRITTEN,
     PERIOD,
     SHORT,
     TEXT,
@@ -178,6 +179,11 @@ class Document:
     design_parameters: Annotated[
         tuple[DesignParameter, ...], DESIGN_PARAMETERS, "Values that a design may vary, and their choices."
     ] = ()
+    explore: Annotated[
+        Mapping[str, Any],
+        MapOf(AS_WRITTEN, free=True),
+        "What `volery explore` varies, and how; its keys are in docs/explore.md.",
+    ] = field(default_factory=dict)
     include: Annotated[
         tuple[str, ...],
         ListOf(TEXT, bare=True),

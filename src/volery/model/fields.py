@@ -304,6 +304,14 @@ class Anything(Syntax):
         return {"x-quantity": "any value; an unquoted `6 / h` or `10 m` becomes a number in SI units"}
 
 
+class AsWritten(Anything):
+    """Whatever YAML can state, as it is written: what sets another value of the model."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+        """See ``Syntax``."""
+        return node.plain()
+
+
 def _si(written: Any) -> Any:
     if isinstance(written, Mapping):
         return {key: _si(value) for key, value in written.items()}
@@ -627,6 +635,7 @@ def summary(cls: type[Any]) -> str:
 TEXT = Text()
 NUMBER = Number()
 ANYTHING = Anything()
+AS_WRITTEN = AsWritten()
 TIME = Duration(units.TIME, least=0)
 PERIOD = Duration(units.TIME, above=0)
 ENERGY = Quantity(units.ENERGY, least=0)
