@@ -319,6 +319,11 @@ def _prism(text: PrismText, path: Path, reading: Reading) -> Prism | None:
             reading.problems.add(
                 path, "its corners lie on one line and enclose nothing; give at least three others"
             )
+        crossing = _crossing(corners)
+        if crossing is not None:
+            first, second = (f"{one + 1} to {(one + 1) % len(corners) + 1}" for one in crossing)
+            what = f"its sides from corner {first} and {second} cross; give the corners in order around it"
+            reading.problems.add(path, what)
     else:
         reading.problems.add(path, "give at least three corners, or a centre and a radius")
         return None
@@ -332,6 +337,36 @@ def _on_a_line(corners: tuple[tuple[float, float], ...]) -> bool:
     along_east, along_north = far_east - east, far_north - north
     length = hypot(along_east, along_north)
     return all(abs(along_east * (n - north) - along_north * (e - east)) <= 0.001 * length for e, n in others)
+
+
+def _crossing(corners: tuple[tuple[float, float], ...]) -> tuple[int, int] | None:
+    """Return two sides of a polygon that cross, by their first corners from 0; None if none do.
+
+    The sides are taken from west to east: only those that begin before another one ends can cross it.
+    """
+    count = len(corners)
+    sides = sorted(range(count), key=lambda one: min(corners[one][0], corners[(one + 1) % count][0]))
+    reached: list[int] = []
+    for side in sides:
+        here, to = corners[side], corners[(side + 1) % count]
+        west = min(here[0], to[0])
+        reached = [one for one in reached if max(corners[one][0], corners[(one + 1) % count][0]) >= west]
+        for one in reached:
+            start, end = corners[one], corners[(one + 1) % count]
+            if _parts(here, to, start, end) and _parts(start, end, here, to):
+                return min(one, side), max(one, side)
+        reached.append(side)
+    return None
+
+
+def _parts(
+    start: tuple[float, float], end: tuple[float, float], one: tuple[float, float], other: tuple[float, float]
+) -> bool:
+    """Return whether the line from *start* to *end* has *one* on one side and *other* on the other."""
+    along, up = end[0] - start[0], end[1] - start[1]
+    left = along * (one[1] - start[1]) - up * (one[0] - start[0])
+    right = along * (other[1] - start[1]) - up * (other[0] - start[0])
+    return (left > 0.0 > right) or (left < 0.0 < right)
 
 
 def _circle(centre: Place, radius: float) -> tuple[tuple[float, float], ...]:

@@ -14,6 +14,7 @@ import pytest
 import volery.simulation.autopilots
 from rigs.effects import ZEROS, without_effect
 from rigs.station import TARGET
+from volery import AMSL, Drone, Options, Position, fly
 from volery.links.mavlink_messages import to_bytewise
 from volery.simulation.autopilots.autopilot_parameters import REAL32
 from volery.simulation.autopilots.onboard_mission import MissionItem
@@ -508,6 +509,19 @@ def test_reposition_without_its_flag_is_refused_and_flown(bench: Any) -> None:
     before = rig.ned[0]
     rig.run(5.0)
     assert rig.ned[0] > before + 3.0
+
+
+def test_the_place_of_no_degrees_is_a_place() -> None:
+    """The original takes only NaN for a place that is not given; models begin at 0, 0 by default."""
+    ends = []
+
+    def back(drone: Drone) -> None:
+        drone.takeoff(5)
+        drone.goto(Position(0.0, 0.0, AMSL(5.0)))
+        ends.append(drone.position)
+
+    fly(back, "sim:px4?start=warm&home=0.0003,0,0", Options(seed=1))
+    assert ends[0].latitude == pytest.approx(0.0, abs=2e-5)
 
 
 def test_where_it_was_sent_it_shows_within_a_second(facts: dict[str, Any], bench: Any) -> None:

@@ -37,6 +37,15 @@ SPOILT = {
         "environment.no_fly_zones.prison",
         ["its corners lie on one line and enclose nothing"],
     ),
+    "a zone whose sides cross": (
+        (
+            "prison: {centre: {east: 50 m, north: 50 m}, radius: 20 m,",
+            "prison: {corners: [{east: 0 m}, {east: 9 m, north: 9 m}, {east: 9 m}, {north: 9 m}],",
+        ),
+        "prison: {",
+        "environment.no_fly_zones.prison",
+        ["its sides from corner 1 to 2 and 3 to 4 cross; give the corners in order around it"],
+    ),
     "no version": (("volery: 1\n", ""), "name: hosp", "volery", ["this key is missing"]),
     "another version": (("volery: 1\n", "volery: 2\n"), "volery: 2", "volery", ["2 is not one of 1"]),
     "text for a number": (

@@ -28,10 +28,13 @@ MARGIN = 3.0
 _CELLS = 256  # along the longer side of the lattice, at most
 _SMALLEST = 4.0  # [m] side of a cell, at least
 _STEP = 0.5  # [m] what begins less above the ground stands on it: the ground follows the globe
+_BOXED = 32  # edges in a row share a bounding box: a polygon of thousands of corners is searched by boxes
+_ROUNDING = 1.0 + 1e-9  # on a distance: an edge that is as near as another one but for rounding is looked at
+_SPARE = 0.01  # [m] by which a ray passes a box whose edges it cannot meet
 _ON_TOP = 0.02  # [m] a body's centre below a top by less is on the solid, not beside it
 
 # Columns of a solid's row.
-WEST, SOUTH, EAST, NORTH, FLOOR, CEILING, FIRST_EDGE, END_EDGE = range(8)
+WEST, SOUTH, EAST, NORTH, FLOOR, CEILING, FIRST_EDGE, END_EDGE, FIRST_BOX = range(9)
 # Columns of the lattice.
 _LEFT, _BOTTOM, _SIDE, _COLUMNS, _ROWS = range(5)
 
@@ -77,9 +80,11 @@ class Ray(NamedTuple):
 class SceneArrays(NamedTuple):
     """A scene for the compiled step.
 
-    ``solids`` (solids, 8): bounds west, south, east, north, then floor, ceiling, first edge, end of edges.
-    ``edges`` (edges, 4): both ends (east, north). ``cells``: for each cell where its list begins, and the end
-    of the last; then the lists. ``lattice``: west and south edge, side of a cell [m], columns, rows.
+    ``solids`` (solids, 9): bounds west, south, east, north, then floor, ceiling, first edge, end of edges,
+    first box. ``edges`` (edges and boxes, 4): both ends (east, north) of every edge; then of every ``_BOXED``
+    edges of a solid in a row the bounds west, south, east, north. ``cells``: for each cell where its list
+    begins, and the end of the last; then the lists. ``lattice``: west and south edge, side of a cell [m],
+    columns, rows.
     """
 
     solids: Array
@@ -143,8 +148,8 @@ class Scene:
 
 def _arrays(solids: Sequence[Solid]) -> SceneArrays:
     if not solids:
-        return SceneArrays(np.zeros((0, 8)), np.zeros((0, 4)), np.zeros(1, dtype=np.int64), np.zeros(5))
-    rows = np.zeros((len(solids), 8))
+        return SceneArrays(np.zeros((0, 9)), np.zeros((0, 4)), np.zeros(1, dtype=np.int64), np.zeros(5))
+    rows = np.zeros((len(solids), 9))
     edges: list[tuple[float, ...]] = []
     for row, solid in zip(rows, solids, strict=True):
         corners = np.array(solid.corners)
@@ -152,6 +157,12 @@ def _arrays(solids: Sequence[Solid]) -> SceneArrays:
         row[FLOOR], row[CEILING], row[FIRST_EDGE] = solid.floor, solid.ceiling, len(edges)
         edges += [(*one, *other) for one, other in pairwise((*solid.corners, solid.corners[0]))]
         row[END_EDGE] = len(edges)
+    boxes: list[tuple[float, ...]] = []
+    for row in rows:
+        row[FIRST_BOX] = len(edges) + len(boxes)
+        for first in range(int(row[FIRST_EDGE]), int(row[END_EDGE]), _BOXED):
+            ends = np.array(edges[first : min(first + _BOXED, int(row[END_EDGE]))]).reshape(-1, 2)
+            boxes.append((*ends.min(axis=0), *ends.max(axis=0)))
     west, south = rows[:, WEST].min() - MARGIN, rows[:, SOUTH].min() - MARGIN
     wide, high = rows[:, EAST].max() + MARGIN - west, rows[:, NORTH].max() + MARGIN - south
     side = max(_SMALLEST, max(wide, high) / _CELLS)
@@ -169,7 +180,7 @@ def _arrays(solids: Sequence[Solid]) -> SceneArrays:
                 near[line * columns + column].append(index)
     starts = np.cumsum([len(near) + 1, *map(len, near)])
     cells = np.array([*starts, *(index for one in near for index in one)], dtype=np.int64)
-    return SceneArrays(rows, np.array(edges), cells, np.array((west, south, side, columns, lines)))
+    return SceneArrays(rows, np.array([*edges, *boxes]), cells, np.array((west, south, side, columns, lines)))
 
 
 @numeric
@@ -195,10 +206,14 @@ def is_over(scene: SceneArrays, solid: int, east: float, north: float) -> bool:
     ):
         return False
     inside = False
-    for edge in range(int(solids[solid, FIRST_EDGE]), int(solids[solid, END_EDGE])):
-        x, y, to_x, to_y = edges[edge, 0], edges[edge, 1], edges[edge, 2], edges[edge, 3]
-        if (y > north) != (to_y > north) and east < x + (to_x - x) * (north - y) / (to_y - y):
-            inside = not inside
+    end, box = int(solids[solid, END_EDGE]), int(solids[solid, FIRST_BOX])
+    for first in range(int(solids[solid, FIRST_EDGE]), end, _BOXED):
+        if edges[box, 1] <= north < edges[box, 3]:
+            for edge in range(first, min(first + _BOXED, end)):
+                x, y, to_x, to_y = edges[edge, 0], edges[edge, 1], edges[edge, 2], edges[edge, 3]
+                if (y > north) != (to_y > north) and east < x + (to_x - x) * (north - y) / (to_y - y):
+                    inside = not inside
+        box += 1
     return inside
 
 
@@ -218,21 +233,38 @@ def top_below(scene: SceneArrays, east: float, north: float, up: float) -> float
 
 
 @numeric
+def _distance(east: float, north: float) -> float:
+    return sqrt(east * east + north * north)
+
+
+@numeric
 def _nearest_side(scene: SceneArrays, solid: int, east: float, north: float) -> tuple[float, float, float]:
     """Return distance and direction (east, north) from the nearest point of a solid's sides to a place."""
     edges = scene.edges
+    start, end = int(scene.solids[solid, FIRST_EDGE]), int(scene.solids[solid, END_EDGE])
+    box = int(scene.solids[solid, FIRST_BOX])
     nearest, toward_east, toward_north = inf, 0.0, 0.0
-    for edge in range(int(scene.solids[solid, FIRST_EDGE]), int(scene.solids[solid, END_EDGE])):
-        x, y = edges[edge, 0], edges[edge, 1]
-        dx, dy = edges[edge, 2] - x, edges[edge, 3] - y
-        square = dx * dx + dy * dy
-        along = 0.0
-        if square > 0.0:
-            along = min(max(((east - x) * dx + (north - y) * dy) / square, 0.0), 1.0)
-        off_east, off_north = east - x - along * dx, north - y - along * dy
-        distance = sqrt(off_east * off_east + off_north * off_north)
-        if distance < nearest:
-            nearest, toward_east, toward_north = distance, off_east, off_north
+    most = inf  # no nearest point is farther than a corner
+    if end - start > _BOXED:
+        for first in range(start, end, _BOXED):
+            most = min(most, _distance(east - edges[first, 0], north - edges[first, 1]))
+    for first in range(start, end, _BOXED):
+        beside = max(edges[box, 0] - east, east - edges[box, 2], 0.0)
+        beyond = max(edges[box, 1] - north, north - edges[box, 3], 0.0)
+        box += 1
+        if _distance(beside, beyond) > min(nearest, most) * _ROUNDING:
+            continue
+        for edge in range(first, min(first + _BOXED, end)):
+            x, y = edges[edge, 0], edges[edge, 1]
+            dx, dy = edges[edge, 2] - x, edges[edge, 3] - y
+            square = dx * dx + dy * dy
+            along = 0.0
+            if square > 0.0:
+                along = min(max(((east - x) * dx + (north - y) * dy) / square, 0.0), 1.0)
+            off_east, off_north = east - x - along * dx, north - y - along * dy
+            distance = _distance(off_east, off_north)
+            if distance < nearest:
+                nearest, toward_east, toward_north = distance, off_east, off_north
     return nearest, toward_east, toward_north
 
 
@@ -266,7 +298,7 @@ def contact(scene: SceneArrays, body: Cylinder) -> tuple[int, float, float, floa
         distance, off_east, off_north = _nearest_side(scene, solid, east, north)
         inside = is_over(scene, solid, east, north)
         depth = reach + distance if inside else reach - distance
-        if depth <= deepest or distance == 0.0:  # exactly on a side: the next step tells which way is out
+        if depth <= deepest or distance == 0.0:  # on a side there is no direction out; a step later there is
             continue
         below = body.high - row[FLOOR]
         if below < depth and body.centre < row[FLOOR]:
@@ -280,23 +312,39 @@ def contact(scene: SceneArrays, body: Cylinder) -> tuple[int, float, float, floa
 
 
 @numeric
+def _is_apart(scene: SceneArrays, box: int, ray: Ray) -> bool:
+    """Return whether the line of a ray, seen from above, passes a box with room to spare."""
+    edges = scene.edges
+    wide, high = 0.5 * (edges[box, 2] - edges[box, 0]), 0.5 * (edges[box, 3] - edges[box, 1])
+    x, y = edges[box, 0] + wide - ray.east, edges[box, 1] + high - ray.north
+    room = wide * abs(ray.to_north) + high * abs(ray.to_east) + _SPARE
+    return bool(abs(x * ray.to_north - y * ray.to_east) > room)
+
+
+@numeric
 def _meet(scene: SceneArrays, solid: int, ray: Ray, reach: float) -> float:
     """Return how far a ray goes until it meets one solid [m]; infinity if it does not within *reach*."""
     row, edges = scene.solids[solid], scene.edges
     if row[FLOOR] <= ray.up <= row[CEILING] and is_over(scene, solid, ray.east, ray.north):
         return 0.0
     nearest = inf
-    for edge in range(int(row[FIRST_EDGE]), int(row[END_EDGE])):
-        x, y = edges[edge, 0] - ray.east, edges[edge, 1] - ray.north
-        dx, dy = edges[edge, 2] - edges[edge, 0], edges[edge, 3] - edges[edge, 1]
-        across = ray.to_east * dy - ray.to_north * dx
-        if across == 0.0:
+    end, box = int(row[END_EDGE]), int(row[FIRST_BOX])
+    for first in range(int(row[FIRST_EDGE]), end, _BOXED):
+        apart = _is_apart(scene, box, ray)
+        box += 1
+        if apart:
             continue
-        length = (x * dy - y * dx) / across
-        along = (x * ray.to_north - y * ray.to_east) / across
-        height = ray.up + length * ray.to_up
-        if 0.0 <= length < nearest and 0.0 <= along <= 1.0 and row[FLOOR] <= height <= row[CEILING]:
-            nearest = length
+        for edge in range(first, min(first + _BOXED, end)):
+            x, y = edges[edge, 0] - ray.east, edges[edge, 1] - ray.north
+            dx, dy = edges[edge, 2] - edges[edge, 0], edges[edge, 3] - edges[edge, 1]
+            across = ray.to_east * dy - ray.to_north * dx
+            if across == 0.0:
+                continue
+            length = (x * dy - y * dx) / across
+            along = (x * ray.to_north - y * ray.to_east) / across
+            height = ray.up + length * ray.to_up
+            if 0.0 <= length < nearest and 0.0 <= along <= 1.0 and row[FLOOR] <= height <= row[CEILING]:
+                nearest = length
     if ray.to_up != 0.0:
         for level in (row[FLOOR], row[CEILING]):
             length = (level - ray.up) / ray.to_up

@@ -287,7 +287,7 @@ class SensorInput(NamedTuple):
         specific_force: Forward, left, up [m/s^2].
         air_velocity: Velocity of the air, east, north, up [m/s]: mean wind and gust.
         ground: Height of the ground straight below, up [m].
-        scene: What stands in the world; ``scene.cast`` tells how far rays go.
+        scene: What stands in the world; ``scene.cast`` returns the distances at which rays end.
     """
 
     time: Ns

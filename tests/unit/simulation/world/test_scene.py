@@ -100,6 +100,33 @@ def test_a_ray_is_as_long_as_sampling_along_it_says():
         assert length == pytest.approx(first, abs=0.011)
 
 
+def test_a_solid_of_thousands_of_corners_is_met_where_all_its_sides_say():
+    """Bounding boxes of sides change no result: against every side, one by one."""
+    random = np.random.default_rng(8)
+    angles = np.linspace(0.0, 2.0 * np.pi, 3000, endpoint=False)
+    radii = 40.0 + 10.0 * np.sin(7.0 * angles) + random.uniform(-0.02, 0.02, 3000)
+    corners = np.column_stack((radii * np.cos(angles), radii * np.sin(angles)))
+    scene = Scene([Solid("park", tuple(map(tuple, corners)), 0.0, 20.0)])
+    starts, sides = corners, np.roll(corners, -1, axis=0) - corners
+    for east, north in random.uniform(-60.0, 60.0, (60, 2)):
+        offsets = np.array((east, north)) - starts
+        along = np.clip((offsets * sides).sum(axis=1) / (sides * sides).sum(axis=1), 0.0, 1.0)
+        distance = np.linalg.norm(offsets - along[:, None] * sides, axis=1).min()
+        above = starts[:, 1] > north
+        crossed = above != np.roll(above, -1)
+        meets = starts[:, 0] + sides[:, 0] * (north - starts[:, 1]) / np.where(crossed, sides[:, 1], 1.0)
+        inside = (crossed & (east < meets)).sum() % 2 == 1
+        touched, depth, *_ = contact(scene.arrays, Cylinder(east, north, 1.0, 1.1, 1.2, 0.5))
+        expected = 0.5 + distance if inside else 0.5 - distance
+        assert (touched, depth) == (pytest.approx((0, expected)) if expected > 0.0 else (-1, 0.0))
+        [ray] = scene.cast(np.array([[east, north, 5.0]]), np.array([[0.6, 0.8, 0.0]]), 200.0)
+        across = 0.6 * sides[:, 1] - 0.8 * sides[:, 0]
+        lengths = -(offsets[:, 0] * sides[:, 1] - offsets[:, 1] * sides[:, 0]) / across
+        share = -(offsets[:, 0] * 0.8 - offsets[:, 1] * 0.6) / across
+        there = lengths[(lengths >= 0.0) & (share >= 0.0) & (share <= 1.0)]
+        assert ray == pytest.approx(0.0 if inside else min(there, default=inf))
+
+
 # -- contact
 
 
