@@ -86,6 +86,8 @@ class CampaignStore:
             else:
                 self._rows.execute("PRAGMA query_only = ON")
         self._names: dict[str, dict[str, int]] = {"observables": {}, "requirements": {}}
+        if not write:
+            self.count()  # raises an error if this is no campaign, or none yet
 
     def close(self) -> None:
         """Close the files and let others write."""
@@ -186,19 +188,19 @@ class CampaignStore:
         return known
 
     def _read_names(self, table: str) -> dict[str, int]:
-        found = self._rows.execute(f"SELECT name, id FROM {table} ORDER BY id")
+        found = self._query(f"SELECT name, id FROM {table} ORDER BY id")
         return {name: place - 1 for name, place in found}
 
     # -- reading
 
     def count(self) -> tuple[int, int]:
         """Return how many runs were asked for, and how many of them are finished."""
-        asked, finished = self._rows.execute("SELECT COUNT(*), COUNT(status) FROM runs").fetchone()
+        asked, finished = self._query("SELECT COUNT(*), COUNT(status) FROM runs").fetchone()
         return asked, finished
 
     def statuses(self) -> dict[str, int]:
         """Return how many finished runs have each status."""
-        found = self._rows.execute("SELECT status, COUNT(*) FROM runs WHERE status NOT NULL GROUP BY status")
+        found = self._query("SELECT status, COUNT(*) FROM runs WHERE status NOT NULL GROUP BY status")
         return dict(found.fetchall())
 
     def find(self, point: Point) -> Row | None:
@@ -219,7 +221,7 @@ class CampaignStore:
         if points is None:
             after = -1
             while True:  # in parts: the table is written meanwhile
-                found = self._rows.execute(
+                found = self._query(
                     "SELECT run, attempt, point, seed FROM runs JOIN variants ON variants.id = runs.variant "
                     "WHERE status IS NULL AND run > ? ORDER BY run LIMIT 1000",
                     (after,),
@@ -230,7 +232,7 @@ class CampaignStore:
                     return
                 after = found[-1][0]
         for point in points:
-            found = self._rows.execute(
+            found = self._query(
                 "SELECT run, attempt FROM runs JOIN variants ON variants.id = runs.variant "
                 "WHERE point = ? AND seed = ? AND status IS NULL",
                 (point.variant, point.seed),
@@ -240,7 +242,7 @@ class CampaignStore:
 
     def _read(self, query: str, values: tuple[Any, ...]) -> Iterator[Row]:
         names = {table: list(self._read_names(table)) for table in self._names}
-        for found in self._rows.execute(query, values):
+        for found in self._query(query, values):
             run, variant, seed, attempt, status, reason, verdicts, observed, sim_s, wall_s, cpu_s, host = (
                 found
             )
@@ -270,7 +272,7 @@ class CampaignStore:
     def kinds(self) -> dict[str, type[Any]]:
         """Return, by path, the type that holds all values of the points: bool, int, float or str."""
         found: dict[str, set[type[Any]]] = {}
-        for (text,) in self._rows.execute("SELECT point FROM variants ORDER BY id"):
+        for (text,) in self._query("SELECT point FROM variants ORDER BY id"):
             for path, value in json.loads(text).items():
                 found.setdefault(path, set()).add(type(value))
         return {path: _common(kinds) for path, kinds in found.items()}
@@ -286,7 +288,7 @@ class CampaignStore:
             most: Number of rows at most; -1 for all.
         """
         where = "FROM runs WHERE status NOT NULL AND run > ?"
-        (rows,) = self._rows.execute(f"SELECT COUNT(*) {where}", (after,)).fetchone()
+        (rows,) = self._query(f"SELECT COUNT(*) {where}", (after,)).fetchone()
         rows = rows if most < 0 else min(rows, most)
         observables = list(self._read_names("observables"))
         requirements = list(self._read_names("requirements"))
@@ -295,7 +297,7 @@ class CampaignStore:
         whole = np.zeros((3, rows), dtype=np.int64)
         texts: tuple[list[str], ...] = ([], [], [], [])
         variants: list[int] = []
-        found = self._rows.execute(
+        found = self._query(
             "SELECT run, seed, attempt, status, reason, host, verdicts, variant, sim_s, wall_s, cpu_s, "
             f"observed {where} ORDER BY run LIMIT ?",
             (after, rows),
@@ -310,7 +312,7 @@ class CampaignStore:
             numbers[: len(observed), place] = observed
         kinds, values = self.kinds(), {}
         for one in dict.fromkeys(variants):
-            (text,) = self._rows.execute("SELECT point FROM variants WHERE id = ?", (one,)).fetchone()
+            (text,) = self._query("SELECT point FROM variants WHERE id = ?", (one,)).fetchone()
             values[one] = json.loads(text)
         return {
             "run": whole[0],
@@ -332,6 +334,13 @@ class CampaignStore:
 
     # -- errors
 
+    def _query(self, query: str, values: tuple[Any, ...] = ()) -> sqlite3.Cursor:
+        """Read. Raises ``UsageError`` if the file cannot be read."""
+        try:
+            return self._rows.execute(query, values)
+        except sqlite3.Error as error:
+            raise UsageError(f"{self.folder / ROWS_FILE} cannot be read: {error}") from error
+
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         self._rows.execute("BEGIN IMMEDIATE")
@@ -347,7 +356,7 @@ class CampaignStore:
     def _guarded(self) -> Iterator[None]:
         try:
             yield
-        except (sqlite3.OperationalError, sqlite3.DatabaseError, OSError) as error:
+        except (sqlite3.Error, OSError) as error:
             why = error.strerror if isinstance(error, OSError) else error
             raise CampaignDiskError(
                 f"{self.folder} cannot be written: {why}. What was written is complete; when there is room "

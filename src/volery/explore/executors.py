@@ -120,7 +120,10 @@ class RayExecutor(Executor):
 
         self._ray = ray
         try:
-            ray.init(address or "local", log_to_driver=False, configure_logging=False)
+            if address:
+                ray.init(address, log_to_driver=False, configure_logging=False)
+            else:  # by default Ray listens on the machine's outside address
+                ray.init("local", _node_ip_address="127.0.0.1", include_dashboard=False, log_to_driver=False)
         except (OSError, ConnectionError, RuntimeError, ValueError) as error:
             raise UsageError(f"no cluster of Ray answers at {address}: {error}") from error
         self.workers = workers or int(ray.cluster_resources().get("CPU", 1))

@@ -29,7 +29,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from volery.base.errors import ModelError, UsageError, VoleryError
 from volery.explore.points import (
@@ -216,46 +216,41 @@ class RunProcess:
 
     def make(self, task: Task) -> Row | None:
         """Return the row of a run; None if the process was killed from outside."""
-        limit_s, memory_mb = task.setting.limit_s, task.setting.memory_mb
-        status = reason = ""
+        setting = task.setting
         wall_s = 0.0
         try:
             self._link.send(task)
-            answer: object = BEGINS
-            if not self._answers_within(BEGIN_S, 0.0):
-                status, reason = OVER_TIME, f"it did not begin within {BEGIN_S:g} s"
-            else:
-                answer = self._link.recv()
-            if answer == BEGINS and not status:
+            answer, late = self._answer(BEGIN_S, 0.0), f"it did not begin within {BEGIN_S:g} s"
+            if answer == BEGINS:
                 began = time.monotonic()
-                if self._answers_within(limit_s, memory_mb):
-                    answer = self._link.recv()
-                elif (wall_s := time.monotonic() - began) >= limit_s:
-                    status, reason = OVER_TIME, f"it took more than its limit of {limit_s:g} s"
-                else:
-                    status, reason = OVER_MEMORY, f"its process used more than its limit of {memory_mb:g} MB"
-            if isinstance(answer, VoleryError):
-                raise answer
-            if isinstance(answer, Row):
-                return answer
+                late = f"it took more than its limit of {setting.limit_s:g} s"
+                answer = self._answer(setting.limit_s, setting.memory_mb)
+                wall_s = time.monotonic() - began
         except (EOFError, OSError):
             code = self._exit_status()
             if code == -signal.SIGKILL:
                 return None
             how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit status {code}"
             return _ended(task, CRASHED, f"its process ended {how}", wall_s)
+        if isinstance(answer, VoleryError):
+            raise answer
+        if isinstance(answer, Row):
+            return answer
         self.kill()
-        return _ended(task, status, reason, wall_s)
+        much = f"its process used more than its limit of {setting.memory_mb:g} MB"
+        return _ended(task, answer, much if answer == OVER_MEMORY else late, wall_s)
 
-    def _answers_within(self, limit_s: float, memory_mb: float) -> bool:
-        """Wait for a message; return False if there is none within a time, or before a memory is used up."""
+    def _answer(self, limit_s: float, memory_mb: float) -> Any:
+        """Return the next message, or ``OVER_MEMORY`` or ``OVER_TIME`` if there is none within a limit."""
         until = time.monotonic() + limit_s
         while True:
-            left = until - time.monotonic()
-            if self._link.poll(max(0.0, min(left, LOOK_EVERY_S) if memory_mb else left)):
-                return True
-            if left <= 0.0 or (memory_mb and _resident_mb(self._child.pid) > memory_mb):
-                return False
+            left = max(0.0, until - time.monotonic())
+            if self._link.poll(min(left, LOOK_EVERY_S) if memory_mb else left):
+                return self._link.recv()
+            if memory_mb and _resident_mb(self._child.pid) > memory_mb:
+                return OVER_MEMORY
+            if left <= 0.0:
+                return OVER_TIME
 
     def kill(self) -> None:
         """End the process, whatever it does."""
