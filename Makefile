@@ -18,7 +18,7 @@ demo: $(VENV)/volery.stamp ## parcels across a city, two allocations side by sid
 
 test: $(VENV)/test.stamp ## all tests, against real sockets, clients and a browser
 	@status=0; \
-	$(BIN)/pytest -n auto --dist worksteal --durations=5 -m "not integration" || status=1; \
+	$(BIN)/pytest -n auto --dist worksteal --durations=5 -m "not integration and not optional" || status=1; \
 	echo "real ROS, of whose time most is waiting, beside the other integration tests; its result comes last"; \
 	$(BIN)/pytest --durations=5 tests/integration/transports >$(VENV)/transports.log 2>&1 & transports=$$!; \
 	$(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=5 -m "integration and not long" tests/integration \
@@ -27,7 +27,8 @@ test: $(VENV)/test.stamp ## all tests, against real sockets, clients and a brows
 	cat $(VENV)/transports.log; \
 	exit $$status
 
-test-all: test ## the same and what computes for minutes: the modules of a wheel, compiled
+test-all: test ## the same, features that are off by default, and what computes for minutes: compiled modules
+	$(BIN)/pytest -n auto -m "optional and not integration"
 	$(BIN)/pytest -m long
 
 CHECKS := check-style check-types check-types-of-scripts check-layers check-words check-pages

@@ -35,9 +35,13 @@ from volery.report.graph_picture import graph_of_model, graph_svg
 from volery.requirements.observables import NOTED, OBSERVABLES
 from volery.run.assembly.model_checks import vocabulary
 from volery.simulation.autopilots.ardupilot import FIRMWARE as ARDUPILOT
+from volery.simulation.autopilots.ardupilot.copter import CORE as COPTER
+from volery.simulation.autopilots.ardupilot.features import OPTIONAL, features_of
+from volery.simulation.autopilots.ardupilot.rover import CORE as ROVER
 from volery.simulation.autopilots.autopilot import FirmwareFamily
 from volery.simulation.autopilots.autopilot_parameters import Renamed
 from volery.simulation.autopilots.px4 import FIRMWARE as PX4
+from volery.simulation.autopilots.vehicle_state import ParameterTable
 from volery.simulation.world.body_specs import Multirotor
 from volery.testing.driver_checks import GROUPS
 from volery.testing.driver_conformance import chosen
@@ -186,7 +190,9 @@ FIRMWARES = {
         "names, types and values are the recorded ones. Of the rover's, few were recorded: those that it\n"
         "shares with the copter have the copter's values, the rest the documented defaults.\n"
         "Where 4.8, the default, has another name, it follows; values in cm are metres there, 1/100 degrees\n"
-        "degrees, and ARMING_SKIPCHK and SIM_GPS1_ENABLE the opposite.",
+        "degrees, and ARMING_SKIPCHK and SIM_GPS1_ENABLE the opposite. Units and defaults are those of 4.5.\n"
+        "Features that are off by default are on with `features=all` or their names; without them, all\n"
+        "parameters that begin as theirs are absent.",
     ),
     "px4": Firmware(
         "PX4",
@@ -216,13 +222,46 @@ def supported_parameters(firmware: Firmware) -> str:
         every = [parameter.name for parameter in table.defaults()]
         names = {name: _all_names(name, table.renamed) for name in every}
         kept = [names[name] for name in every if name not in table.supported]
-        lines += [f"\n## {one.name}, {kind}\n", "| parameter | what it changes |", "|---|---|"]
-        lines += [f"| {names[name]} | {what} |" for name, what in sorted(table.supported.items())]
+        lines += [f"\n## {one.name}, {kind}\n"]
+        if firmware.family.optional:
+            lines += feature_tables(kind, table)
+        else:
+            lines += ["| parameter | what it changes |", "|---|---|"]
+            lines += [f"| {names[name]} | {what} |" for name, what in sorted(table.supported.items())]
         lines += [
             f"\nWithout effect, {len(kept)} of {len(every)}:\n",
             ", ".join(kept),
         ]
     return "\n".join(lines) + "\n"
+
+
+CORES = {"multirotor": ("COPTER", COPTER), "rover": ("ROVER", ROVER)}
+
+
+def feature_tables(kind: str, table: ParameterTable) -> list[str]:
+    """Return the parameters of ArduPilot's core and of each feature, with their defaults and units."""
+    name, core = CORES[kind]
+    defaults = {
+        one.name: one.value for one in ARDUPILOT.with_features("all").kinds[kind].rules.parameters.defaults()
+    }
+    stated: set[str] = set()
+    lines: list[str] = []
+    for title, feature in {"core": core, **features_of(name, OPTIONAL)}.items():
+        own = {one: what for one, what in sorted(feature.parameters.items()) if one not in stated}
+        stated |= set(own)
+        off = ", off by default" if title in OPTIONAL else ""
+        if own:
+            lines += [
+                f"### {title.replace('_', ' ')}{off}\n",
+                "| parameter | default | unit | what it changes |",
+            ]
+            lines += ["|---|---|---|---|"]
+        lines += [
+            f"| {_all_names(one, table.renamed)} | {defaults[one]:g} | {unit} | {what} |"
+            for one, (unit, what) in own.items()
+        ]
+        lines += [""] if own else []
+    return lines
 
 
 def checks(firmware: Firmware, folder: str) -> str:

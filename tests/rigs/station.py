@@ -42,6 +42,7 @@ class Station:
     firmware: FirmwareFamily
     home: LocalFrame
     heading: float = 0.0
+    features = ""  # that are on beside those that are on by default
     looks_per_second = 20  # while it waits
     record: Record = staticmethod(ignore)  # of the events of the run
 
@@ -53,13 +54,15 @@ class Station:
         use: str = "",
         sensors: str = "rtk",
         seed: int = 3,
+        features: str = "",
         **options: Any,
     ) -> None:
         self.kernel = VirtualKernel(self.record)
         body = Multirotor if kind == "copter" else Rover
         spec = body(sensors=sensors, heading_deg=self.heading)
         self.world, (self.flight,) = make_world(self.kernel.now, [spec], seed=seed, frame=self.home)
-        self.autopilot = Autopilot(self.kernel, self.flight, self.firmware, warm=warm, **options)
+        firmware = self.firmware.with_features(features or self.features)
+        self.autopilot = Autopilot(self.kernel, self.flight, firmware, warm=warm, **options)
         self.vehicle = self.autopilot.vehicle
         self.received: list[Heard] = []
         self.latest: dict[str, dict[str, Any]] = {}

@@ -429,6 +429,11 @@ class Vehicle:
     version: Annotated[
         str, TEXT, 'Version of that firmware, such as `"1.14"`; the newest that is simulated if not given.'
     ] = ""
+    features: Annotated[
+        str,
+        TEXT,
+        "Features of that firmware that are off by default: their names with commas between them, or `all`.",
+    ] = ""
     names: Annotated[
         str,
         OneOf(VEHICLE_NAMES),

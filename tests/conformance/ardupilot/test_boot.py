@@ -21,7 +21,8 @@ def booted(bench: Any) -> dict[str, Any]:
     """A copter and a rover that have booted with all streams on, from before they were ready."""
     found = {}
     for kind in KINDS:
-        rig = bench(kind, warm=False, parameters=RECORDED_RELAYS if kind == "rover" else {})
+        relays = RECORDED_RELAYS if kind == "rover" else {}
+        rig = bench(kind, warm=False, parameters=relays, features="all")
         rig.stream(4)
         rig.run(45.0)
         found[kind] = rig

@@ -232,7 +232,7 @@ def test_several_vehicles_have_their_own_system_ids(bench: Any) -> None:
 def test_modes_that_need_more_are_refused_by_name(
     mode: int, name: str, before: str | None, bench: Any
 ) -> None:
-    rig = bench()
+    rig = bench(features="flip,follow")
     rig.run(0.5)
     assert rig.mode(mode) == FAILED
     assert rig.texts() == [*([before] if before else []), f"Mode change to {name} failed: init failed"]

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from volery.base.time import S
+from volery.simulation.autopilots.ardupilot.modes import received_of
 from volery.simulation.autopilots.onboard_mission import MissionItem
 
 RTL, LAND, BRAKE, GUIDED, SMART_RTL = 6, 9, 17, 4, 21
@@ -32,7 +33,7 @@ def test_losing_the_station_returns_after_the_recorded_time(bench: Any, facts: A
     recorded = facts["failsafe"]
     rig = bench(parameters={"FS_GCS_ENABLE": 1})
     airborne_without_a_station(rig)
-    seen = rig.vehicle.failsafes.station_last_ns / S
+    seen = received_of(rig.vehicle).station_at / S
     rig.run_until(lambda: rig.vehicle.mode.number == recorded["mode"])
     assert rig.now - seen == pytest.approx(recorded["silence"], abs=0.4)
     rig.run(1.5)

@@ -331,7 +331,7 @@ ON_THE_GROUND: list[tuple[str, tuple[float, ...], int]] = [
 
 
 def test_commands_of_ground_stations_are_answered(bench: Any) -> None:
-    rig = bench()
+    rig = bench(features="motor_test")
     rig.run(0.5)
     for what, command, result in ON_THE_GROUND:
         assert rig.command(*command) == result, what
@@ -341,7 +341,7 @@ def test_commands_of_ground_stations_are_answered(bench: Any) -> None:
 
 
 def test_nothing_is_tested_or_calibrated_in_the_air(bench: Any) -> None:
-    rig = bench()
+    rig = bench(features="motor_test")
     rig.airborne()
     assert rig.command(209, 1, 0, 5, 1) == FAILED
     assert rig.texts()[-1] == "Motor Test: vehicle not landed"

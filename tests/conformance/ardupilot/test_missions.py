@@ -413,7 +413,7 @@ def test_items_at_a_place_keep_their_frame(command: int, bench: Any) -> None:
 
 @pytest.mark.parametrize("command", [92, 94, 218, 222])
 def test_items_without_effect_do_not_refuse_the_mission(command: int, bench: Any) -> None:
-    rig = bench()
+    rig = bench(features="guided_items,payload_place")
     rig.run(0.5)
     assert upload(rig, [HOME, item(command, frame=3)]) == 0
     rig.send("MISSION_REQUEST_INT", target_system=1, target_component=1, seq=1)

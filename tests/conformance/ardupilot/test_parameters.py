@@ -32,7 +32,7 @@ def listed(rig: Any) -> list[dict[str, Any]]:
 
 @pytest.mark.parametrize(("kind", "count"), [("copter", 1390), ("rover", 1281)])
 def test_the_whole_list_comes_in_order_within_a_second(kind: str, count: int, bench: Any) -> None:
-    rig = bench(kind)
+    rig = bench(kind, features="all")
     rig.run(0.5)
     begun = rig.now
     found = listed(rig)
@@ -146,9 +146,7 @@ def test_supported_parameters_exist_and_are_read_and_no_others_are() -> None:
     shared = [*room.glob("*.py"), *room.glob("manoeuvres/*.py"), *room.glob("mavlink/*.py")]
     paths = sorted([*shared, *room.glob("ardupilot/*.py")])
     source = "".join(path.read_text(encoding="utf-8") for path in paths)
-    source = re.sub(
-        r'^        "[A-Z0-9_]+": ".*",$|^    "[A-Z0-9_]+": ".*",$', "", source, flags=re.MULTILINE
-    )  # the table
+    kinds = FIRMWARE.with_features("all").kinds
     read = set(re.findall(r'(?:parameters|\bp)\["([A-Z0-9_]+)"', source))
     read |= set(re.findall(r'"(BATT_(?:LOW|CRT)_(?:VOLT|MAH)|BATT_FS_(?:LOW|CRT)_ACT)"', source))
     read |= {
@@ -176,11 +174,11 @@ def test_supported_parameters_exist_and_are_read_and_no_others_are() -> None:
     read |= {f"SERIAL{port}_{part}" for port in range(1, 8) for part in ("OPTIONS", "PROTOCOL")}
     read |= {f"MNT1_{axis}_{end}" for axis in ("ROLL", "PITCH", "YAW") for end in ("MIN", "MAX")}
     read |= {f"MNT1_{place}_{axis}" for place in ("RETRACT", "NEUTRAL") for axis in "XYZ"}
-    stated = set(FIRMWARE.kinds["multirotor"].rules.parameters.supported) | set(
-        FIRMWARE.kinds["rover"].rules.parameters.supported
+    stated = set(kinds["multirotor"].rules.parameters.supported) | set(
+        kinds["rover"].rules.parameters.supported
     )
     assert stated == read
-    for firmware in FIRMWARE.kinds.values():
+    for firmware in kinds.values():
         names = {parameter.name for parameter in firmware.rules.parameters.defaults()}
         assert set(firmware.rules.parameters.supported) <= names
 
@@ -223,10 +221,11 @@ def test_satellites_and_motors_fail_by_parameter(bench: Any) -> None:
     assert rig.flight.truth().position[2] < 3.0
 
 
+@pytest.mark.parametrize("features", ["", pytest.param("all", marks=pytest.mark.optional)])
 @pytest.mark.parametrize("kind", ["copter", "rover"])
-def test_what_has_no_effect_is_refused(kind: str, bench: Any) -> None:
+def test_what_has_no_effect_is_refused(kind: str, features: str, bench: Any) -> None:
     """Each parameter is set to another value: only those that change what the vehicle does keep it."""
-    rig = bench(kind)
+    rig = bench(kind, features=features)
     rig.run(0.5)
     kept = set()
     table = rig.autopilot.firmware.rules.parameters
@@ -299,10 +298,11 @@ ACCEPTED_WITHOUT_EFFECT = {
 """With the source: ArduPilot's libraries at 64a9c7877b, and the recordings."""
 
 
+@pytest.mark.parametrize("features", ["", pytest.param("all", marks=pytest.mark.optional)])
 @pytest.mark.parametrize("kind", ["copter", "rover"])
-def test_a_command_without_effect_is_refused(kind: str, bench: Any) -> None:
+def test_a_command_without_effect_is_refused(kind: str, features: str, bench: Any) -> None:
     def ready() -> Any:
-        rig = bench(kind)
+        rig = bench(kind, features=features)
         rig.send("HEARTBEAT", type=6, autopilot=8)
         rig.run(1.52)
         return rig

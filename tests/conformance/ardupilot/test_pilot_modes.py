@@ -14,7 +14,7 @@ MIDDLE = (1500, 1500, 1500, 1500)
 
 @pytest.mark.parametrize("mode", [1, 7, 11, 16, 19, 20, 21, 24])
 def test_modes_of_the_recording_are_accepted_in_the_air(mode: int, bench: Any) -> None:
-    rig = bench()
+    rig = bench(features="traffic")
     rig.airborne()
     assert rig.mode(mode) == 0
     assert rig.latest["HEARTBEAT"]["custom_mode"] == mode

@@ -63,7 +63,7 @@ def test_its_console_flies_and_it_forwards(proxied: Any) -> None:
     hearer.meet()
     said = folder / "said"  # it reads the parameters by FTP, as of the original
     hearer.wait(
-        "HEARTBEAT", lambda beat: "Received 1390 parameters (ftp)" in said.read_text(errors="replace")
+        "HEARTBEAT", lambda beat: "Received 1372 parameters (ftp)" in said.read_text(errors="replace")
     )
     hearer.wait_ready()
     order("mode GUIDED")

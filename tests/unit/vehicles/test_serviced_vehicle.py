@@ -14,6 +14,7 @@ from volery.base.errors import CapabilityError, OutOfBounds, Refused, UsageError
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import S
 from volery.kernel.waiting import sleep
+from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
 from volery.vehicles import Drone, Fence, Zone
 from volery.vehicles.drivers.ardupilot import open_driver as open_ardupilot
 from volery.vehicles.drivers.px4 import open_driver as open_px4
@@ -213,7 +214,7 @@ def test_logs_payload_and_reboot(strip: type[Airstrip], known: str) -> None:
 def test_a_servo_of_an_ardupilot() -> None:
     field = ArduPilotStrip()
     field.fly(lambda drone: drone.payload.set_servo(9, 1500))
-    assert field.autopilot.vehicle.outputs.servos[9] == 1500
+    assert outputs_of(field.autopilot.vehicle).servos[9] == 1500
 
 
 def rtcm(size: int) -> bytes:

@@ -40,6 +40,12 @@ def serve(
     version: Annotated[
         str | None, typer.Option(help="Version of the firmware, such as 1.14; the newest by default.")
     ] = None,
+    features: Annotated[
+        str | None,
+        typer.Option(
+            metavar="all|NAME,...", help="Features of the firmware that are off by default, such as winch."
+        ),
+    ] = None,
     graph: Annotated[
         str,
         typer.Option(
@@ -60,7 +66,8 @@ def serve(
 
     if not 0.0 < speed < float("inf"):
         raise UsageError(f"--speed {speed:g}: give simulated seconds per second, above 0")
-    options = {"kind": kind, "sensors": sensors, "home": home, "system": system, "version": version}
+    options = {"kind": kind, "sensors": sensors, "home": home, "system": system}
+    options |= {"version": version, "features": features}
     query = "&".join(f"{name}={value}" for name, value in options.items() if value is not None)
     vehicle = parse_simulated(parse(f"sim:{autopilot}?{query}"), autopilot)
     server: VehicleServer | VehicleNodeServer

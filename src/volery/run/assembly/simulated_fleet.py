@@ -102,6 +102,7 @@ class SimulatedFleet:
         for vehicle, flight in zip(vehicles, flights, strict=True):
             self.flights[vehicle.name] = flight
             family = firmwares.load(vehicle.autopilot).of_version(vehicle.version)
+            family = family.with_features(vehicle.features)
             self._families[vehicle.name] = family
             self.autopilots[vehicle.name] = Autopilot(
                 kernel,

@@ -23,6 +23,7 @@ RATE_OPTIONS = ("attitude", "rate", "rc")
 """Rates that the driver of a simulated MAVLink autopilot requests, Hz."""
 
 OPTIONS = (
+    "features",
     "heading",
     "home",
     "kind",
@@ -83,8 +84,8 @@ def parse_simulated(
     """Parse a ``sim:`` address.
 
     Options: ``home=LAT,LON,AMSL``, ``heading=DEG``, ``kind=multirotor|rover``, ``sensors=consumer|rtk``,
-    ``start=warm|cold``, ``system=ID``, ``version`` of the firmware, ``wind=SPEED,FROM_DEG,GUSTS``,
-    ``parameters=NAME:VALUE,...`` of the autopilot, ``names`` of its ROS node,
+    ``start=warm|cold``, ``system=ID``, ``version`` of the firmware, its ``features=all|NAME,...``,
+    ``wind=SPEED,FROM_DEG,GUSTS``, ``parameters=NAME:VALUE,...`` of the autopilot, ``names`` of its ROS node,
     ``transmitter=CHANNEL:PULSE@SECONDS,...``, ``rate``, ``attitude`` and ``rc`` in Hz, ``wire=values|bytes``
     and, with bytes, the faults of ``volery.links.wire_faults``. Raises ``UsageError``.
     """
@@ -103,6 +104,7 @@ def parse_simulated(
         started=_one_of(address, "start", STARTS, "cold"),
         parameters=_parameters(address),
         version=address.options.get("version", ""),
+        features=address.options.get("features", ""),
     )
     wind = Wind(*(address.numbers("wind", 3) or ()))
     frame = LocalFrame(latitude, longitude, amsl)

@@ -15,7 +15,7 @@ autopilot.connect(theirs)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import nan
@@ -131,6 +131,12 @@ class FirmwareFamily:
     """``kinds`` of each version, the newest last; empty where there is one only."""
     airframes: bool = False
     """Whether it can be configured for the airframe of a model."""
+    version: str = ""
+    """The version that was chosen."""
+    optional: Sequence[str] = ()
+    """Names of features that are off unless they are asked for."""
+    with_optional: Callable[[frozenset[str]], Mapping[str, Mapping[str, Firmware]]] | None = None
+    """Return ``versions`` with some of these features."""
 
     def of_version(self, version: str) -> FirmwareFamily:
         """Return the family with the firmwares of one version; of the newest if *version* is empty.
@@ -143,7 +149,31 @@ class FirmwareFamily:
         if version not in self.versions:
             there = f"there is {choices(self.versions)}" if self.versions else "there is one only"
             raise UsageError(f"a simulated {self.name} has no version {version!r}; {there}")
-        return replace(self, kinds=self.versions[version])
+        return replace(self, kinds=self.versions[version], version=version)
+
+    def with_features(self, names: str) -> FirmwareFamily:
+        """Return the family with features that are off by default.
+
+        Args:
+            names: Their names with commas between them, or ``all``; empty: none.
+
+        Raises:
+            UsageError: There is no such feature.
+        """
+        wanted, known = [name.strip() for name in names.split(",") if name.strip()], ("all", *self.optional)
+        if not wanted:
+            return self
+        if self.with_optional is None:
+            raise UsageError(f"a simulated {self.name} has no features that are off by default: {names!r}")
+        unknown = [name for name in wanted if name not in known]
+        if unknown:
+            there = choices(known)
+            raise UsageError(
+                f"a simulated {self.name} has no feature {unknown[0]!r}; off by default: {there}"
+            )
+        versions = self.with_optional(frozenset(self.optional if "all" in wanted else wanted))
+        kinds = versions[self.version or list(versions)[-1]]
+        return replace(self, kinds=kinds, versions=versions)
 
 
 firmwares: Registry[FirmwareFamily] = Registry("volery.autopilots", "simulated autopilot")

@@ -92,6 +92,7 @@ class Parameters:
         overrides: Values that a user gives.
         renamed: Parameters that the version shows otherwise, by the firmware's own names.
         supported: Parameters that change the behaviour, by the firmware's own names; ``None``: all do.
+        remedy: Returns what to do to have a parameter that is not there; empty: nothing.
 
     Raises:
         UsageError: A name in *overrides* does not exist, its value is not finite or not of the parameter's
@@ -106,6 +107,7 @@ class Parameters:
         *,
         of_vehicle: Mapping[str, float] | None = None,
         supported: Collection[str] | None = None,
+        remedy: Callable[[str], str] = lambda _name: "",
     ) -> None:
         own = tuple(defaults)
         self._values = {parameter.name: parameter.value for parameter in own}
@@ -126,13 +128,14 @@ class Parameters:
         for name, value in (of_vehicle or {}).items():
             self.set(self.name(name), value)
         for name, value in (overrides or {}).items():
-            self._override(name, value)
+            self._override(name, value, remedy)
 
-    def _override(self, name: str, value: float) -> None:
+    def _override(self, name: str, value: float, remedy: Callable[[str], str]) -> None:
         """Set a parameter as a user states it."""
         if name not in self._index:
             now = self._renamed.get(name)
-            hint = f"; it is {now.name} now" if now is not None else did_you_mean(name, self._index)
+            hint = f"; {remedy(name)}" if remedy(name) else did_you_mean(name, self._index)
+            hint = hint if now is None else f"; it is {now.name} now"
             raise UsageError(f"the autopilot has no parameter {name!r}{hint}")
         before, kind = self._now(name), self._order[self._index[name]].type
         after = self.set(name, value)

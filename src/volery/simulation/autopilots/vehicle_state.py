@@ -34,22 +34,11 @@ from volery.simulation.autopilots.protocol_endpoint import VehicleOutput
 from volery.simulation.autopilots.state_groups import (
     NEVER,
     ArmingState,
-    AvoidanceState,
-    ButtonState,
     CommandedLimits,
     FailsafeState,
-    FenceState,
-    GearState,
     GroundState,
     Home,
-    LeadState,
-    OutputState,
-    PrecisionState,
-    ProximityState,
     ReportState,
-    SurfaceState,
-    SwitchState,
-    TrafficState,
 )
 
 
@@ -179,6 +168,11 @@ def no_rows(_vehicle: Vehicle) -> tuple[LogRow, ...]:
     return ()
 
 
+def no_remedy(_parameter: str) -> str:
+    """Return an empty text: the default of a firmware that always has the same parameters."""
+    return ""
+
+
 class StartupTimes(NamedTuple):
     """Uptimes [ns] from which parts of the autopilot work."""
 
@@ -221,6 +215,8 @@ class ParameterTable(NamedTuple):
     """The parameters that change the behaviour, and what each changes. No other can be changed."""
     renamed: Mapping[str, Renamed] = NOT_RENAMED
     """Parameters that this version shows otherwise."""
+    remedy: Callable[[str], str] = no_remedy
+    """Return what to do to have a parameter that is not there; empty: nothing."""
 
 
 class RcDefaults(NamedTuple):
@@ -298,6 +294,7 @@ class Vehicle:
                 table.renamed,
                 of_vehicle=table.of_vehicle(system, flight),
                 supported=table.supported,
+                remedy=table.remedy,
             )
         except UsageError as error:
             raise UsageError(f"{name}: {error}") from None
@@ -311,6 +308,8 @@ class Vehicle:
         """Recorded flights, oldest first; they persist, too."""
         self.firmware_state: Any = rules.firmware_state(self)
         """State that only the firmware uses."""
+        self.kept: dict[Any, Any] = {}
+        """State that parts of the firmware keep until the next boot, by its owner."""
         self.boot_at: Ns = kernel.now()
         self.mode: Mode = rules.boot_mode
         self.mode_before: Mode = rules.boot_mode
@@ -322,19 +321,9 @@ class Vehicle:
         self.arming = ArmingState()
         self.ground = GroundState()
         self.commanded = CommandedLimits()
-        self.outputs = OutputState()
-        self.gear = GearState()
-        self.lead = LeadState()
-        self.buttons = ButtonState()
-        self.switches = SwitchState()
         self.failsafes = FailsafeState()
-        self.fence = FenceState()
-        self.proximity = ProximityState()
-        self.precision = PrecisionState()
-        self.surface = SurfaceState()
-        self.avoidance = AvoidanceState()
-        self.traffic = TrafficState()
-        self.reports = ReportState(arming_checks_at=self.uptime(), counters_at=self.uptime())
+        self.reports = ReportState()
+        self.kept.clear()
         self.home: Home | None = None
         self._setpoint: Setpoint = OFF
         self.flight.drive(OFF)
@@ -511,7 +500,7 @@ class Vehicle:
 
     def run_manoeuvre(self) -> None:
         """Let the manoeuvre update the set-point; called at every tick and when the RC channels move."""
-        if not self.armed or self.switches.motors_stopped_at != NEVER:
+        if not self.armed or self.arming.motors_stopped_at != NEVER:
             self.drive(OFF)
         elif self.flies and self.landed:
             self._run_on_ground()

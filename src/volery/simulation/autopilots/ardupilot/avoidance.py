@@ -10,18 +10,20 @@ for a copter with a gain near the limit.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import hypot, inf, pi, radians, sqrt
 from typing import NamedTuple
 
 from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector
-from volery.base.time import MS, to_seconds
-from volery.simulation.autopilots.ardupilot.fence import CEILING, CIRCLE, POLYGON
+from volery.base.time import MS, Ns, to_seconds
+from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, build_of
+from volery.simulation.autopilots.ardupilot.fence import CEILING, CIRCLE, POLYGON, fence_of
 from volery.simulation.autopilots.ardupilot.fence_shapes import Circle, Level, Shape, shapes
-from volery.simulation.autopilots.ardupilot.proximity import closest, edges, is_healthy, upward
+from volery.simulation.autopilots.ardupilot.proximity import closest, edges, is_healthy, proximity_of, upward
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.flight_stack.guidance import approach
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 BY_FENCE, BY_PROXIMITY = 1, 2
@@ -32,10 +34,25 @@ BACK_SHARE = 0.4
 """Share of that deceleration for backing away."""
 GAIN = 1.0
 """PSC_POSXY_P and PSC_POSZ_P [1/s]."""
-LEVEL_MODES = ("LOITER", "GUIDED", "FOLLOW", "ZIGZAG")
-"""Modes of a copter whose horizontal velocity is limited."""
 RESTART = 200 * MS
 """Time without a limited velocity after which the limit of acceleration begins anew [ns]."""
+PROXIMITY_SWITCH = 40
+"""RCn_OPTION."""
+
+
+@dataclass
+class AvoidanceState:
+    """Avoidance of the fence and of obstacles."""
+
+    by_proximity: bool = True
+    """Whether the switch of the transmitter admits avoidance by the proximity sensor."""
+    velocity: Vector = (0.0, 0.0, 0.0)
+    """Velocity that was last given, north, east, down [m/s]."""
+    limited_at: Ns = NEVER
+    """When avoidance last changed a velocity."""
+
+
+avoidance_of = Kept(AvoidanceState)
 
 
 class Law(NamedTuple):
@@ -195,7 +212,7 @@ def _fence_shapes(vehicle: Vehicle) -> list[Shape]:
     parameters, home = vehicle.parameters, vehicle.home
     types = round(parameters["FENCE_TYPE"])
     found: list[Shape] = []
-    if types & CIRCLE and home is not None and CIRCLE not in vehicle.fence.breached:
+    if types & CIRCLE and home is not None and CIRCLE not in fence_of(vehicle).breached:
         found.append(Circle((home.ned[0], home.ned[1]), parameters["FENCE_RADIUS"], True))
     if types & POLYGON:
         found += shapes(vehicle)
@@ -229,7 +246,7 @@ def _uses_fence(vehicle: Vehicle) -> bool:
 
 
 def _uses_proximity(vehicle: Vehicle) -> bool:
-    admitted = vehicle.avoidance.by_proximity and is_healthy(vehicle)
+    admitted = avoidance_of(vehicle).by_proximity and is_healthy(vehicle)
     return admitted and bool(round(vehicle.parameters["AVOID_ENABLE"]) & BY_PROXIMITY)
 
 
@@ -285,7 +302,7 @@ def _backed(velocity: Level, retreat: Level) -> Level:
 
 def _with_limited_change(vehicle: Vehicle, wanted: Vector, limited: Vector) -> Vector:
     """Return *limited*, which changes by AVOID_ACCEL_MAX at most from the velocity before it."""
-    state, now = vehicle.avoidance, vehicle.kernel.now()
+    state, now = avoidance_of(vehicle), vehicle.kernel.now()
     if limited == wanted:
         return limited
     passed = now - state.limited_at
@@ -337,7 +354,7 @@ def _limited_climb(vehicle: Vehicle, climb: float, law: Law) -> float:
 
 def _leaning_away(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     """Return a set-point of ALT_HOLD with the lean away from obstacles within AVOID_DIST_MAX."""
-    parameters, sensor = vehicle.parameters, vehicle.proximity
+    parameters, sensor = vehicle.parameters, proximity_of(vehicle)
     most, reach = radians(parameters["AVOID_ANGLE_MAX"] / 100.0), parameters["AVOID_DIST_MAX"]
     largest = vehicle.tuning.tilt
     if most <= 0.0 or reach <= 0.0 or not _uses_proximity(vehicle):
@@ -368,7 +385,7 @@ def limit_copter(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     wanted = setpoint.velocity
     down = -_limited_climb(vehicle, -wanted[2], law)
     level = (wanted[0], wanted[1])
-    if vehicle.mode.name in LEVEL_MODES:
+    if vehicle.mode.name in build_of(vehicle).avoiding:
         level, retreat = _limited_level(vehicle, level, law)
         level = _backed(level, retreat)
     limited = (*level, down)
@@ -406,3 +423,38 @@ def limit_rover(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     if not drives and limited >= 0.0:
         return replace(setpoint, speed=limited)
     return replace(setpoint, control=Control.DRIVE, velocity=(limited, 0.0, 0.0))
+
+
+def _switch_proximity(vehicle: Vehicle, position: int) -> None:
+    if position:
+        avoidance_of(vehicle).by_proximity = position > 0
+
+
+ROVER = Feature(
+    parameters={
+        "AVOID_ACCEL_MAX": ("m/s²", "largest change of the velocity by avoidance; 0: any"),
+        "AVOID_BACKUP_DZ": (
+            "m",
+            "distance within AVOID_MARGIN at which the vehicle backs away from an obstacle",
+        ),
+        "AVOID_BACKUP_SPD": ("m/s", "largest speed of backing away"),
+        "AVOID_BEHAVE": ("", "1 shortens the velocity before a limit, 0 slides along it"),
+        "AVOID_ENABLE": ("", "bits: 1 avoids the fence, 2 obstacles by the proximity sensor"),
+        "AVOID_MARGIN": ("m", "distance that avoidance keeps from obstacles"),
+    },
+    switches={PROXIMITY_SWITCH: _switch_proximity},
+    at_once=(PROXIMITY_SWITCH,),
+    limit=limit_rover,
+)
+COPTER = replace(
+    ROVER,
+    parameters={
+        **ROVER.parameters,
+        "AVOID_ALT_MIN": ("m", "height by the rangefinder below which obstacles do not count"),
+        "AVOID_ANGLE_MAX": ("0.01°", "largest lean away from obstacles in ALT_HOLD"),
+        "AVOID_BACKZ_SPD": ("m/s", "largest rate of sinking back below the ceiling"),
+        "AVOID_DIST_MAX": ("m", "distance of obstacles from which ALT_HOLD leans away"),
+    },
+    problems=obstacle_problems,
+    limit=limit_copter,
+)

@@ -6,12 +6,17 @@ they have at that time.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 from volery.base.time import S
-from volery.simulation.autopilots.ardupilot.modes import INFO, update_prearm_state
-from volery.simulation.autopilots.ardupilot.payload import relays_at_boot
+from volery.simulation.autopilots.ardupilot.feature import build_of
+from volery.simulation.autopilots.ardupilot.modes import (
+    INFO,
+    failing_prearm_checks,
+    reports_of,
+    update_prearm_state,
+)
 from volery.simulation.autopilots.ardupilot.versions import Version
 from volery.simulation.autopilots.autopilot import BootEvent
 from volery.simulation.autopilots.mavlink.firmware import BootBytes
@@ -69,6 +74,12 @@ def measurement_event(seconds: float, values: Sequence[tuple[str, float]]) -> Bo
 def bytes_at(*pairs: tuple[float, bytes]) -> tuple[BootBytes, ...]:
     """Return raw bytes on the wire, as pairs of seconds after boot and data."""
     return tuple(BootBytes(round(seconds * S), data) for seconds, data in pairs)
+
+
+def set_up_outputs(vehicle: Vehicle) -> None:
+    """Let the features set up their outputs."""
+    for act in build_of(vehicle).boots:
+        act(vehicle)
 
 
 def set_origin(vehicle: Vehicle) -> None:
@@ -151,7 +162,7 @@ def copter_events(version: Version, ready: VehicleAction) -> tuple[BootEvent, ..
         ),
         texts_event(0.16, "Calibrating barometer"),
         announcement_event(0.16, "MNT1_TYPE", "CAM1_TYPE", "BARO_ALT_OFFSET"),
-        action_event(1.75, relays_at_boot),
+        action_event(1.75, set_up_outputs),
         texts_event(1.75, "Barometer 1 calibration complete", "Barometer 2 calibration complete"),
         measurement_event(1.75, (("BARO1_GND_PRESS", 94502.516), ("BARO2_GND_PRESS", 94502.242))),
         announcement_event(1.75, *_IDS),
@@ -184,7 +195,7 @@ def rover_events(version: Version, ready: VehicleAction) -> tuple[BootEvent, ...
         texts_event(0.01, "Calibrating barometer"),
         announcement_event(0.01, "BARO_ALT_OFFSET"),
         texts_event(1.73, "Barometer 1 calibration complete", "Barometer 2 calibration complete"),
-        action_event(1.73, relays_at_boot),
+        action_event(1.73, set_up_outputs),
         texts_event(1.73, "Beginning INS calibration. Do not move vehicle"),
         measurement_event(1.73, (("BARO1_GND_PRESS", 94503.914), ("BARO2_GND_PRESS", 94503.42))),
         announcement_event(1.73, "RELAY1_FUNCTION", "RELAY2_FUNCTION", "MNT1_TYPE", "CAM1_TYPE"),
@@ -215,30 +226,28 @@ def rover_events(version: Version, ready: VehicleAction) -> tuple[BootEvent, ...
 
 STORE_COUNTERS_EVERY = 30 * S
 
-Problems = Callable[[Vehicle], list[str]]
-"""Returns the texts of all checks that forbid arming, in the firmware's words."""
 
-
-def skip_elevation(vehicle: Vehicle) -> None:
-    """Regard the field elevation as reported: a warm vehicle has its home a moment later."""
+def skip_reports(vehicle: Vehicle) -> None:
+    """Regard the reports of the boot as sent: a warm vehicle has its home a moment later."""
     vehicle.reports.sent_once.add("elevation")
+    reports_of(vehicle).arming_checks_at = reports_of(vehicle).counters_at = vehicle.uptime()
 
 
-def on_position(vehicle: Vehicle, before_arming: Problems) -> None:
+def on_position(vehicle: Vehicle) -> None:
     """Set the home position and evaluate the pre-arm checks of a vehicle that starts warm."""
     set_home_position(vehicle)
     if vehicle.home is None:
         vehicle.reports.sent_once.discard("elevation")
-    vehicle.arming.checks_passed = not before_arming(vehicle)
+    vehicle.arming.checks_passed = not failing_prearm_checks(vehicle)
 
 
-def each_second(vehicle: Vehicle, before_arming: Problems) -> None:
+def each_second(vehicle: Vehicle) -> None:
     """Evaluate the pre-arm checks, and store the flight time and run time counters every 30 s."""
     if vehicle.uptime() < vehicle.rules.startup.ready_after:
         return
-    update_prearm_state(vehicle, before_arming)
-    if vehicle.uptime() - vehicle.reports.counters_at >= STORE_COUNTERS_EVERY:
-        vehicle.reports.counters_at = vehicle.uptime()
+    update_prearm_state(vehicle)
+    if vehicle.uptime() - reports_of(vehicle).counters_at >= STORE_COUNTERS_EVERY:
+        reports_of(vehicle).counters_at = vehicle.uptime()
         if vehicle.ground.flight_time:
             vehicle.set_parameter("STAT_FLTTIME", vehicle.ground.flight_time // S)
         vehicle.set_parameter("STAT_RUNTIME", vehicle.uptime() // S)

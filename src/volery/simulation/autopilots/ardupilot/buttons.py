@@ -6,8 +6,11 @@ here, so a change counts at the next tick.
 
 from __future__ import annotations
 
-from volery.base.time import S, from_seconds
-from volery.simulation.autopilots.ardupilot.auxiliary import AuxiliaryFunctions
+from dataclasses import dataclass, field
+
+from volery.base.time import Ns, S, from_seconds
+from volery.simulation.autopilots.ardupilot.auxiliary import run_function
+from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
 from volery.simulation.autopilots.mavlink.messages import boot_ms
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -19,9 +22,26 @@ REPORTED_EVERY = S
 """Time between two reports of one change, which end BTN_REPORT_SEND seconds after it."""
 
 
-def read_buttons(vehicle: Vehicle, auxiliary: AuxiliaryFunctions) -> None:
+@dataclass
+class ButtonState:
+    """Buttons on the pins of an autopilot."""
+
+    pressed: int | None = None
+    """One bit for each button whose pin is high; ``None`` until they are first read."""
+    changed_at: Ns = NEVER
+    changed_ms: int = 0
+    """Time of the last change, and the same since boot [ms]."""
+    reported_at: Ns = NEVER
+    on: set[int] = field(default_factory=set)
+    """Buttons whose function has last run as pressed, from 0."""
+
+
+buttons_of = Kept(ButtonState)
+
+
+def read_buttons(vehicle: Vehicle) -> None:
     """Report the buttons after a change, and run their functions; after a boot also without a change."""
-    parameters, state = vehicle.parameters, vehicle.buttons
+    parameters, state = vehicle.parameters, buttons_of(vehicle)
     if not parameters["BTN_ENABLE"]:
         return
     pressed, now = _pressed(vehicle), vehicle.kernel.now()
@@ -36,7 +56,7 @@ def read_buttons(vehicle: Vehicle, auxiliary: AuxiliaryFunctions) -> None:
         fields = {"time_boot_ms": boot_ms(vehicle), "last_change_ms": state.changed_ms, "state": pressed}
         vehicle.output.send_event("BUTTON_CHANGE", fields)
     if first or changed:
-        _run_functions(vehicle, auxiliary, pressed, every=first)
+        _run_functions(vehicle, pressed, every=first)
 
 
 def _pressed(vehicle: Vehicle) -> int:
@@ -47,8 +67,9 @@ def _pressed(vehicle: Vehicle) -> int:
     return sum((pins >> pin & 1) << number for number, pin in enumerate(numbers) if pin >= 0)
 
 
-def _run_functions(vehicle: Vehicle, auxiliary: AuxiliaryFunctions, pressed: int, *, every: bool) -> None:
+def _run_functions(vehicle: Vehicle, pressed: int, *, every: bool) -> None:
     """Run the functions of buttons that differ from when they last ran, or of every button."""
+    already = buttons_of(vehicle).on
     for number in range(BUTTONS):
         function = round(vehicle.parameters[f"BTN_FUNC{number + 1}"])
         if not function:
@@ -56,6 +77,18 @@ def _run_functions(vehicle: Vehicle, auxiliary: AuxiliaryFunctions, pressed: int
         on = bool(pressed >> number & 1)
         if round(vehicle.parameters[f"BTN_OPTIONS{number + 1}"]) & INVERTED:
             on = not on
-        if every or on != (number in vehicle.buttons.on):
-            (vehicle.buttons.on.add if on else vehicle.buttons.on.discard)(number)
-            auxiliary.run(vehicle, function, 1 if on else -1)
+        if every or on != (number in already):
+            (already.add if on else already.discard)(number)
+            run_function(vehicle, function, 1 if on else -1)
+
+
+COPTER = ROVER = Feature(
+    parameters={
+        "BTN_ENABLE": ("", "any value but 0: buttons are read"),
+        "BTN_REPORT_SEND": ("s", "time after a change for which BUTTON_CHANGE is repeated"),
+        **{f"BTN_PIN{number}": ("", "pin of that button; -1: none") for number in range(1, 5)},
+        **{f"BTN_FUNC{number}": ("", "function of that button, as RCn_OPTION") for number in range(1, 5)},
+        **{f"BTN_OPTIONS{number}": ("", "bit 1 inverts that button") for number in range(1, 5)},
+    },
+    on_tick=read_buttons,
+)

@@ -7,10 +7,13 @@ picture: CAMERA_FEEDBACK reports where one would have been taken. CAM1_TYPE coun
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from math import degrees, hypot
 from typing import Any
 
-from volery.base.time import US, from_seconds
+from volery.base.frames import Vector
+from volery.base.time import US, Ns, from_seconds
+from volery.simulation.autopilots.ardupilot.feature import Feature, Item, Kept, as_command
 from volery.simulation.autopilots.ardupilot.servo_outputs import write
 from volery.simulation.autopilots.mavlink.messages import (
     ACCEPTED,
@@ -23,7 +26,7 @@ from volery.simulation.autopilots.mavlink.messages import (
     finite,
 )
 from volery.simulation.autopilots.onboard_mission import MissionItem
-from volery.simulation.autopilots.state_groups import NEVER, CameraState
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 SERVO, COMPONENTS = 1, 5
@@ -37,10 +40,38 @@ SET_ZOOM, SET_FOCUS, SET_SOURCE, START_VIDEO, STOP_VIDEO = 531, 532, 534, 2500, 
 SHOOT = 1
 """Shooting command of DIGICAM_CONTROL."""
 WITHOUT_END = -1
+CAMERA_SWITCH = 9
+"""RCn_OPTION."""
+
+
+@dataclass
+class CameraState:
+    """Camera."""
+
+    kind: int | None = None
+    """Type that the vehicle has booted with; ``None``: not known yet."""
+    pictures: int = 0
+    taken_at: Ns = NEVER
+    place: Vector | None = None
+    """Where the last picture was taken, or the distance to the next one counts from."""
+    pressed_until: Ns = NEVER
+    """Until when the servo presses the trigger."""
+    pending: bool = False
+    """Whether a picture came too early and is taken later."""
+    period: Ns = 0
+    left: int = 0
+    """Pictures that are still to be taken in that period; negative: without end."""
+    feedback: dict[str, Any] = field(default_factory=dict)
+    """Report of the last picture."""
+    has_components: bool = False
+    """Whether a component of the vehicle has been received that may be a camera."""
+
+
+camera_of = Kept(CameraState)
 
 
 def _present(vehicle: Vehicle) -> bool:
-    return vehicle.outputs.camera.kind in (SERVO, COMPONENTS)
+    return camera_of(vehicle).kind in (SERVO, COMPONENTS)
 
 
 def take_picture(vehicle: Vehicle) -> bool:
@@ -49,7 +80,7 @@ def take_picture(vehicle: Vehicle) -> bool:
     One that comes before CAM1_INTRVAL_MIN has passed since the last is taken then; one that comes while the
     servo still presses the trigger is not taken.
     """
-    camera, now = vehicle.outputs.camera, vehicle.kernel.now()
+    camera, now = camera_of(vehicle), vehicle.kernel.now()
     if not _present(vehicle):
         return False
     too_early = camera.taken_at != NEVER and now - camera.taken_at < from_seconds(
@@ -72,22 +103,22 @@ def take_picture(vehicle: Vehicle) -> bool:
 
 def _forward(vehicle: Vehicle, number: int, *params: float) -> None:
     """Send a command to the components of the vehicle, if one has been received."""
-    if vehicle.outputs.camera.has_components:
+    if camera_of(vehicle).has_components:
         values = {f"param{place}": 0.0 for place in range(1, 8)}
         values |= {f"param{place}": value for place, value in enumerate(params, start=1)}
         fields = {"target_system": 0, "target_component": 0, "command": number, "confirmation": 0, **values}
         vehicle.output.send_event("COMMAND_LONG", fields)
 
 
-def on_component(vehicle: Vehicle, sender: int) -> None:
-    """Notice a heartbeat of a component of the vehicle."""
+def on_component(vehicle: Vehicle, _fields: dict[str, Any], sender: int) -> None:
+    """Handle HEARTBEAT of a component of the vehicle."""
     if sender == vehicle.system:
-        vehicle.outputs.camera.has_components = True
+        camera_of(vehicle).has_components = True
 
 
 def update_camera(vehicle: Vehicle) -> None:
     """Release the trigger, and take the pictures that are due by time or distance, at each tick."""
-    camera, parameters, now = vehicle.outputs.camera, vehicle.parameters, vehicle.kernel.now()
+    camera, parameters, now = camera_of(vehicle), vehicle.parameters, vehicle.kernel.now()
     if camera.kind is None:
         camera.kind = round(parameters["CAM1_TYPE"])
     if not _present(vehicle):
@@ -139,14 +170,14 @@ def _feedback_now(vehicle: Vehicle, camera: CameraState) -> Fields:
 
 def feedback(vehicle: Vehicle) -> Fields | None:
     """Return CAMERA_FEEDBACK of the last picture, empty before the first; ``None`` without a camera."""
-    return vehicle.outputs.camera.feedback if _present(vehicle) else None
+    return camera_of(vehicle).feedback if _present(vehicle) else None
 
 
 def _control(vehicle: Vehicle, params: tuple[float, ...]) -> None:
     """Take a picture or give the order to the components; params as in DIGICAM_CONTROL, from the first."""
     if int(params[4]) == SHOOT:
         take_picture(vehicle)
-    elif vehicle.outputs.camera.kind == COMPONENTS:
+    elif camera_of(vehicle).kind == COMPONENTS:
         _forward(vehicle, DIGICAM_CONTROL, *params)
 
 
@@ -171,7 +202,7 @@ def on_digicam_message(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -
 
 def on_digicam_configure(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_DIGICAM_CONFIGURE, which is for the components."""
-    if vehicle.outputs.camera.kind == COMPONENTS:
+    if camera_of(vehicle).kind == COMPONENTS:
         params = (command.param1, command.param2, command.param3, command.param4)
         _forward(vehicle, DIGICAM_CONFIGURE, *params, command.fifth, command.sixth, finite(command.z))
     return ACCEPTED
@@ -185,7 +216,7 @@ def on_trigger_distance(vehicle: Vehicle, command: Command) -> int:
 
 def on_start_capture(vehicle: Vehicle, command: Command) -> int:
     """Handle IMAGE_START_CAPTURE: param2 seconds between param3 pictures, 0 without end; 0 and 0 is one."""
-    camera, period, count = vehicle.outputs.camera, command.param2, round(command.param3)
+    camera, period, count = camera_of(vehicle), command.param2, round(command.param3)
     if command.param1 < 0.0:
         return UNSUPPORTED
     if command.param1 > 1.0 or not _present(vehicle):
@@ -200,7 +231,7 @@ def on_stop_capture(vehicle: Vehicle, command: Command) -> int:
     """Handle IMAGE_STOP_CAPTURE."""
     if not 0.0 <= command.param1 <= 1.0 or (command.param1 == 1.0 and not _present(vehicle)):
         return UNSUPPORTED
-    vehicle.outputs.camera.left = 0
+    camera_of(vehicle).left = 0
     return ACCEPTED
 
 
@@ -225,3 +256,35 @@ def picture_by_switch(vehicle: Vehicle, position: int) -> None:
     """Take a picture when the switch goes up."""
     if position > 0:
         take_picture(vehicle)
+
+
+COPTER = Feature(
+    parameters={
+        "CAM1_TYPE": ("", "from the next boot on: 1 a camera with a servo, 5 with commands to components"),
+        "CAM1_DURATION": ("s", "time for which the servo presses the trigger"),
+        "CAM1_INTRVAL_MIN": ("s", "least time between two pictures"),
+        "CAM1_SERVO_OFF": ("µs", "pulse width of the servo that does not press"),
+        "CAM1_SERVO_ON": ("µs", "pulse width of the servo that presses"),
+        "CAM1_TRIGG_DIST": ("m", "distance between two pictures; 0: none by distance"),
+        "CAM_AUTO_ONLY": ("", "any value but 0: pictures by distance in AUTO only"),
+        "CAM_MAX_ROLL": ("°", "largest roll for pictures by distance; 0: any"),
+    },
+    commands=CAMERA_COMMANDS,
+    messages={"DIGICAM_CONTROL": on_digicam_message, "HEARTBEAT": on_component},
+    items={
+        DIGICAM_CONTROL: Item("DigiCamCtrl", act_on_camera, silent=True),
+        TRIGGER_DISTANCE: Item("SetCamTrigDst", act_on_camera, silent=True),
+        DIGICAM_CONFIGURE: Item("DigiCamCfg", as_command(on_digicam_configure), silent=True),
+        START_CAPTURE: Item("ImageStartCapture", as_command(on_start_capture), silent=True),
+        STOP_CAPTURE: Item("ImageStopCapture", as_command(on_stop_capture), silent=True),
+        SET_ZOOM: Item("SetCameraZoom", silent=True),
+        SET_FOCUS: Item("SetCameraFocus", silent=True),
+        SET_SOURCE: Item("SetCameraSource", silent=True),
+        START_VIDEO: Item("VideoStartCapture", silent=True),
+        STOP_VIDEO: Item("VideoStopCapture", silent=True),
+    },
+    switches={CAMERA_SWITCH: picture_by_switch},
+    on_tick=update_camera,
+    telemetry={"CAMERA_FEEDBACK": feedback},
+)
+ROVER = replace(COPTER, items={**COPTER.items, TRIGGER_DISTANCE: Item("SetCamTrigDst", act_on_camera)})

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
 from math import isfinite, isnan, pi, radians
 
 from volery.base.frames import wrap
-from volery.simulation.autopilots.ardupilot import payload
 from volery.simulation.autopilots.ardupilot.battery import on_battery_reset
-from volery.simulation.autopilots.ardupilot.camera import CAMERA_COMMANDS
-from volery.simulation.autopilots.ardupilot.estimator_sources import SET_SOURCES, on_set_sources
-from volery.simulation.autopilots.ardupilot.fence import fence_admits, on_fence_enable
-from volery.simulation.autopilots.ardupilot.landing_gear import on_airframe_configuration
+from volery.simulation.autopilots.ardupilot.fence import fence_admits
 from volery.simulation.autopilots.ardupilot.modes import (
     CRITICAL,
     FORCE,
@@ -23,13 +18,10 @@ from volery.simulation.autopilots.ardupilot.modes import (
     arm,
     change_mode,
     disarm,
+    failing_prearm_checks,
+    reports_of,
     set_mode,
 )
-from volery.simulation.autopilots.ardupilot.motor_test import MOTOR_TEST, on_copter_test, on_rover_test
-from volery.simulation.autopilots.ardupilot.mount import point_at
-from volery.simulation.autopilots.ardupilot.mount_control import MOUNT_COMMANDS
-from volery.simulation.autopilots.ardupilot.sprayer import DO_SPRAYER, on_sprayer
-from volery.simulation.autopilots.ardupilot.winch import DO_WINCH, on_winch
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
@@ -53,7 +45,6 @@ from volery.simulation.autopilots.onboard_mission import (
     GLOBAL_TERRAIN,
     GLOBAL_TERRAIN_INT,
     JUMP_TAG,
-    LAND_START,
     MissionItem,
 )
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -61,11 +52,9 @@ from volery.simulation.autopilots.vehicle_state import Vehicle
 LOITER_UNLIMITED, RETURN, LAND, TAKEOFF = 17, 20, 21, 22
 CONDITION_YAW, DO_SET_MODE, CHANGE_SPEED, SET_HOME = 115, 176, 178, 179
 FLIGHT_TERMINATION, REPOSITION, PAUSE_CONTINUE, SET_YAW_SPEED, SET_MISSION_CURRENT = 185, 192, 193, 213, 224
-SET_REVERSE = 194
-REPEAT_RELAY, REPEAT_SERVO, FENCE_ENABLE, RUN_PREARM_CHECKS = 182, 184, 207, 401
-ROI_LOCATION, ROI_NONE, ROI = 195, 197, 201
+SET_REVERSE, RUN_PREARM_CHECKS = 194, 401
 START_MAG_CAL, ACCEPT_MAG_CAL, CANCEL_MAG_CAL = 42424, 42425, 42426
-BATTERY_RESET, VTOL_LAND, JUMP_TO_TAG, AIRFRAME_CONFIGURATION = 42651, 85, 601, 2520
+BATTERY_RESET, VTOL_LAND, JUMP_TO_TAG = 42651, 85, 601
 CALIBRATION, STORAGE, REBOOT, MISSION_START, ARM_DISARM, GET_HOME = 241, 245, 246, 300, 400, 410
 
 HIGHEST = 83_000.0
@@ -74,20 +63,18 @@ HIGHEST = 83_000.0
 FARTHEST_POINT = 2.1e7
 """Largest distance of a target that is flown towards [m]: any point of the globe."""
 
-Problems = Callable[[Vehicle], list[str]]
-
 SPEED_OVER_GROUND = (0, 1)
 CLIMB_SPEED, DESCENT_SPEED = 2, 3
 """Values of param1 of DO_CHANGE_SPEED."""
 
 
-def on_arm(vehicle: Vehicle, command: Command, problems: Problems, words: tuple[str, str]) -> int:
+def on_arm(vehicle: Vehicle, command: Command) -> int:
     """Handle COMPONENT_ARM_DISARM."""
     magic = round(command.param2)
     if command.param1 == 1.0:
-        return arm(vehicle, problems, words[0], magic in (FORCE, SKIP_CHECKS))
+        return arm(vehicle, force=magic in (FORCE, SKIP_CHECKS))
     if command.param1 == 0.0:
-        return disarm(vehicle, words[1], magic == FORCE)
+        return disarm(vehicle, force=magic == FORCE)
     return UNSUPPORTED
 
 
@@ -96,11 +83,16 @@ def on_set_mode(vehicle: Vehicle, command: Command) -> int:
     return set_mode(vehicle, round(command.param1), round(command.param2))
 
 
-def to_mode(number: int) -> Handler:
-    """Return the handler of a command that only enters a mode."""
+def number_of(vehicle: Vehicle, name: str) -> int:
+    """Return the number of a mode that every vehicle of that kind has."""
+    return next(number for number, mode in vehicle.rules.modes.items() if mode.name == name)
+
+
+def to_mode(name: str) -> Handler:
+    """Return the handler of a command that only enters the mode of that name."""
 
     def handle(vehicle: Vehicle, _command: Command) -> int:
-        return ACCEPTED if change_mode(vehicle, number) else FAILED
+        return ACCEPTED if change_mode(vehicle, number_of(vehicle, name)) else FAILED
 
     return handle
 
@@ -125,8 +117,7 @@ def on_takeoff(vehicle: Vehicle, command: Command) -> int:
 
 def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
     """Handle MISSION_START: enter AUTO and allow the take-off."""
-    auto = next(number for number, mode in vehicle.rules.modes.items() if mode.name == "AUTO")
-    if not vehicle.armed or not change_mode(vehicle, auto):
+    if not vehicle.armed or not change_mode(vehicle, number_of(vehicle, "AUTO")):
         return FAILED
     manoeuvre = vehicle.manoeuvre
     if isinstance(manoeuvre, FlyMission):
@@ -224,7 +215,7 @@ def on_set_home(vehicle: Vehicle, command: Command) -> int:
             return FAILED
         vehicle.set_home_here(by_user=True)
     else:
-        if not _is_place(command):
+        if not is_place(command):
             return DENIED
         relative = command.is_int and command.frame not in (GLOBAL, 5)
         base = vehicle.home.amsl if relative and vehicle.home else 0.0
@@ -232,7 +223,8 @@ def on_set_home(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def _is_place(command: Command) -> bool:
+def is_place(command: Command) -> bool:
+    """Return whether a command has a place and a height that a location can hold."""
     return abs(command.x) <= 90.0 and abs(command.y) <= 180.0 and abs(command.z) < HIGHEST
 
 
@@ -245,13 +237,14 @@ def _means_here(command: Command) -> bool:
     return (command.x == 0.0 and command.y == 0.0) or level
 
 
-def on_reposition(vehicle: Vehicle, command: Command, guided: int) -> int:
+def on_reposition(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_REPOSITION (COMMAND_INT only): flag 1 allows a change to GUIDED; copters ignore the speed."""
+    guided = number_of(vehicle, "GUIDED")
     if not command.is_int:
         return UNSUPPORTED
     if vehicle.mode.number != guided and not round(command.param2) & 1:
         return DENIED
-    if not _is_place(command) or command.frame not in PLACE_FRAMES or _means_here(command):
+    if not is_place(command) or command.frame not in PLACE_FRAMES or _means_here(command):
         return DENIED
     if not fence_admits(vehicle, vehicle.point(command.frame, command.x, command.y, command.z)):
         return FAILED
@@ -312,9 +305,9 @@ def on_reverse(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_termination(vehicle: Vehicle, command: Command, words: str) -> int:
+def on_termination(vehicle: Vehicle, command: Command) -> int:
     """Handle DO_FLIGHTTERMINATION: stop the motors, also in flight."""
-    return disarm(vehicle, words, force=True) if command.param1 > 0.5 else FAILED
+    return disarm(vehicle, force=True) if command.param1 > 0.5 else FAILED
 
 
 def on_set_current(vehicle: Vehicle, command: Command) -> int:
@@ -359,7 +352,7 @@ def on_storage(vehicle: Vehicle, command: Command) -> int:
     """Handle PREFLIGHT_STORAGE: 2 erases the parameters, which have their defaults from the next boot on."""
     if command.param1 != ERASE:
         return DENIED
-    vehicle.reports.parameters_erased = True
+    reports_of(vehicle).parameters_erased = True
     vehicle.send_text(WARNING, "All parameters reset, reboot board")
     return ACCEPTED
 
@@ -375,7 +368,7 @@ def on_reboot(vehicle: Vehicle, command: Command) -> int:
         return UNSUPPORTED
     if vehicle.armed and command.y != 20_190_226.0:
         return FAILED
-    if vehicle.reports.parameters_erased:
+    if reports_of(vehicle).parameters_erased:
         vehicle.parameters.reset()
     vehicle.parameters.set("STAT_BOOTCNT", vehicle.parameters["STAT_BOOTCNT"] + 1.0)
     vehicle.output.after_reply(vehicle.restart)
@@ -400,104 +393,50 @@ def on_pause(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED if done else FAILED
 
 
-def on_prearm_checks(vehicle: Vehicle, _command: Command, problems: Problems) -> int:
+def on_prearm_checks(vehicle: Vehicle, _command: Command) -> int:
     """Handle RUN_PREARM_CHECKS: make the checks of arming and report those that fail."""
     if vehicle.armed:
         return TEMPORARILY_REJECTED
-    for text in problems(vehicle):
+    for text in failing_prearm_checks(vehicle):
         vehicle.send_text(CRITICAL, f"PreArm: {text}")
     return ACCEPTED
 
 
-def on_region(vehicle: Vehicle, command: Command) -> int:
-    """Handle DO_SET_ROI and its two forms: without a mount that pans, the nose turns to the place.
+SHARED_COMMANDS: Mapping[int, Handler] = {
+    ARM_DISARM: on_arm,
+    DO_SET_MODE: on_set_mode,
+    MISSION_START: on_mission_start,
+    CHANGE_SPEED: on_change_speed,
+    SET_HOME: on_set_home,
+    GET_HOME: on_get_home,
+    REPOSITION: on_reposition,
+    SET_MISSION_CURRENT: on_set_current,
+    FLIGHT_TERMINATION: on_termination,
+    CALIBRATION: on_calibration,
+    STORAGE: on_storage,
+    REBOOT: on_reboot,
+    RUN_PREARM_CHECKS: on_prearm_checks,
+    START_MAG_CAL: on_compass_calibration,
+    ACCEPT_MAG_CAL: on_compass_calibration,
+    CANCEL_MAG_CAL: lambda _vehicle, _command: ACCEPTED,
+    BATTERY_RESET: on_battery_reset,
+    JUMP_TO_TAG: on_jump_to_tag,
+}
+"""Commands of the core that copter and rover share."""
 
-    Without a place the nose turns along the path again, also after CONDITION_YAW.
-    """
-    if command.number == ROI_NONE or (command.x == 0.0 and command.y == 0.0):
-        point_at(vehicle, None)
-        vehicle.commanded.forget_heading()
-        return ACCEPTED
-    if not _is_place(command):
-        return FAILED
-    point_at(vehicle, vehicle.point(command.frame, command.x, command.y, command.z))
-    return ACCEPTED
-
-
-def shared_commands(
-    problems: Problems, prearm: Problems, words: tuple[str, str], guided: int
-) -> dict[int, Handler]:
-    """Return the commands that copter and rover share.
-
-    Args:
-        problems: Returns the texts that forbid arming.
-        prearm: Returns those of the checks that are made before it regularly.
-        words: Status texts of arming and disarming.
-        guided: Number of the mode GUIDED.
-    """
-    return {
-        ARM_DISARM: lambda vehicle, command: on_arm(vehicle, command, problems, words),
-        DO_SET_MODE: on_set_mode,
-        MISSION_START: on_mission_start,
-        CHANGE_SPEED: on_change_speed,
-        SET_HOME: on_set_home,
-        GET_HOME: on_get_home,
-        REPOSITION: partial(on_reposition, guided=guided),
-        SET_MISSION_CURRENT: on_set_current,
-        FLIGHT_TERMINATION: partial(on_termination, words=words[1]),
-        CALIBRATION: on_calibration,
-        STORAGE: on_storage,
-        REBOOT: on_reboot,
-        RUN_PREARM_CHECKS: partial(on_prearm_checks, problems=prearm),
-        payload.SET_SERVO: payload.on_set_servo,
-        REPEAT_SERVO: payload.on_repeat_servo,
-        payload.SET_RELAY: payload.on_set_relay,
-        REPEAT_RELAY: payload.on_repeat_relay,
-        ROI: on_region,
-        ROI_LOCATION: on_region,
-        ROI_NONE: on_region,
-        **MOUNT_COMMANDS,
-        **CAMERA_COMMANDS,
-        payload.GRIPPER: payload.on_gripper,
-        DO_SPRAYER: on_sprayer,
-        START_MAG_CAL: on_compass_calibration,
-        ACCEPT_MAG_CAL: on_compass_calibration,
-        CANCEL_MAG_CAL: lambda _vehicle, _command: ACCEPTED,
-        FENCE_ENABLE: on_fence_enable,
-        BATTERY_RESET: on_battery_reset,
-        SET_SOURCES: on_set_sources,
-        JUMP_TO_TAG: on_jump_to_tag,
-    }
-
-
-def copter_commands(
-    problems: Problems, prearm: Problems, words: tuple[str, str], modes: Mapping[str, int]
-) -> dict[int, Handler]:
-    """Return all commands of a copter. ``modes`` maps the names of modes to their numbers."""
-    return {
-        **shared_commands(problems, prearm, words, modes["GUIDED"]),
-        TAKEOFF: on_takeoff,
-        LAND: to_mode(modes["LAND"]),
-        VTOL_LAND: to_mode(modes["LAND"]),
-        RETURN: to_mode(modes["RTL"]),
-        LOITER_UNLIMITED: to_mode(modes["LOITER"]),
-        LAND_START: to_mode(modes["AUTO_RTL"]),
-        CONDITION_YAW: on_condition_yaw,
-        PAUSE_CONTINUE: on_pause,
-        AIRFRAME_CONFIGURATION: on_airframe_configuration,
-        DO_WINCH: on_winch,
-        MOTOR_TEST: on_copter_test,
-    }
-
-
-def rover_commands(
-    problems: Problems, prearm: Problems, words: tuple[str, str], modes: Mapping[str, int]
-) -> dict[int, Handler]:
-    """Return all commands of a rover. ``modes`` maps the names of modes to their numbers."""
-    return {
-        **shared_commands(problems, prearm, words, modes["GUIDED"]),
-        RETURN: to_mode(modes["RTL"]),
-        SET_YAW_SPEED: on_set_yaw_speed,
-        SET_REVERSE: on_reverse,
-        MOTOR_TEST: partial(on_rover_test, problems=problems, words=words),
-    }
+COPTER_COMMANDS: Mapping[int, Handler] = {
+    **SHARED_COMMANDS,
+    TAKEOFF: on_takeoff,
+    LAND: to_mode("LAND"),
+    VTOL_LAND: to_mode("LAND"),
+    RETURN: to_mode("RTL"),
+    LOITER_UNLIMITED: to_mode("LOITER"),
+    CONDITION_YAW: on_condition_yaw,
+    PAUSE_CONTINUE: on_pause,
+}
+ROVER_COMMANDS: Mapping[int, Handler] = {
+    **SHARED_COMMANDS,
+    RETURN: to_mode("RTL"),
+    SET_YAW_SPEED: on_set_yaw_speed,
+    SET_REVERSE: on_reverse,
+}

@@ -7,11 +7,12 @@ pymavlink, MAVExplorer and the log review of ground stations read by name.
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from math import degrees, hypot
-from typing import NamedTuple
 
 from volery.base.elementary import atan2
 from volery.base.time import S
+from volery.simulation.autopilots.ardupilot.feature import LogForm
 from volery.simulation.autopilots.ardupilot.versions import Version
 from volery.simulation.autopilots.mavlink.messages import EPOCH_US
 from volery.simulation.autopilots.onboard_log import FlightLog, LogSample
@@ -36,13 +37,8 @@ _CODES = {
 """Format letters of DataFlash to those of ``struct``."""
 
 
-class _Form(NamedTuple):
-    """A type of message: its number, its name, its format letters and its columns."""
-
-    number: int
-    name: str
-    letters: str
-    columns: str
+class _Form(LogForm):
+    """A type of message that is written."""
 
     def layout(self) -> struct.Struct:
         return struct.Struct("<2sB" + "".join(_CODES[letter] for letter in self.letters))
@@ -60,23 +56,14 @@ ATT = _Form(133, "ATT", "Qfff", "TimeUS,Roll,Pitch,Yaw")
 POS = _Form(134, "POS", "QLLfff", "TimeUS,Lat,Lng,Alt,RelHomeAlt,RelOriginAlt")
 GPS = _Form(135, "GPS", "QBBIHBcLLffff", "TimeUS,I,Status,GMS,GWk,NSats,HDop,Lat,Lng,Alt,Spd,GCrs,VZ")
 BAT = _Form(136, "BAT", "QBffffB", "TimeUS,Inst,Volt,VoltR,Curr,CurrTot,RemPct")
-PRX = _Form(
-    137,
-    "PRX",
-    "QBBfffffffffff",
-    "TimeUS,Layer,He,D0,D45,D90,D135,D180,D225,D270,D315,DUp,CAn,CDis",
-)
-PRXR = _Form(138, "PRXR", "QBffffffff", "TimeUS,Layer,D0,D45,D90,D135,D180,D225,D270,D315")
 EV = _Form(139, "EV", "QB", "TimeUS,Id")
 ARMED_EVENT, DISARMED_EVENT = 10, 11
-PL = _Form(140, "PL", "QBBfffffffIIB", "TimeUS,Heal,TAcq,pX,pY,vX,vY,mX,mY,mZ,LastMeasMS,EKFOutl,Est")
-EXTRAS = {form.name: form for form in (PRX, PRXR, PL)}
-"""Messages of ``FlightLog.extras``."""
-FORMS = (FMT, PARM, MSG, MODE, ARM, EV, ATT, POS, GPS, BAT, *EXTRAS.values())
+FORMS = (FMT, PARM, MSG, MODE, ARM, EV, ATT, POS, GPS, BAT)
 
 
-def encode(log: FlightLog, version: Version) -> bytes:
-    """Return a log in DataFlash format."""
+def encode(log: FlightLog, version: Version, added: Sequence[LogForm]) -> bytes:
+    """Return a log in DataFlash format; *added* are the messages of ``FlightLog.extras``."""
+    extra_forms = {form.name: _Form(*form) for form in added}
     name = "ArduCopter" if log.flies else "ArduRover"
     samples = list(log.samples())
     start = round(samples[0].time_us) if samples else 0
@@ -88,7 +75,7 @@ def encode(log: FlightLog, version: Version) -> bytes:
             form.letters.encode(),
             form.columns.encode(),
         )
-        for form in FORMS
+        for form in (*FORMS, *extra_forms.values())
     ]
     out.append(MSG.row(start, f"{name} {version.text}".encode()))
     out += [PARM.row(start, one.name.encode(), one.value, one.value) for one in log.parameters]
@@ -99,16 +86,15 @@ def encode(log: FlightLog, version: Version) -> bytes:
             mode = sample.mode
             out.append(MODE.row(round(sample.time_us), int(mode), int(mode), 0))
         out += _rows(log, sample, start)
-        out += [_extra_row(sample, name, values) for name, values in extras]
+        out += [_extra_row(sample, extra_forms[name], values) for name, values in extras]
     if samples:
         end = round(samples[-1].time_us)
         out += [ARM.row(end, 0, 0, 0, 1), EV.row(end, DISARMED_EVENT)]
     return b"".join(out)
 
 
-def _extra_row(sample: LogSample, name: str, values: tuple[float, ...]) -> bytes:
+def _extra_row(sample: LogSample, form: _Form, values: tuple[float, ...]) -> bytes:
     """Return a row of the firmware's own at the time of a sample."""
-    form = EXTRAS[name]
     fitting = (
         int(one) if letter in "BI" else one for letter, one in zip(form.letters[1:], values, strict=True)
     )

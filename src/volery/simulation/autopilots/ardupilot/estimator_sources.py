@@ -6,22 +6,44 @@ other sources a set may name do not exist here, so that such a set has no positi
 
 from __future__ import annotations
 
-from volery.base.time import S
-from volery.simulation.autopilots.ardupilot.modes import CRITICAL, Check
+from dataclasses import dataclass, replace
+
+from volery.base.time import Ns, S
+from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Kept
+from volery.simulation.autopilots.ardupilot.modes import CRITICAL
 from volery.simulation.autopilots.ardupilot.parameter_checks import GPS, SETS
-from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, Command
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, Command, Fields
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 SET_SOURCES, SOURCES_OPTION = 42_007, 90
 """MAV_CMD, and value of RCn_OPTION."""
+GLITCHING = 1 << 15
+"""Bit of EKF_STATUS_FLAGS: satellites are refused."""
+
+
+@dataclass
+class SourceState:
+    """Satellites as the estimator uses them. Times in ns."""
+
+    ignored: bool = False
+    """Whether the chosen set of sources has no satellites."""
+    glitching: bool = False
+    """Whether the estimator has refused all fixes for a second, and has not fused them for ten since then."""
+    refused_at: Ns = NEVER
+    """When it last refused one."""
+
+
+sources_of = Kept(SourceState)
 
 
 def choose_sources(vehicle: Vehicle, number: int) -> None:
     """Use the sources of a set, from 1; before the estimator has an origin nothing changes."""
     ignored = vehicle.parameters[f"EK3_SRC{number}_POSXY"] != GPS
     started = vehicle.uptime() > vehicle.rules.startup.origin_after
-    if started and ignored != vehicle.switches.satellites_ignored:
-        vehicle.switches.satellites_ignored = ignored
+    sources = sources_of(vehicle)
+    if started and ignored != sources.ignored:
+        sources.ignored = ignored
         vehicle.flight.use_gps(not ignored)
 
 
@@ -39,23 +61,34 @@ GLITCH_AFTER, GLITCH_CLEARED_AFTER = 1.0, 10 * S
 
 def watch_glitches(vehicle: Vehicle) -> None:
     """Note the beginning and end of a glitch of the satellites, which a copter reports."""
-    failsafes, now = vehicle.failsafes, vehicle.kernel.now()
+    sources, now = sources_of(vehicle), vehicle.kernel.now()
     refused = vehicle.estimate.gps_refused
     if refused > 0.0:
-        failsafes.refused_at = now
+        sources.refused_at = now
     glitching = refused > GLITCH_AFTER or (
-        failsafes.glitching and now - failsafes.refused_at <= GLITCH_CLEARED_AFTER
+        sources.glitching and now - sources.refused_at <= GLITCH_CLEARED_AFTER
     )
-    if glitching == failsafes.glitching:
+    if glitching == sources.glitching:
         return
-    failsafes.glitching = glitching
+    sources.glitching = glitching
     if vehicle.flies:
         vehicle.send_text(CRITICAL, "GPS Glitch or Compass error" if glitching else "Glitch cleared")
-
-
-GLITCH_CHECK = Check("GPS glitching", lambda vehicle: vehicle.failsafes.glitching)
 
 
 def switch_sources(vehicle: Vehicle, position: int) -> None:
     """Choose the first set with the switch down, the second in the middle, the third up."""
     choose_sources(vehicle, position + 2)
+
+
+def _amend_report(vehicle: Vehicle, report: Fields) -> Fields:
+    """Return EKF_STATUS_REPORT with the flag of a glitch."""
+    return {**report, "flags": report["flags"] | GLITCHING} if sources_of(vehicle).glitching else report
+
+
+ROVER = Feature(
+    commands={SET_SOURCES: on_set_sources},
+    switches={SOURCES_OPTION: switch_sources},
+    on_tick=watch_glitches,
+    amends={"EKF_STATUS_REPORT": _amend_report},
+)
+COPTER = replace(ROVER, checks=(Check("GPS glitching", lambda vehicle: sources_of(vehicle).glitching),))

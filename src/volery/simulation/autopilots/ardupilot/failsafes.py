@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 
 from volery.base.time import Ns, S, from_seconds
 from volery.simulation.autopilots.ardupilot.battery import left_mah, used_mah
-from volery.simulation.autopilots.ardupilot.landing_sequence import AUTO_RTL
+from volery.simulation.autopilots.ardupilot.feature import Kept
 from volery.simulation.autopilots.ardupilot.modes import (
-    COPTER_DISARMED,
+    AUTO_RTL,
     CRITICAL,
-    ROVER_DISARMED,
     WARNING,
     change_mode,
     disarm,
+    received_of,
 )
 from volery.simulation.autopilots.autopilot import Failsafe
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
@@ -33,31 +34,44 @@ CONTINUE_GUIDED_ON_RADIO, CONTINUE_LANDING, CONTINUE_PILOT_ON_STATION = 1 << 2, 
 """Bits of FS_OPTIONS."""
 
 
+@dataclass
+class FailsafeConditions:
+    """What the conditions of failsafes remember."""
+
+    true_since: dict[str, Ns] = field(default_factory=dict)
+    """Since when [ns] a condition has been true that must last before a failsafe acts, by its name."""
+    suspended: bool = False
+    """Whether the failsafes of station and transmitter do not act: a feature drives the motors itself."""
+
+
+conditions_of = Kept(FailsafeConditions)
+
+
 def station_lost(vehicle: Vehicle) -> bool:
     """Return whether a ground station that was received is silent for longer than FS_GCS_TIMEOUT."""
-    if vehicle.parameters["FS_GCS_ENABLE"] == 0.0 or vehicle.failsafes.station_last_ns == NEVER:
+    if vehicle.parameters["FS_GCS_ENABLE"] == 0.0 or received_of(vehicle).station_at == NEVER:
         return False
-    if vehicle.outputs.motor_test.running:
+    if conditions_of(vehicle).suspended:
         return False
-    silence = vehicle.kernel.now() - vehicle.failsafes.station_last_ns
+    silence = vehicle.kernel.now() - received_of(vehicle).station_at
     return silence > from_seconds(vehicle.parameters["FS_GCS_TIMEOUT"])
 
 
 def radio_lost(vehicle: Vehicle) -> bool:
     """Return whether the throttle channel is below FS_THR_VALUE."""
-    if vehicle.parameters["FS_THR_ENABLE"] == 0.0 or vehicle.outputs.motor_test.running:
+    if vehicle.parameters["FS_THR_ENABLE"] == 0.0 or conditions_of(vehicle).suspended:
         return False
     return vehicle.rc[vehicle.tuning.sticks.throttle] < vehicle.parameters["FS_THR_VALUE"]
 
 
 def radio_never_received(vehicle: Vehicle) -> bool:
     """Return whether FS_THR_ENABLE expects a transmitter and none was received since boot."""
-    return vehicle.parameters["FS_THR_ENABLE"] != 0.0 and not vehicle.failsafes.rc_received
+    return vehicle.parameters["FS_THR_ENABLE"] != 0.0 and not received_of(vehicle).transmitter
 
 
 def radio_too_low(vehicle: Vehicle) -> bool:
     """Return whether a transmitter that was received is lost now."""
-    return vehicle.failsafes.rc_received and radio_lost(vehicle)
+    return received_of(vehicle).transmitter and radio_lost(vehicle)
 
 
 def _battery_below(vehicle: Vehicle, volts: str, charge: str) -> bool:
@@ -66,9 +80,9 @@ def _battery_below(vehicle: Vehicle, volts: str, charge: str) -> bool:
         return False
     sagged = parameters[volts] > 0.0 and estimate.battery_volts < parameters[volts]
     if not sagged:
-        vehicle.failsafes.true_since.pop(volts, None)
+        conditions_of(vehicle).true_since.pop(volts, None)
         return parameters[charge] > 0.0 and left_mah(vehicle) < parameters[charge]
-    since = vehicle.failsafes.true_since.setdefault(volts, vehicle.kernel.now())
+    since = conditions_of(vehicle).true_since.setdefault(volts, vehicle.kernel.now())
     return vehicle.kernel.now() - since >= from_seconds(parameters["BATT_LOW_TIMER"])
 
 
@@ -88,7 +102,7 @@ def battery_critical(vehicle: Vehicle) -> bool:
 
 def estimator_lost(vehicle: Vehicle) -> bool:
     """Return whether the estimator has had a position, and has had none for a second."""
-    since, reported = vehicle.failsafes.true_since, vehicle.reports.sent_once
+    since, reported = conditions_of(vehicle).true_since, vehicle.reports.sent_once
     if vehicle.parameters["FS_EKF_THRESH"] <= 0.0:
         return False
     has_position = vehicle.has_position
@@ -181,7 +195,7 @@ def _on_radio_lost(vehicle: Vehicle) -> None:
 def _on_copter_battery(vehicle: Vehicle, level: str) -> None:
     action = _report_battery(vehicle, level)
     if action == DISARM_ACTION:
-        disarm(vehicle, COPTER_DISARMED, force=True)
+        disarm(vehicle, force=True)
     elif action:
         _respond(vehicle, "Battery", BATTERY_ACTIONS.get(action, ()), "")
 
@@ -201,7 +215,7 @@ def _respond(vehicle: Vehicle, what: str, modes: tuple[int, ...], exception: str
         vehicle.send_text(WARNING, f"{what} Failsafe")
     elif vehicle.landed and not mission_started:
         vehicle.send_text(WARNING, f"{what} Failsafe - Disarming")
-        disarm(vehicle, COPTER_DISARMED, force=True)
+        disarm(vehicle, force=True)
     elif manoeuvre.landing and what != "Battery" and _battery_lands(vehicle):
         vehicle.send_text(WARNING, f"{what} + Battery Failsafe - Continuing Landing")
     elif manoeuvre.landing and round(vehicle.parameters["FS_OPTIONS"]) & CONTINUE_LANDING:
@@ -224,7 +238,7 @@ def _battery_lands(vehicle: Vehicle) -> bool:
 
 def _on_estimator_lost(vehicle: Vehicle) -> None:
     """Report it; enter LAND or ALT_HOLD as FS_EKF_ACTION demands, if the vehicle is armed and needs it."""
-    now, since = vehicle.kernel.now(), vehicle.failsafes.true_since
+    now, since = vehicle.kernel.now(), conditions_of(vehicle).true_since
     if now - since.get("estimator warned", NEVER) > WARNED_EVERY:
         since["estimator warned"] = now
         vehicle.send_text(CRITICAL, "EKF variance")
@@ -265,7 +279,7 @@ ROVER_ACTIONS = {
 
 def _act_on_rover(vehicle: Vehicle, action: int) -> None:
     if action == DISARM_ACTION:
-        disarm(vehicle, ROVER_DISARMED, force=True)
+        disarm(vehicle, force=True)
     else:
         _enter_first(vehicle, ROVER_ACTIONS.get(action, ()))
 
@@ -278,7 +292,7 @@ ACTIVE_IN_HOLD = 1 << 0
 
 def _lost_for_long(vehicle: Vehicle, name: str, lost: Callable[[Vehicle], bool]) -> bool:
     """Return whether a link is lost for FS_TIMEOUT in a mode that a failsafe may end."""
-    since = vehicle.failsafes.true_since
+    since = conditions_of(vehicle).true_since
     if not lost(vehicle):
         since.pop(name, None)
         return False

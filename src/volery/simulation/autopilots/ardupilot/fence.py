@@ -8,14 +8,21 @@ ignored without a text. ``avoidance`` slows the vehicle down before the fence.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
 from math import hypot, inf
 
 from volery.base.frames import Vector
-from volery.base.time import MS
-from volery.simulation.autopilots.ardupilot.fence_points import FENCE, clear_if_emptied
+from volery.base.time import MS, Ns
+from volery.simulation.autopilots.ardupilot.feature import Feature, Item, Kept, as_command
+from volery.simulation.autopilots.ardupilot.fence_points import (
+    FENCE,
+    clear_if_emptied,
+    on_fence_fetch,
+    on_fence_point,
+)
 from volery.simulation.autopilots.ardupilot.fence_shapes import shapes
 from volery.simulation.autopilots.ardupilot.modes import (
-    COPTER_DISARMED,
     NOTICE,
     change_mode,
     disarm,
@@ -39,6 +46,27 @@ BACKUP = 20.0
 
 Respond = Callable[[Vehicle, float], None]
 """Responds to a new breach at a distance beyond the fence [m]."""
+FENCE_ENABLE, FENCE_SWITCH = 207, 11
+"""MAV_CMD, and value of RCn_OPTION."""
+SENSOR = 1 << 20
+"""MAV_SYS_STATUS_SENSOR of the fence."""
+
+
+@dataclass
+class FenceState:
+    """Breaches of the fence."""
+
+    floor: bool = False
+    """Whether the floor counts."""
+    breached: dict[int, float] = field(default_factory=dict)
+    """Limits beyond which the vehicle is, to the distance beyond [m] at which the breach counts anew."""
+    count: int = 0
+    """Number of breaches."""
+    breached_at: Ns = 0
+    """Uptime of the last of them [ns]."""
+
+
+fence_of = Kept(FenceState)
 
 
 def on_fence_enable(vehicle: Vehicle, command: Command) -> int:
@@ -52,8 +80,8 @@ def on_fence_enable(vehicle: Vehicle, command: Command) -> int:
 def enable_fence(vehicle: Vehicle, *, on: bool) -> None:
     """Switch the fence and its floor on or off."""
     vehicle.parameters.set("FENCE_ENABLE", float(on))
-    vehicle.fence.floor = on
-    vehicle.fence.breached.clear()
+    fence_of(vehicle).floor = on
+    fence_of(vehicle).breached.clear()
 
 
 def _types(vehicle: Vehicle) -> int:
@@ -97,7 +125,7 @@ def fence_admits(vehicle: Vehicle, point: Vector) -> bool:
 
 def check_fence(vehicle: Vehicle, respond: Respond) -> None:
     """Check the fence; respond to a new breach of an armed vehicle."""
-    fence = vehicle.fence
+    fence = fence_of(vehicle)
     clear_if_emptied(vehicle)
     if not vehicle.parameters["FENCE_ENABLE"]:
         fence.breached.clear()
@@ -120,7 +148,7 @@ def fence_status(vehicle: Vehicle) -> Fields | None:
     """Return FENCE_STATUS while the fence is enabled."""
     if not vehicle.parameters["FENCE_ENABLE"]:
         return None
-    fence = vehicle.fence
+    fence = fence_of(vehicle)
     kinds = {FLOOR: BELOW, CEILING: ABOVE, CIRCLE: BOUNDARY, POLYGON: BOUNDARY}
     return {
         "breach_status": int(bool(fence.breached)),
@@ -152,7 +180,7 @@ def _first_problem(vehicle: Vehicle) -> str:
 
 
 def _breach_problem(vehicle: Vehicle, margin: float) -> str:
-    if vehicle.fence.breached:
+    if fence_of(vehicle).breached:
         return "vehicle outside fence"
     return "Invalid FENCE_MARGIN value" if margin < 0.0 else ""
 
@@ -206,9 +234,9 @@ def respond_copter(vehicle: Vehicle, distance: float) -> None:
     if not action:
         return
     closed = vehicle.mode.manual_throttle and Stabilize(vehicle).pilot.throttle <= 0.0
-    falls = closed and "radio" not in vehicle.failsafes.active and CEILING not in vehicle.fence.breached
+    falls = closed and "radio" not in vehicle.failsafes.active and CEILING not in fence_of(vehicle).breached
     if vehicle.landed or falls:
-        disarm(vehicle, COPTER_DISARMED, force=True)
+        disarm(vehicle, force=True)
         return
     modes = (LAND,) if distance > GIVE_UP else COPTER_ACTIONS.get(action, (RTL, LAND))
     any(change_mode(vehicle, mode) for mode in modes)
@@ -229,7 +257,58 @@ def respond_rover(vehicle: Vehicle, distance: float) -> None:
     """Respond as FENCE_ACTION demands, without a text."""
     action = round(vehicle.parameters["FENCE_ACTION"])
     if action == TERMINATE and distance <= GIVE_UP:
-        disarm(vehicle, "Throttle disarmed", force=True)
+        disarm(vehicle, force=True)
     elif action:
         modes = (ROVER_HOLD,) if distance > GIVE_UP else ROVER_ACTIONS.get(action, ())
         any(change_mode(vehicle, mode) for mode in modes)
+
+
+def _switch_fence(vehicle: Vehicle, position: int) -> None:
+    enable_fence(vehicle, on=position > 0)
+
+
+def _amend_status(vehicle: Vehicle, status: Fields) -> Fields:
+    """Return SYS_STATUS with the fence: enabled if it acts, healthy if it is not breached."""
+    if not vehicle.parameters["FENCE_ENABLE"]:
+        return status
+    enabled, healthy = status["onboard_control_sensors_enabled"], status["onboard_control_sensors_health"]
+    return {
+        **status,
+        "onboard_control_sensors_enabled": enabled | (SENSOR if vehicle.parameters["FENCE_ACTION"] else 0),
+        "onboard_control_sensors_health": healthy & ~SENSOR
+        if fence_of(vehicle).breached
+        else healthy | SENSOR,
+    }
+
+
+ROVER = Feature(
+    parameters={
+        "FENCE_ACTION": ("", "action beyond the fence; 0 only reports"),
+        "FENCE_ENABLE": ("", "any value but 0 switches the fence on"),
+        "FENCE_RADIUS": ("m", "circle of the fence about home"),
+        "FENCE_TYPE": ("", "bits: 1 height, 2 circle, 4 polygons, 8 floor"),
+        "FENCE_MARGIN": (
+            "m",
+            "distance that avoidance keeps from the fence; the limits have to leave room for it",
+        ),
+        "FENCE_TOTAL": ("", "number of points; 0 clears the fence"),
+    },
+    commands={FENCE_ENABLE: on_fence_enable},
+    messages={"FENCE_POINT": on_fence_point},
+    questions={"FENCE_FETCH_POINT": on_fence_fetch},
+    items={FENCE_ENABLE: Item("FenceEnable", as_command(on_fence_enable))},
+    switches={FENCE_SWITCH: _switch_fence},
+    checks=FENCE_CHECKS,
+    on_tick=partial(check_fence, respond=respond_rover),
+    telemetry={"FENCE_STATUS": fence_status},
+    amends={"SYS_STATUS": _amend_status},
+)
+COPTER = replace(
+    ROVER,
+    parameters={
+        **ROVER.parameters,
+        "FENCE_ALT_MAX": ("m", "ceiling of the fence above home"),
+        "FENCE_ALT_MIN": ("m", "floor of the fence above home"),
+    },
+    on_tick=partial(check_fence, respond=respond_copter),
+)

@@ -6,8 +6,10 @@ the polygon, and FENCE_TOTAL states the number of both and the corners.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
+from volery.simulation.autopilots.ardupilot.feature import Kept
 from volery.simulation.autopilots.ardupilot.modes import INFO, WARNING
 from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.mavlink.messages import finite
@@ -40,6 +42,16 @@ TYPES = {
 }
 """Numbers of the items in the firmware's status texts."""
 LEAST_CORNERS, LEAST_TOTAL = 3, 5
+
+
+@dataclass
+class Stated:
+    """FENCE_TOTAL as it was stated last."""
+
+    total: int = 0
+
+
+stated_of = Kept(Stated)
 
 
 def stored_fence_point(kind: int, item: MissionItem) -> MissionItem | int:
@@ -97,14 +109,14 @@ def points_changed(vehicle: Vehicle, kind: int) -> None:
     corners = sum(point.command in (INCLUSION, EXCLUSION) for point in points)
     total = corners + 2 if corners >= LEAST_CORNERS else 0
     vehicle.set_parameter("FENCE_TOTAL", total)
-    vehicle.fence.total = total
+    stated_of(vehicle).total = total
 
 
 def clear_if_emptied(vehicle: Vehicle) -> None:
     """Remove the fence once a station has set FENCE_TOTAL to 0."""
     total = round(vehicle.parameters["FENCE_TOTAL"])
-    if total != vehicle.fence.total:
-        vehicle.fence.total = total
+    if total != stated_of(vehicle).total:
+        stated_of(vehicle).total = total
         if not total:
             vehicle.points[FENCE] = []
 
@@ -150,7 +162,7 @@ def on_fence_point(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> No
             corners[index - 1] = blank._replace(**place)
     corners = [corner._replace(param1=float(len(corners))) for corner in corners]
     vehicle.points[FENCE] = [*returns, *corners]
-    vehicle.fence.total = total
+    stated_of(vehicle).total = total
 
 
 def on_fence_fetch(vehicle: Vehicle, fields: dict[str, Any], sender: Peer) -> None:

@@ -5,33 +5,28 @@ Fence and rally points are served in their deprecated messages, too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import cache, partial
 from typing import Any
 
 from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.ardupilot import (
-    camera,
     dataflash,
     fence_points,
     files,
-    high_latency,
     mission,
-    mount_control,
-    payload,
     pilot_input,
-    proximity,
-    rally,
     telemetry,
 )
 from volery.simulation.autopilots.ardupilot.battery import battery_status
 from volery.simulation.autopilots.ardupilot.commands import go_to_item
-from volery.simulation.autopilots.ardupilot.fence import fence_status
+from volery.simulation.autopilots.ardupilot.feature import ArmingProblems, Build, Feature
+from volery.simulation.autopilots.ardupilot.features import absent, features_of
 from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
-from volery.simulation.autopilots.ardupilot.mount import attitude_status
 from volery.simulation.autopilots.ardupilot.parameters import LEAST_HOVER, MOST_HOVER
 from volery.simulation.autopilots.ardupilot.sensor_status import Health, sys_status
 from volery.simulation.autopilots.ardupilot.versions import Version
+from volery.simulation.autopilots.autopilot_parameters import Parameter, Parameters, Tuning
 from volery.simulation.autopilots.flight_stack.flight import Flight, hover_collective
 from volery.simulation.autopilots.mavlink import messages
 from volery.simulation.autopilots.mavlink.channel import Peer
@@ -52,10 +47,9 @@ from volery.simulation.autopilots.mavlink.messages import (
     DENIED,
     FAILED,
     Command,
-    Handler,
     vehicle_type,
 )
-from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
+from volery.simulation.autopilots.vehicle_state import ParameterTable, Vehicle, VehicleAction
 from volery.simulation.world.body_specs import Multirotor
 
 SEND_BANNER = 42_428
@@ -87,7 +81,7 @@ def private_links(vehicle: Vehicle) -> frozenset[int]:
     return frozenset(port for port, value in options if value & PRIVATE)
 
 
-def questions(sent: TelemetryPolicy) -> dict[str, QuestionHandler]:
+def _questions(sent: TelemetryPolicy, build: Build) -> dict[str, QuestionHandler]:
     """Return the handlers by message; *sent* builds AUTOPILOT_VERSION."""
 
     def on_version(vehicle: Vehicle, _fields: dict[str, Any], sender: Peer) -> None:
@@ -96,9 +90,8 @@ def questions(sent: TelemetryPolicy) -> dict[str, QuestionHandler]:
 
     return {
         "AUTOPILOT_VERSION_REQUEST": on_version,
-        "FENCE_FETCH_POINT": fence_points.on_fence_fetch,
-        "RALLY_FETCH_POINT": rally.on_rally_fetch,
         "TERRAIN_CHECK": on_terrain_check,
+        **build.questions,
     }
 
 
@@ -118,16 +111,10 @@ BUILDERS: Mapping[str, Builder] = {
     "ATTITUDE": messages.attitude,
     "ATTITUDE_QUATERNION": messages.attitude_quaternion,
     "BATTERY_STATUS": battery_status,
-    "CAMERA_FEEDBACK": camera.feedback,
-    "DISTANCE_SENSOR": telemetry.distance_sensor,
     "EKF_STATUS_REPORT": telemetry.ekf_status,
-    "FENCE_STATUS": fence_status,
     "EXTENDED_SYS_STATE": telemetry.extended_sys_state,
     "GLOBAL_POSITION_INT": telemetry.global_position,
     "GPS_GLOBAL_ORIGIN": telemetry.origin,
-    "GIMBAL_DEVICE_ATTITUDE_STATUS": attitude_status,
-    "GIMBAL_MANAGER_INFORMATION": mount_control.manager_information,
-    "GIMBAL_MANAGER_STATUS": mount_control.manager_status,
     "GPS_RAW_INT": telemetry.gps_raw,
     "HOME_POSITION": telemetry.home_position,
     "LOCAL_POSITION_NED": telemetry.local_position,
@@ -137,11 +124,9 @@ BUILDERS: Mapping[str, Builder] = {
     "POSITION_TARGET_GLOBAL_INT": telemetry.position_target,
     "POSITION_TARGET_LOCAL_NED": telemetry.local_target,
     "POWER_STATUS": telemetry.power_status,
-    "RANGEFINDER": telemetry.rangefinder,
     "RAW_IMU": telemetry.raw_imu,
     "RC_CHANNELS": telemetry.rc_channels,
     "RC_CHANNELS_RAW": telemetry.rc_channels_raw,
-    "RELAY_STATUS": payload.relay_status,
     "SCALED_IMU2": telemetry.scaled_imu2,
     "SCALED_IMU3": telemetry.scaled_imu3,
     "SCALED_PRESSURE": telemetry.pressure,
@@ -314,7 +299,6 @@ def builders(
         health: Sensor bits of SYS_STATUS.
         system_status: Returns the MAV_STATE.
     """
-    sensors = partial(sys_status, health=health)
     return {
         **BUILDERS,
         "AUTOPILOT_VERSION": lambda vehicle: telemetry.autopilot_version(
@@ -323,47 +307,67 @@ def builders(
         "HEARTBEAT": lambda vehicle: telemetry.heartbeat(
             vehicle, vehicle_type(vehicle, kind), system_status(vehicle)
         ),
-        "HIGH_LATENCY2": high_latency.report(kind, sensors),
-        "SYS_STATUS": sensors,
+        "SYS_STATUS": partial(sys_status, health=health),
     }
 
 
-def on_heartbeat(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
-    """Handle HEARTBEAT of a ground station and of components."""
-    pilot_input.on_heartbeat(vehicle, fields, sender)
-    camera.on_component(vehicle, sender)
-
-
-MESSAGE_HANDLERS = {
-    "DIGICAM_CONTROL": camera.on_digicam_message,
-    "DISTANCE_SENSOR": proximity.on_distance_sensor,
-    "HEARTBEAT": on_heartbeat,
-    "FENCE_POINT": fence_points.on_fence_point,
-    "GLOBAL_POSITION_INT": mount_control.on_other_position,
-    "MOUNT_CONFIGURE": mount_control.on_mount_configure_message,
-    "MOUNT_CONTROL": mount_control.on_mount_control_message,
-    "RALLY_POINT": rally.on_rally_point,
+MESSAGE_HANDLERS: Mapping[str, MessageHandler] = {
+    "HEARTBEAT": pilot_input.on_heartbeat,
     "MANUAL_CONTROL": pilot_input.on_manual_control,
-    "OBSTACLE_DISTANCE": proximity.on_obstacle_distance,
-    "OBSTACLE_DISTANCE_3D": proximity.on_obstacle_3d,
     "RC_CHANNELS_OVERRIDE": pilot_input.on_override,
 }
 """Messages that need no answer, for every kind of vehicle."""
 
 
+def build_firmware(
+    core: Feature, kind: str, optional: Collection[str], problems: ArmingProblems, words: tuple[str, str]
+) -> Build:
+    """Return the tables of a core and its features.
+
+    Args:
+        core: What the core adds by itself.
+        kind: ``COPTER`` or ``ROVER``.
+        optional: Features that are on beside those that are on by default.
+        problems: Returns the texts that forbid arming.
+        words: Status texts of arming and disarming.
+    """
+    return Build([core, *features_of(kind, optional).values()], problems, words)
+
+
+def parameter_table(
+    build: Build,
+    optional: Collection[str],
+    version: Version,
+    recorded: Callable[[], tuple[Parameter, ...]],
+    tuning: Callable[[Parameters], Tuning],
+) -> ParameterTable:
+    """Return the parameters of one kind of vehicle: the recorded ones, but those of features that are off."""
+
+    @cache
+    def defaults() -> tuple[Parameter, ...]:
+        return tuple(one for one in recorded() if not absent(one.name, optional))
+
+    def remedy(name: str) -> str:
+        feature = absent(name, optional)
+        return f"features={feature} or features=all adds it" if feature else ""
+
+    meanings = {name: meaning for name, (_, meaning) in build.parameters.items()}
+    return ParameterTable(defaults, tuning, own_parameters, meanings, version.renamed, remedy)
+
+
 def telemetry_policy(
-    messages: Mapping[str, Builder],
+    build: Build,
     streams: Mapping[int, Sequence[str]],
     on_stream_request: Callable[[Vehicle, int, int, int], None] = ignore_stream_request,
     least_period: Ns = 3 * MS,
 ) -> TelemetryPolicy:
     """Return what one kind of vehicle sends."""
     return TelemetryPolicy(
-        messages=messages,
+        messages=build.telemetry,
         message_order=ORDER,
         streams=streams,
         on_stream_request=on_stream_request,
-        high_latency_links=high_latency.links,
+        high_latency=build.high_latency,
         least_period=least_period,
         intervals_after=100 * MS,
         refuse_interval=refuse_interval,
@@ -374,13 +378,12 @@ def telemetry_policy(
 def ardupilot_mavlink(
     *,
     version: Version,
+    build: Build,
     start: LinkStart,
     sent: TelemetryPolicy,
-    commands: Mapping[int, Handler],
-    handlers: Mapping[str, MessageHandler],
     on_parameter_list: VehicleAction,
 ) -> MavlinkFirmware:
-    """Return the MAVLink rules of one kind of vehicle: the shared ones, and the arguments."""
+    """Return the MAVLink rules of one kind of vehicle."""
 
     def on_banner(vehicle: Vehicle, _command: Command) -> int:
         on_parameter_list(vehicle)
@@ -390,22 +393,18 @@ def ardupilot_mavlink(
         start=start._replace(timesync_every=10 * S),
         telemetry=sent,
         commands=CommandPolicy(
-            commands={
-                **commands,
-                SEND_BANNER: on_banner,
-                high_latency.CONTROL_HIGH_LATENCY: high_latency.on_control,
-            },
-            handlers={**MESSAGE_HANDLERS, **handlers},
+            commands={**build.commands, SEND_BANNER: on_banner},
+            handlers=build.messages,
             set_mode=set_mode,
             set_mode_ack=11,
-            questions=questions(sent),
+            questions=_questions(sent, build),
             accepts=accepts,
             private_links=private_links,
-            nan_commands=frozenset({mount_control.GIMBAL_PITCHYAW}),
+            nan_commands=build.nan_commands,
         ),
         missions=MissionPolicy(
             runs=mission.runs,
-            stored_item=mission.stored_item,
+            stored_item=partial(mission.stored_item, items=build.items),
             home_item=mission.home_item,
             go_to_item=go_to_item,
             grew=mission.mission_grew,
@@ -415,7 +414,9 @@ def ardupilot_mavlink(
             writes_parts=True,
         ),
         parameters=ParameterPolicy(reports_missing=version.reports_missing_parameters),
-        logs=LogPolicy(partial(dataflash.encode, version=version), first=1, while_armed=False),
+        logs=LogPolicy(
+            partial(dataflash.encode, version=version, added=build.log_forms), first=1, while_armed=False
+        ),
         files=files.FILES,
         on_parameter_list=on_parameter_list,
     )

@@ -10,9 +10,11 @@ from math import radians
 
 from volery.base.time import MS, Ns, to_seconds
 from volery.kernel.api import Handle
+from volery.simulation.autopilots.ardupilot.feature import Feature
+from volery.simulation.autopilots.ardupilot.modes import MANUAL_BITS, enter
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
 
 PERIOD: Ns = 10 * MS
 RATE, RATE_ACCEL = radians(400.0), radians(1100.0)
@@ -25,6 +27,8 @@ ABANDONED_BY, CHOSEN_BY = 40.0 / 45.0, 3.0 / 45.0
 """Deflections of a stick that end a flip, and that choose its axis."""
 FLIPS_FROM = ("ACRO", "STABILIZE", "ALT_HOLD")
 """Modes from which a flip starts."""
+FLIP, FLIP_SWITCH = 14, 2
+"""Number of the mode, and value of RCn_OPTION."""
 
 
 class _Stage(IntEnum):
@@ -126,3 +130,15 @@ class Flip(Stabilize):
                 throttle=min(1.0, max(0.0, thrust + change)),
             )
         )
+
+
+def _enter_flip(vehicle: Vehicle, mode: Mode) -> bool:
+    return enter(vehicle, mode, "" if may_flip(vehicle) else "init failed")
+
+
+COPTER = Feature(
+    modes=(Mode(FLIP, "FLIP", MANUAL_BITS, Flip, armable=False),),
+    mode_switches={FLIP_SWITCH: FLIP},
+    entries={FLIP: _enter_flip},
+    tumbling=("FLIP",),
+)

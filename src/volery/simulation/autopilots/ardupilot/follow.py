@@ -7,18 +7,21 @@ other vehicle plus a share of the distance, limited so that the copter can stop.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import hypot, radians
 from typing import Any
 
 from volery.base.elementary import atan2, cos, sin
 from volery.base.frames import Vector, quaternion_to_euler
 from volery.base.time import Ns, S, to_seconds
+from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
+from volery.simulation.autopilots.ardupilot.modes import AUTO_BITS, INFO, LEVEL_AND_HEIGHT, WARNING, enter
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import root_speed
 from volery.simulation.autopilots.mavlink.messages import all_within
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE
-from volery.simulation.autopilots.state_groups import LeadState
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.state_groups import NEVER
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
 
 OUTDATED: Ns = 3 * S
 """Age from which a position does not count."""
@@ -30,13 +33,32 @@ HAS_POSITION, HAS_VELOCITY, HAS_ATTITUDE = 1, 2, 8
 """Bits of ``est_capabilities``."""
 FACE_LEAD, AS_LEAD, ALONG_FLIGHT = 1, 2, 3
 """FOLL_YAW_BEHAVE."""
-INFO = 6
-"""MAV_SEVERITY."""
+FOLLOW, FOLLOW_SWITCH = 23, 57
+"""Number of the mode, and value of RCn_OPTION."""
+
+
+@dataclass
+class LeadState:
+    """Another vehicle that this one may follow, as it last reported itself."""
+
+    system: int = 0
+    """System that was chosen where none is named."""
+    at: Ns = NEVER
+    """Time of the report [ns]."""
+    place: Vector = (0.0, 0.0, 0.0)
+    """North, east, down about the estimator's origin [m], as ``velocity`` [m/s]."""
+    velocity: Vector = (0.0, 0.0, 0.0)
+    heading: float = 0.0
+    """Clockwise from north [rad], and the time [ns] at which it was last reported."""
+    heading_at: Ns = NEVER
+
+
+lead_of = Kept(LeadState)
 
 
 def _is_followed(vehicle: Vehicle, sender: int) -> bool:
     """Return whether FOLL_SYSID names that system; 0 is the first that reports its position."""
-    lead = vehicle.lead
+    lead = lead_of(vehicle)
     if not vehicle.parameters["FOLL_ENABLE"] or sender == vehicle.system:
         return False
     named = round(vehicle.parameters["FOLL_SYSID"])
@@ -50,7 +72,7 @@ def _is_followed(vehicle: Vehicle, sender: int) -> bool:
 
 def on_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
     """Handle GLOBAL_POSITION_INT of another vehicle."""
-    lead = vehicle.lead
+    lead = lead_of(vehicle)
     if (fields["lat"] == 0 and fields["lon"] == 0) or not _is_followed(vehicle, sender):
         return
     relative = vehicle.parameters["FOLL_ALT_TYPE"] == 1.0
@@ -64,7 +86,7 @@ def on_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
 
 def on_target(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
     """Handle FOLLOW_TARGET."""
-    lead, given = vehicle.lead, fields["est_capabilities"]
+    lead, given = lead_of(vehicle), fields["est_capabilities"]
     unusable = (fields["lat"] == 0 and fields["lon"] == 0) or not given & HAS_POSITION
     if unusable or not all_within((fields["alt"], *fields["vel"])) or not _is_followed(vehicle, sender):
         return
@@ -101,7 +123,7 @@ class Follow(Manoeuvre):
         """Give a velocity, and a heading as FOLL_YAW_BEHAVE says."""
         vehicle, tuning = self.vehicle, self.vehicle.tuning
         now = vehicle.kernel.now()
-        lead = vehicle.lead
+        lead = lead_of(vehicle)
         velocity: Vector = (0.0, 0.0, 0.0)
         yaw = None
         self.target = None
@@ -176,3 +198,32 @@ class Follow(Manoeuvre):
         if behaviour == ALONG_FLIGHT and hypot(velocity[0], velocity[1]) > 1.0:
             return atan2(velocity[1], velocity[0])
         return None
+
+
+def _enter_follow(vehicle: Vehicle, mode: Mode) -> bool:
+    if vehicle.parameters["FOLL_ENABLE"] or mode is vehicle.mode:
+        return enter(vehicle, mode)
+    vehicle.send_text(WARNING, "Set FOLL_ENABLE = 1")
+    return enter(vehicle, mode, "init failed")
+
+
+COPTER = Feature(
+    parameters={
+        "FOLL_ENABLE": ("", "any value but 0: FOLLOW may be entered"),
+        "FOLL_SYSID": ("", "system that FOLLOW follows; 0: the first that reports its position"),
+        "FOLL_DIST_MAX": ("m", "distance beyond which it is not followed; 0: none"),
+        "FOLL_ALT_TYPE": ("", "1: its height above home counts, 0: above the sea"),
+        "FOLL_OFS_TYPE": ("", "1: the place beside it turns with its heading"),
+        "FOLL_POS_P": ("1/s", "speed for each metre that is missing"),
+        "FOLL_YAW_BEHAVE": (
+            "",
+            "1 turns the nose to it, 2 takes its heading, 3 turns the nose where it flies",
+        ),
+        **{f"FOLL_OFS_{axis}": ("m", "place beside it; all 0: the place at the start") for axis in "XYZ"},
+    },
+    modes=(Mode(FOLLOW, "FOLLOW", AUTO_BITS, Follow, LEVEL_AND_HEIGHT, needs_position=True, armable=False),),
+    mode_switches={FOLLOW_SWITCH: FOLLOW},
+    entries={FOLLOW: _enter_follow},
+    avoiding=("FOLLOW",),
+    messages={"FOLLOW_TARGET": on_target, "GLOBAL_POSITION_INT": on_position},
+)

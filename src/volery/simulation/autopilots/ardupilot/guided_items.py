@@ -8,19 +8,36 @@ to the companion computer, which is not done here.
 from __future__ import annotations
 
 from math import hypot
+from typing import NamedTuple
 
 from volery.base.time import from_seconds
+from volery.simulation.autopilots.ardupilot.feature import Feature, Item
+from volery.simulation.autopilots.ardupilot.rover import guided_arrived, guided_stale
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Leg
 from volery.simulation.autopilots.manoeuvres.rover_driving import GuidedRover
-from volery.simulation.autopilots.onboard_mission import MissionItem
-from volery.simulation.autopilots.state_groups import GuidedLimits
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle, VehicleAction
+from volery.simulation.autopilots.onboard_mission import GUIDED_ENABLE, GUIDED_LIMITS, MissionItem
+from volery.simulation.autopilots.state_groups import CommandedLimits
+from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+
+
+class GuidedLimits(NamedTuple):
+    """Limits at which a mission takes the vehicle back from a companion computer; 0: none."""
+
+    commanded: CommandedLimits
+    """Limits of the mode in which they were set: they hold until it changes."""
+    seconds: float = 0.0
+    lowest: float = 0.0
+    """Height [m] above the estimator's origin, as ``highest``."""
+    highest: float = 0.0
+    distance: float = 0.0
+    """Horizontal distance [m] from where it was handed over."""
 
 
 def set_limits(vehicle: Vehicle, item: MissionItem) -> None:
     """Execute DO_GUIDED_LIMITS: whole seconds, least and largest height, and distance; 0: no limit."""
-    vehicle.commanded.guided_limits = GuidedLimits(int(item.param1), item.param2, item.param3, item.param4)
+    limits = int(item.param1), item.param2, item.param3, item.param4
+    vehicle.kept[GuidedLimits] = GuidedLimits(vehicle.commanded, *limits)
 
 
 def copter_guided_leg(vehicle: Vehicle, item: MissionItem) -> Leg:
@@ -28,11 +45,9 @@ def copter_guided_leg(vehicle: Vehicle, item: MissionItem) -> Leg:
     return _leg(vehicle, item, Guided(vehicle))
 
 
-def rover_guided_leg(
-    vehicle: Vehicle, item: MissionItem, on_arrival: VehicleAction, on_timeout: VehicleAction
-) -> Leg:
+def rover_guided_leg(vehicle: Vehicle, item: MissionItem) -> Leg:
     """Return the leg of NAV_GUIDED_ENABLE of a rover, which is at its end near the item's place, too."""
-    leg = _leg(vehicle, item, GuidedRover(vehicle, on_arrival, on_timeout))
+    leg = _leg(vehicle, item, GuidedRover(vehicle, guided_arrived, guided_stale))
     if not item.has_place:
         return leg
     north, east, _ = vehicle.point(item.frame, item.x / 1e7, item.y / 1e7, item.z)
@@ -46,7 +61,9 @@ def rover_guided_leg(
 
 def _leg(vehicle: Vehicle, item: MissionItem, guided: Manoeuvre) -> Leg:
     begun, start = vehicle.kernel.now(), vehicle.estimate.position
-    limits = vehicle.commanded.guided_limits
+    limits: GuidedLimits | None = vehicle.kept.get(GuidedLimits)
+    if limits is None or limits.commanded is not vehicle.commanded:
+        limits = GuidedLimits(vehicle.commanded)
     enables = int(item.param1) > 0
 
     def ended() -> bool:
@@ -60,3 +77,14 @@ def _leg(vehicle: Vehicle, item: MissionItem, guided: Manoeuvre) -> Leg:
         )
 
     return Leg(guided, ended)
+
+
+COPTER = Feature(
+    items={
+        GUIDED_ENABLE: Item("GuidedEnable", leg=copter_guided_leg, keeps_frame=True),
+        GUIDED_LIMITS: Item("GuidedLimits", set_limits),
+    }
+)
+ROVER = Feature(
+    items={**COPTER.items, GUIDED_ENABLE: Item("GuidedEnable", leg=rover_guided_leg, keeps_frame=True)}
+)

@@ -6,19 +6,14 @@ heartbeats, and nothing at all until CONTROL_HIGH_LATENCY. Source: GCS_Common an
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import hypot
 
-from volery.simulation.autopilots.ardupilot import airspeed, sensor_status, telemetry
+from volery.simulation.autopilots.ardupilot import sensor_status, telemetry
+from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, build_of
 from volery.simulation.autopilots.ardupilot.modes import NOTICE
-from volery.simulation.autopilots.mavlink.firmware import Builder
-from volery.simulation.autopilots.mavlink.messages import (
-    ACCEPTED,
-    FAILED,
-    Command,
-    Fields,
-    boot_ms,
-    vehicle_type,
-)
+from volery.simulation.autopilots.mavlink.firmware import HighLatency
+from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, boot_ms
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 CONTROL_HIGH_LATENCY = 2600
@@ -43,6 +38,17 @@ FAILURES = {
 """Bit of HL_FAILURE_FLAG by that of MAV_SYS_STATUS_SENSOR."""
 
 
+@dataclass
+class LinkState:
+    """Links of high latency."""
+
+    on: bool = False
+    """Whether a command has switched them on."""
+
+
+links_of = Kept(LinkState)
+
+
 def links(vehicle: Vehicle) -> frozenset[int]:
     """Return the numbers of the links that SERIALn_PROTOCOL makes links of high latency."""
     return frozenset(
@@ -54,8 +60,8 @@ def on_control(vehicle: Vehicle, command: Command) -> int:
     """Handle CONTROL_HIGH_LATENCY: param1 is 1 to switch the links on, 0 to switch them off."""
     if command.param1 not in (0.0, 1.0):
         return FAILED
-    vehicle.reports.high_latency = command.param1 == 1.0
-    vehicle.send_text(NOTICE, f"High Latency {'enabled' if vehicle.reports.high_latency else 'disabled'}")
+    links_of(vehicle).on = command.param1 == 1.0
+    vehicle.send_text(NOTICE, f"High Latency {'enabled' if links_of(vehicle).on else 'disabled'}")
     return ACCEPTED
 
 
@@ -63,37 +69,37 @@ def _byte(value: float) -> int:
     return min(255, max(0, int(value)))
 
 
-def report(kind: int, system_status: Builder) -> Builder:
-    """Return the builder of HIGH_LATENCY2 of a vehicle of that MAV_TYPE; *system_status* is of SYS_STATUS."""
+def _built(vehicle: Vehicle, name: str) -> Fields:
+    """Return a message of which there is always one."""
+    built = build_of(vehicle).telemetry[name](vehicle)
+    return built[0] if isinstance(built, list) else built or {}
 
-    def build(vehicle: Vehicle) -> Fields:
-        status, hud = system_status(vehicle), telemetry.vfr_hud(vehicle)
-        assert isinstance(status, dict)
-        latitude, longitude, amsl = vehicle.estimate.geodetic
-        celsius = airspeed.temperature(vehicle)
-        base_mode = telemetry.heartbeat(vehicle, kind, 0)["base_mode"]
-        healthy = status["onboard_control_sensors_health"]
-        return {
-            "timestamp": boot_ms(vehicle),
-            "type": vehicle_type(vehicle, kind),
-            "autopilot": 3,
-            "custom_mode": vehicle.mode.number,
-            "latitude": round(latitude * 1e7),
-            "longitude": round(longitude * 1e7),
-            "altitude": int(amsl),
-            "heading": hud["heading"] // 2,
-            "throttle": hud["throttle"],
-            "airspeed": _byte(hud["airspeed"] * 5.0),
-            "groundspeed": _byte(hud["groundspeed"] * 5.0),
-            "temperature_air": NO_TEMPERATURE if celsius is None else int(celsius),
-            "battery": status["battery_remaining"],
-            "wp_num": vehicle.mission.current,
-            "failure_flags": sum(flag for sensor, flag in FAILURES.items() if not healthy & sensor),
-            "custom0": (base_mode + 128) % 256 - 128,
-            **(_copter_targets(vehicle) if vehicle.flies else _rover_targets(vehicle)),
-        }
 
-    return build
+def report(vehicle: Vehicle) -> Fields:
+    """Return HIGH_LATENCY2."""
+    status, hud, beat = (_built(vehicle, name) for name in ("SYS_STATUS", "VFR_HUD", "HEARTBEAT"))
+    latitude, longitude, amsl = vehicle.estimate.geodetic
+    base_mode = beat["base_mode"]
+    healthy = status["onboard_control_sensors_health"]
+    return {
+        "timestamp": boot_ms(vehicle),
+        "type": beat["type"],
+        "autopilot": 3,
+        "custom_mode": vehicle.mode.number,
+        "latitude": round(latitude * 1e7),
+        "longitude": round(longitude * 1e7),
+        "altitude": int(amsl),
+        "heading": hud["heading"] // 2,
+        "throttle": hud["throttle"],
+        "airspeed": _byte(hud["airspeed"] * 5.0),
+        "groundspeed": _byte(hud["groundspeed"] * 5.0),
+        "temperature_air": NO_TEMPERATURE,
+        "battery": status["battery_remaining"],
+        "wp_num": vehicle.mission.current,
+        "failure_flags": sum(flag for sensor, flag in FAILURES.items() if not healthy & sensor),
+        "custom0": (base_mode + 128) % 256 - 128,
+        **(_copter_targets(vehicle) if vehicle.flies else _rover_targets(vehicle)),
+    }
 
 
 def _copter_targets(vehicle: Vehicle) -> Fields:
@@ -115,5 +121,16 @@ def _rover_targets(vehicle: Vehicle) -> Fields:
     return {
         "target_heading": target.get("target_bearing", 0) // 2,
         "target_distance": target.get("wp_dist", 0) // 10,
-        "airspeed_sp": _byte(telemetry.vfr_hud(vehicle)["airspeed"] * 5.0),
+        "airspeed_sp": _byte(_built(vehicle, "VFR_HUD")["airspeed"] * 5.0),
     }
+
+
+COPTER = ROVER = Feature(
+    parameters={
+        f"SERIAL{port}_PROTOCOL": ("", "43: link of that number is of high latency, from the next boot on")
+        for port in SERIAL_PORTS
+    },
+    commands={CONTROL_HIGH_LATENCY: on_control},
+    telemetry={"HIGH_LATENCY2": report},
+    high_latency=HighLatency(links, muted=lambda vehicle: not links_of(vehicle).on),
+)

@@ -7,6 +7,9 @@ change with it: only the outputs do. Pins that sense the gear are not simulated.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
 from volery.simulation.autopilots.ardupilot.modes import INFO
 from volery.simulation.autopilots.ardupilot.servo_outputs import channels, move
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, Command
@@ -20,12 +23,31 @@ RETRACTS_AFTER_TAKEOFF, DEPLOYS_FOR_LANDING = 1, 2
 """Bits of LGR_OPTIONS."""
 RETRACT = 1
 """param2 of AIRFRAME_CONFIGURATION; any other value deploys."""
+AIRFRAME_CONFIGURATION, GEAR_SWITCH = 2520, 29
+"""MAV_CMD, and value of RCn_OPTION."""
 CLIMBS_BY_ITSELF = ("AUTO", "GUIDED")
+
+
+@dataclass
+class GearState:
+    """Landing gear, as its outputs were last set."""
+
+    deployed: bool | None = None
+    """``None`` until it has moved."""
+    started: bool = False
+    """Whether the position at the start has been taken."""
+    height: int = 0
+    """Height above home [m], climb and landing at the last tick."""
+    climbing: bool = False
+    landing: bool = False
+
+
+gear_of = Kept(GearState)
 
 
 def move_gear(vehicle: Vehicle, deploy: bool) -> None:
     """Deploy or retract, if LGR_ENABLE allows: outputs go to their upper or lower end."""
-    parameters, gear = vehicle.parameters, vehicle.gear
+    parameters, gear = vehicle.parameters, gear_of(vehicle)
     if not parameters["LGR_ENABLE"]:
         return
     move(vehicle, GEAR_OUTPUT, float(deploy))
@@ -48,7 +70,7 @@ def switch_gear(vehicle: Vehicle, position: int) -> None:
 
 def watch_gear(vehicle: Vehicle) -> None:
     """Move the gear where the start, a height, a take-off or a landing demands it, at each tick."""
-    parameters, gear = vehicle.parameters, vehicle.gear
+    parameters, gear = vehicle.parameters, gear_of(vehicle)
     if not parameters["LGR_ENABLE"]:
         return
     if not gear.started:
@@ -70,7 +92,7 @@ def watch_gear(vehicle: Vehicle) -> None:
 
 def _at_heights(vehicle: Vehicle) -> None:
     """Deploy or retract an armed vehicle that passes a height above home, in whole metres; 0: none."""
-    gear = vehicle.gear
+    gear = gear_of(vehicle)
     lower, upper = vehicle.parameters["LGR_DEPLOY_ALT"], vehicle.parameters["LGR_RETRACT_ALT"]
     height, before = max(0, int(vehicle.height)), gear.height
     gear.height = height
@@ -80,3 +102,17 @@ def _at_heights(vehicle: Vehicle) -> None:
         move_gear(vehicle, deploy=True)
     elif gear.deployed is not False and upper > 0 and lower <= upper and before < upper <= height:
         move_gear(vehicle, deploy=False)
+
+
+COPTER = Feature(
+    parameters={
+        "LGR_ENABLE": ("", "any value but 0: there is a landing gear"),
+        "LGR_STARTUP": ("", "1 retracts, 2 deploys the landing gear at the start"),
+        "LGR_DEPLOY_ALT": ("m", "height above home below which a descent deploys the landing gear; 0: none"),
+        "LGR_RETRACT_ALT": ("m", "height above home above which a climb retracts the landing gear; 0: none"),
+        "LGR_OPTIONS": ("", "landing gear: bit 0 retracts after a take-off, bit 1 deploys for landing"),
+    },
+    commands={AIRFRAME_CONFIGURATION: on_airframe_configuration},
+    switches={GEAR_SWITCH: switch_gear},
+    on_tick=watch_gear,
+)

@@ -8,12 +8,24 @@ from __future__ import annotations
 
 from math import dist
 
+from volery.simulation.autopilots.ardupilot.commands import to_mode
+from volery.simulation.autopilots.ardupilot.feature import Feature
+from volery.simulation.autopilots.ardupilot.mission import fly_mission
+from volery.simulation.autopilots.ardupilot.modes import (
+    AUTO,
+    AUTO_BITS,
+    AUTO_RTL,
+    INFO,
+    LEVEL_AND_HEIGHT,
+    WARNING,
+    enter,
+)
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import item_point
 from volery.simulation.autopilots.onboard_mission import LAND_START
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
 
-AUTO, AUTO_RTL = 3, 27
-"""Numbers of the modes."""
+SEQUENCE_SWITCH = 99
+"""RCn_OPTION."""
 
 
 def nearest_landing(vehicle: Vehicle) -> int | None:
@@ -42,3 +54,40 @@ def leave_sequence(vehicle: Vehicle) -> None:
     passed = vehicle.mission.items[: vehicle.mission.current + 1]
     if not any(item.command == LAND_START for item in passed):
         vehicle.enter_mode(vehicle.rules.modes[AUTO])
+
+
+def enter_sequence(vehicle: Vehicle, mode: Mode) -> bool:
+    """Enter AUTO_RTL at the nearest start of a landing, also from a later place of the sequence."""
+    start = nearest_landing(vehicle)
+    if start is None:
+        vehicle.send_text(WARNING, "Unable to start landing sequence")
+        vehicle.send_text(WARNING, "Mode change to AUTO RTL failed: No landing sequence found")
+        return False
+    plan = vehicle.mission
+    before, complete = plan.current, plan.complete
+    vehicle.choose_item(start)
+    vehicle.send_text(INFO, "Landing sequence start")
+    if enter(vehicle, mode):
+        return True
+    plan.current, plan.complete = before, complete
+    return False
+
+
+COPTER = Feature(
+    modes=(
+        Mode(
+            AUTO_RTL,
+            "AUTO_RTL",
+            AUTO_BITS,
+            fly_mission,
+            LEVEL_AND_HEIGHT,
+            needs_position=True,
+            armable=False,
+            starts_high=True,
+        ),
+    ),
+    mode_switches={SEQUENCE_SWITCH: AUTO_RTL},
+    entries={AUTO_RTL: enter_sequence},
+    commands={LAND_START: to_mode("AUTO_RTL")},
+    on_tick=leave_sequence,
+)

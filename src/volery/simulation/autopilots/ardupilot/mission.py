@@ -3,84 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import dist, isinf, isnan
 
 from volery.base.time import from_seconds, to_seconds
-from volery.simulation.autopilots.ardupilot.camera import (
-    CAMERA_COMMANDS,
-    DIGICAM_CONFIGURE,
-    DIGICAM_CONTROL,
-    SET_FOCUS,
-    SET_SOURCE,
-    SET_ZOOM,
-    START_CAPTURE,
-    START_VIDEO,
-    STOP_CAPTURE,
-    STOP_VIDEO,
-    TRIGGER_DISTANCE,
-    act_on_camera,
-)
 from volery.simulation.autopilots.ardupilot.commands import (
-    FENCE_ENABLE,
     HIGHEST,
-    REPEAT_RELAY,
-    REPEAT_SERVO,
-    ROI,
-    ROI_LOCATION,
-    ROI_NONE,
     SET_REVERSE,
     change_speed,
-    on_region,
     turn_to,
 )
-from volery.simulation.autopilots.ardupilot.fence import on_fence_enable
-from volery.simulation.autopilots.ardupilot.guided_items import copter_guided_leg, set_limits
+from volery.simulation.autopilots.ardupilot.feature import Item, Kept, build_of
 from volery.simulation.autopilots.ardupilot.modes import (
-    COPTER_DISARMED,
     INFO,
     MISSION_MODES,
     NOTICE,
     change_mode,
     disarm,
 )
-from volery.simulation.autopilots.ardupilot.mount_control import (
-    GIMBAL_PITCHYAW,
-    MOUNT_CONTROL,
-    on_gimbal_pitchyaw,
-    on_mount_control,
-)
-from volery.simulation.autopilots.ardupilot.payload import (
-    GRIPPER,
-    SET_RELAY,
-    SET_SERVO,
-    act_on_payload,
-    on_repeat_relay,
-    on_repeat_servo,
-)
-from volery.simulation.autopilots.ardupilot.payload_place import payload_leg
-from volery.simulation.autopilots.ardupilot.sprayer import DO_SPRAYER, act_on_sprayer
-from volery.simulation.autopilots.ardupilot.winch import DO_WINCH, act_on_winch
 from volery.simulation.autopilots.manoeuvres.manual_flight import HoldPlace
-from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Leg, MissionRules, copter_leg
+from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
+    FlyMission,
+    Leg,
+    MissionRules,
+    copter_leg,
+)
 from volery.simulation.autopilots.manoeuvres.rover_driving import Stand
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint, quarter_time
-from volery.simulation.autopilots.mavlink.messages import EPOCH_US, Command, Handler, finite
+from volery.simulation.autopilots.mavlink.messages import EPOCH_US, finite
 from volery.simulation.autopilots.onboard_mission import (
     CHANGE_SPEED,
     CONDITION_DELAY,
     CONDITION_DISTANCE,
     CONDITION_YAW,
     DELAY,
-    DO_AUX_FUNCTION,
     GLOBAL,
     GLOBAL_INT,
     GLOBAL_RELATIVE,
     GLOBAL_RELATIVE_INT,
     GLOBAL_TERRAIN,
     GLOBAL_TERRAIN_INT,
-    GUIDED_ENABLE,
-    GUIDED_LIMITS,
     JUMP,
     JUMP_TAG,
     LAND,
@@ -90,7 +52,6 @@ from volery.simulation.autopilots.onboard_mission import (
     LOITER_TURNS,
     LOITER_UNLIMITED,
     MISSION_FRAME,
-    PAYLOAD_PLACE,
     RETURN,
     SET_HOME,
     SET_YAW_SPEED,
@@ -104,77 +65,6 @@ from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 UNSUPPORTED_FRAME, UNSUPPORTED, INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_Z = 2, 3, 6, 10, 11, 12
 """MAV_MISSION_RESULT."""
 
-NAMES = {
-    WAYPOINT: "WP",
-    SPLINE_WAYPOINT: "SplineWP",
-    LOITER_UNLIMITED: "LoitUnlim",
-    LOITER_TURNS: "LoitTurns",
-    LOITER_TIME: "LoitTime",
-    LOITER_TO_ALTITUDE: "LoitAltitude",
-    RETURN: "RTL",
-    LAND: "Land",
-    TAKEOFF: "Takeoff",
-    DELAY: "Delay",
-    SET_YAW_SPEED: "SetYawSpd",
-    CONDITION_DELAY: "CondDelay",
-    CONDITION_DISTANCE: "CondDist",
-    CONDITION_YAW: "CondYaw",
-    CHANGE_SPEED: "ChangeSpeed",
-    SET_HOME: "SetHome",
-    JUMP: "Jump",
-    SET_RELAY: "SetRelay",
-    SET_SERVO: "SetServo",
-    GRIPPER: "Gripper",
-    DO_SPRAYER: "Sprayer",
-    DO_WINCH: "Winch",
-    SET_REVERSE: "SetReverse",
-    DIGICAM_CONTROL: "DigiCamCtrl",
-    TRIGGER_DISTANCE: "SetCamTrigDst",
-    DO_AUX_FUNCTION: "AuxFunction",
-    GUIDED_ENABLE: "GuidedEnable",
-    GUIDED_LIMITS: "GuidedLimits",
-    PAYLOAD_PLACE: "PayloadPlace",
-    REPEAT_RELAY: "RepeatRelay",
-    REPEAT_SERVO: "RepeatServo",
-    LAND_START: "LandStart",
-    **dict.fromkeys((ROI_LOCATION, ROI_NONE, ROI), "SetROI"),
-    MOUNT_CONTROL: "MountControl",
-    GIMBAL_PITCHYAW: "GimbalPitchYaw",
-    DIGICAM_CONFIGURE: "DigiCamCfg",
-    START_CAPTURE: "ImageStartCapture",
-    STOP_CAPTURE: "ImageStopCapture",
-    SET_ZOOM: "SetCameraZoom",
-    SET_FOCUS: "SetCameraFocus",
-    SET_SOURCE: "SetCameraSource",
-    START_VIDEO: "VideoStartCapture",
-    STOP_VIDEO: "VideoStopCapture",
-    FENCE_ENABLE: "FenceEnable",
-    JUMP_TAG: "Tag",
-}
-"""Names of the items in the firmware's status texts."""
-
-
-PLACED = frozenset(
-    {
-        WAYPOINT,
-        SPLINE_WAYPOINT,
-        LOITER_UNLIMITED,
-        LOITER_TURNS,
-        LOITER_TIME,
-        LOITER_TO_ALTITUDE,
-        LAND,
-        PAYLOAD_PLACE,
-        TAKEOFF,
-        SET_HOME,
-    }
-)
-"""Items whose place is checked and whose frame is stored."""
-
-KEEPS_FRAME = PLACED | {GUIDED_ENABLE, LAND_START, 191, ROI_LOCATION, ROI}
-"""Items whose frame is stored; the others read back frame 0. The last four: landing sequence, go-around and
-regions of interest.
-"""
-
 STORED_FRAMES = {
     GLOBAL: GLOBAL,
     GLOBAL_INT: GLOBAL,
@@ -186,16 +76,22 @@ STORED_FRAMES = {
 """The frame that is read back for the frame that was sent."""
 
 
-def stored_item(item: MissionItem) -> MissionItem | int:
-    """Return an item as stored (frames without their INT variants, NaN as 0), or the MAV_MISSION_RESULT."""
-    if item.command not in NAMES:
+def stored_item(item: MissionItem, items: Mapping[int, Item]) -> MissionItem | int:
+    """Return an item as stored (frames without their INT variants, NaN as 0), or the MAV_MISSION_RESULT.
+
+    Args:
+        item: The item.
+        items: Items that the firmware knows.
+    """
+    known = items.get(item.command)
+    if known is None:
         return UNSUPPORTED
     if item.frame not in STORED_FRAMES and item.frame != MISSION_FRAME:
         return UNSUPPORTED_FRAME
-    wrong = _wrong_parameter(item) or (_wrong_place(item) if item.command in PLACED else 0)
+    wrong = _wrong_parameter(item) or (_wrong_place(item) if known.placed else 0)
     if wrong:
         return wrong
-    frame = STORED_FRAMES.get(item.frame, GLOBAL) if item.command in KEEPS_FRAME else GLOBAL
+    frame = STORED_FRAMES.get(item.frame, GLOBAL) if known.placed or known.keeps_frame else GLOBAL
     return item._replace(
         frame=frame,
         param1=finite(item.param1),
@@ -241,22 +137,27 @@ def mission_grew(vehicle: Vehicle, count: int) -> None:
     vehicle.set_parameter("MIS_TOTAL", count)
 
 
+@dataclass
+class ReachedItem:
+    """What of a mission has been reported."""
+
+    number: int | None = None
+    """Number of an action that was reported instead of the waypoint before it."""
+
+
+reached_of = Kept(ReachedItem)
+
+
 def item_begins(vehicle: Vehicle, index: int, item: MissionItem) -> None:
     """Report the item that begins."""
-    vehicle.send_text(INFO, f"Mission: {index} {NAMES.get(item.command, 'Unknown')}")
-
-
-SILENT = frozenset(
-    {GRIPPER, SET_SERVO, SET_RELAY, REPEAT_RELAY, REPEAT_SERVO, DIGICAM_CONTROL, TRIGGER_DISTANCE}
-    | {DO_SPRAYER, DO_AUX_FUNCTION, JUMP_TAG, GIMBAL_PITCHYAW, DIGICAM_CONFIGURE, START_CAPTURE, STOP_CAPTURE}
-    | {SET_ZOOM, SET_FOCUS, SET_SOURCE, START_VIDEO, STOP_VIDEO}
-)
-"""Actions that AP_Mission itself executes: their end is not reported."""
+    known = build_of(vehicle).items.get(item.command)
+    vehicle.send_text(INFO, f"Mission: {index} {known.name if known else 'Unknown'}")
 
 
 def _is_reported(vehicle: Vehicle, item: MissionItem) -> bool:
     """Return whether the end of an action is reported by its number."""
-    return item.command not in SILENT or (item.command == TRIGGER_DISTANCE and not vehicle.flies)
+    known = build_of(vehicle).items.get(item.command)
+    return known is None or not known.silent
 
 
 def item_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
@@ -269,7 +170,7 @@ def item_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
     action = plan[following] if following < len(plan) else None
     at_once = action is not None and not (action.navigates or action.is_condition or action.command == JUMP)
     replaced = action is not None and at_once and _is_reported(vehicle, action)
-    vehicle.reports.item_reached = following if replaced else None
+    reached_of(vehicle).number = following if replaced else None
     vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": following if replaced else index})
     if item.command in (WAYPOINT, SPLINE_WAYPOINT, LOITER_TIME, LOITER_TURNS, LOITER_TO_ALTITUDE, DELAY):
         words = "command" if vehicle.flies else "waypoint"
@@ -278,8 +179,8 @@ def item_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
 
 def action_done(vehicle: Vehicle, index: int, item: MissionItem) -> None:
     """Report an action by its number, unless that has been sent instead of the item before it."""
-    if vehicle.reports.item_reached == index:
-        vehicle.reports.item_reached = None
+    if reached_of(vehicle).number == index:
+        reached_of(vehicle).number = None
     elif _is_reported(vehicle, item):
         vehicle.output.send_event("MISSION_ITEM_REACHED", {"seq": index})
 
@@ -309,48 +210,36 @@ def _reverse(vehicle: Vehicle, item: MissionItem) -> None:
     vehicle.commanded.backwards = item.param1 == 1.0
 
 
-def _wind_winch(vehicle: Vehicle, item: MissionItem) -> None:
-    if vehicle.flies:
-        act_on_winch(vehicle, item)
-
-
-def _as_command(handler: Handler) -> Callable[[Vehicle, MissionItem], None]:
-    """Return an action that executes an item as the command of its number."""
-
-    def act(vehicle: Vehicle, item: MissionItem) -> None:
-        params = item.param1, item.param2, item.param3, item.param4
-        handler(vehicle, Command(item.command, *params, item.x / 1e7, item.y / 1e7, item.z, item.frame, True))
-
-    return act
-
-
-ACTIONS: Mapping[int, Callable[[Vehicle, MissionItem], None]] = {
-    CHANGE_SPEED: _change_speed,
-    CONDITION_YAW: _turn,
-    SET_HOME: _set_home,
-    GUIDED_LIMITS: set_limits,
-    DO_SPRAYER: act_on_sprayer,
-    DIGICAM_CONTROL: act_on_camera,
-    TRIGGER_DISTANCE: act_on_camera,
-    SET_REVERSE: _reverse,
-    DO_WINCH: _wind_winch,
-    **dict.fromkeys((GRIPPER, SET_RELAY, SET_SERVO), act_on_payload),
-    **dict.fromkeys((ROI_LOCATION, ROI_NONE, ROI), _as_command(on_region)),
-    REPEAT_RELAY: _as_command(on_repeat_relay),
-    REPEAT_SERVO: _as_command(on_repeat_servo),
-    FENCE_ENABLE: _as_command(on_fence_enable),
-    MOUNT_CONTROL: _as_command(on_mount_control),
-    GIMBAL_PITCHYAW: _as_command(on_gimbal_pitchyaw),
-    **{one: _as_command(CAMERA_COMMANDS[one]) for one in (DIGICAM_CONFIGURE, START_CAPTURE, STOP_CAPTURE)},
+ITEMS: Mapping[int, Item] = {
+    WAYPOINT: Item("WP", placed=True),
+    SPLINE_WAYPOINT: Item("SplineWP", placed=True),
+    LOITER_UNLIMITED: Item("LoitUnlim", placed=True),
+    LOITER_TURNS: Item("LoitTurns", placed=True),
+    LOITER_TIME: Item("LoitTime", placed=True),
+    LOITER_TO_ALTITUDE: Item("LoitAltitude", placed=True),
+    RETURN: Item("RTL"),
+    LAND: Item("Land", placed=True),
+    TAKEOFF: Item("Takeoff", placed=True),
+    DELAY: Item("Delay"),
+    SET_YAW_SPEED: Item("SetYawSpd"),
+    CONDITION_DELAY: Item("CondDelay"),
+    CONDITION_DISTANCE: Item("CondDist"),
+    CONDITION_YAW: Item("CondYaw", _turn),
+    CHANGE_SPEED: Item("ChangeSpeed", _change_speed),
+    SET_HOME: Item("SetHome", _set_home, placed=True),
+    JUMP: Item("Jump"),
+    SET_REVERSE: Item("SetReverse", _reverse),
+    JUMP_TAG: Item("Tag", silent=True),
+    LAND_START: Item("LandStart", keeps_frame=True),
 }
-"""What executes the item of a command."""
+"""Items of the core."""
 
 
 def act(vehicle: Vehicle, item: MissionItem) -> None:
-    """Execute an item that does not navigate; a tag and the start of a landing only mark a place."""
-    action = ACTIONS.get(item.command)
-    if action is not None:
-        action(vehicle, item)
+    """Execute an item that does not navigate; one without an action only marks a place."""
+    known = build_of(vehicle).items.get(item.command)
+    if known is not None and known.act is not None:
+        known.act(vehicle, item)
 
 
 DAY_S = 86_400
@@ -360,12 +249,17 @@ UNSTATED = -1.0
 """Hour, minute or second of NAV_DELAY that is not stated."""
 
 
+def leg_of_feature(vehicle: Vehicle, item: MissionItem) -> Leg | None:
+    """Return the leg of an item of a feature; ``None``: it is one of the core."""
+    known = build_of(vehicle).items.get(item.command)
+    return known.leg(vehicle, item) if known is not None and known.leg is not None else None
+
+
 def leg_of_copter(vehicle: Vehicle, item: MissionItem, goes_on: bool) -> Leg:
     """Return the leg of an item. A delay without a duration lasts until a time of day."""
-    if item.command == GUIDED_ENABLE:
-        return copter_guided_leg(vehicle, item)
-    if item.command == PAYLOAD_PLACE:
-        return payload_leg(vehicle, item)
+    stated = leg_of_feature(vehicle, item)
+    if stated is not None:
+        return stated
     if item.command == DELAY:
         if item.param1 <= 0.0:
             item = item._replace(param1=_seconds_until(vehicle, item))
@@ -421,7 +315,7 @@ def runs(vehicle: Vehicle) -> bool:
 def copter_ended(vehicle: Vehicle) -> Manoeuvre | None:
     """Disarm on the ground; hold the position in the air."""
     if vehicle.landed and vehicle.armed:
-        disarm(vehicle, COPTER_DISARMED, force=True)
+        disarm(vehicle, force=True)
     return ToPoint(vehicle) if vehicle.armed else None
 
 
@@ -443,19 +337,12 @@ def rover_ended(vehicle: Vehicle) -> Manoeuvre | None:
     return HoldPlace(vehicle) if after == DONE_LOITER else Stand(vehicle)
 
 
-Actions = Mapping[int, Callable[[Vehicle, MissionItem], None]]
-"""Command to what executes its item."""
-
-
-def _rules(ended: Callable[[Vehicle], Manoeuvre | None], actions: Actions) -> MissionRules:
-    def execute(vehicle: Vehicle, item: MissionItem) -> None:
-        actions.get(item.command, act)(vehicle, item)
-
+def _rules(ended: Callable[[Vehicle], Manoeuvre | None]) -> MissionRules:
     return MissionRules(
         restarts=True,
         item_begins=item_begins,
         item_done=item_done,
-        act=execute,
+        act=act,
         action_begins=item_begins,
         action_done=action_done,
         jumped=jumped,
@@ -463,11 +350,10 @@ def _rules(ended: Callable[[Vehicle], Manoeuvre | None], actions: Actions) -> Mi
     )
 
 
-def copter_rules(actions: Actions) -> MissionRules:
-    """Return the rules of a copter's missions, with actions beside the shared ones."""
-    return _rules(copter_ended, actions)
+COPTER_MISSION = _rules(copter_ended)
+ROVER_MISSION = _rules(rover_ended)
 
 
-def rover_rules(actions: Actions) -> MissionRules:
-    """Return the rules of a rover's missions, with actions beside the shared ones."""
-    return _rules(rover_ended, actions)
+def fly_mission(vehicle: Vehicle) -> FlyMission:
+    """Return the manoeuvre of the modes of a copter that fly the mission."""
+    return FlyMission(vehicle, leg_of_copter, COPTER_MISSION, leaves_ground)

@@ -7,16 +7,16 @@ vehicle.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 from volery.base.time import Ns, S
 from volery.simulation.autopilots.ardupilot.battery import left_mah
-from volery.simulation.autopilots.ardupilot.flip import may_flip
-from volery.simulation.autopilots.ardupilot.landing_sequence import AUTO_RTL, nearest_landing
+from volery.simulation.autopilots.ardupilot.feature import Check, Kept, build_of
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED
 from volery.simulation.autopilots.onboard_mission import DELAY, TAKEOFF
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import FIX_3D, Mode, Vehicle
 
 CRITICAL, WARNING, NOTICE, INFO = 2, 4, 5, 6
@@ -31,15 +31,37 @@ LEARN_AND_SAVE = 2
 DISPLAY_EVERY: Ns = 30 * S
 DISPLAY_PAUSE: Ns = 4 * S
 
-COPTER_DISARMED, ROVER_DISARMED = "Disarming motors", "Throttle disarmed"
-"""Status texts of disarming."""
+
+@dataclass
+class Reports:
+    """What ArduPilot has reported since boot. Uptimes in ns."""
+
+    arming_checks_at: Ns = 0
+    """Uptime of the last report of failed arming checks."""
+    arming_checks_due: bool = False
+    """Whether checks have begun to fail since then."""
+    counters_at: Ns = 0
+    """Uptime at which operating hours were last stored."""
+    contacts: int = 0
+    """Number of touch-downs reported."""
+    parameters_erased: bool = False
+    """Whether the parameters have their defaults from the next boot on."""
 
 
-class Check(NamedTuple):
-    """One arming check: its text, and whether it fails now."""
+reports_of = Kept(Reports)
 
-    text: str
-    fails: Callable[[Vehicle], bool]
+
+@dataclass
+class Received:
+    """What has been received since boot."""
+
+    station_at: Ns = NEVER
+    """Time of the last message of the ground station that controls the vehicle [ns]."""
+    transmitter: bool = False
+    """Whether a transmitter or overrides have been received."""
+
+
+received_of = Kept(Received)
 
 
 def between_uptimes(start: float, end: float) -> Callable[[Vehicle], bool]:
@@ -138,7 +160,7 @@ def sticks_not_neutral(vehicle: Vehicle, *, by_rudder: bool) -> list[str]:
         vehicle: The vehicle.
         by_rudder: Whether the yaw stick of a copter, the steering of a rover, arms and so is not checked.
     """
-    if not vehicle.failsafes.rc_received or "radio" in vehicle.failsafes.active:
+    if not received_of(vehicle).transmitter or "radio" in vehicle.failsafes.active:
         return []
     sticks, options = vehicle.tuning.sticks, round(vehicle.parameters["RC_OPTIONS"])
     read = sticks.read(vehicle.rc)
@@ -160,13 +182,13 @@ def sticks_not_neutral(vehicle: Vehicle, *, by_rudder: bool) -> list[str]:
     return [f"{name} (RC{channel}) is not neutral" for name, channel, deflection in found if deflection]
 
 
-def failing_checks(
-    vehicle: Vehicle, checks: Sequence[Check], parameter_checks: Callable[[Vehicle], list[str]]
-) -> list[str]:
-    """Return the texts of the checks that fail, in the firmware's order; parameters are checked last."""
+def failing_prearm_checks(vehicle: Vehicle) -> list[str]:
+    """Return the texts of the pre-arm checks that fail, in the firmware's order."""
     if vehicle.parameters["ARMING_CHECK"] == 0.0:
         return []
-    return [check.text for check in checks if check.fails(vehicle)] + parameter_checks(vehicle)
+    build = build_of(vehicle)
+    found = [check.text for check in build.checks if check.fails(vehicle)]
+    return found + [text for problems in build.problems for text in problems(vehicle)]
 
 
 def mode_not_armable(vehicle: Vehicle) -> list[str]:
@@ -177,18 +199,17 @@ def mode_not_armable(vehicle: Vehicle) -> list[str]:
     return [name]
 
 
-def arm(vehicle: Vehicle, problems: Callable[[Vehicle], list[str]], words: str, force: bool) -> int:
+def arm(vehicle: Vehicle, *, force: bool = False, by_rudder: bool = False) -> int:
     """Arm if no check forbids it, and return a MAV_RESULT.
 
     Args:
         vehicle: The vehicle.
-        problems: Returns the texts that forbid arming.
-        words: Status text of success.
         force: Skip the checks.
+        by_rudder: Whether the yaw stick of a copter, the steering of a rover, arms.
     """
     if vehicle.armed:
         return ACCEPTED
-    found = [] if force else problems(vehicle)
+    found = [] if force else build_of(vehicle).arming_problems(vehicle, by_rudder=by_rudder)
     if found:
         vehicle.arming.refused_at = vehicle.kernel.now()
         for text in found:
@@ -198,11 +219,11 @@ def arm(vehicle: Vehicle, problems: Callable[[Vehicle], list[str]], words: str, 
         vehicle.set_home_here()
     vehicle.arming.checks_passed = True
     vehicle.arm()
-    vehicle.send_text(INFO, words)
+    vehicle.send_text(INFO, build_of(vehicle).words[0])
     return ACCEPTED
 
 
-def disarm(vehicle: Vehicle, words: str, force: bool) -> int:
+def disarm(vehicle: Vehicle, *, force: bool) -> int:
     """Disarm, in flight only by force, and return a MAV_RESULT. The mission begins anew then.
 
     A rover in AUTO keeps its item; a copter stores its hover throttle.
@@ -214,31 +235,33 @@ def disarm(vehicle: Vehicle, words: str, force: bool) -> int:
     vehicle.disarm()
     if vehicle.flies or vehicle.mode.name != "AUTO":
         vehicle.mission.current = 0
-    vehicle.send_text(INFO, words)
+    vehicle.send_text(INFO, build_of(vehicle).words[1])
     if vehicle.flies and vehicle.parameters["MOT_HOVER_LEARN"] == LEARN_AND_SAVE:
         vehicle.set_parameter("MOT_THST_HOVER", vehicle.estimate.stored_hover)
     return ACCEPTED
 
 
-def update_prearm_state(vehicle: Vehicle, problems: Callable[[Vehicle], list[str]]) -> None:
+def update_prearm_state(vehicle: Vehicle) -> None:
     """Evaluate the pre-arm checks; report those that fail every 30 s, and once they have begun to fail."""
     if vehicle.armed:
         vehicle.arming.checks_passed = True
         return
-    found = problems(vehicle)
-    since = vehicle.uptime() - vehicle.reports.arming_checks_at
-    due = since >= DISPLAY_EVERY or (vehicle.reports.arming_checks_due and since > DISPLAY_PAUSE)
-    vehicle.reports.arming_checks_due |= bool(found) and vehicle.arming.checks_passed
+    found, reports = failing_prearm_checks(vehicle), reports_of(vehicle)
+    since = vehicle.uptime() - reports.arming_checks_at
+    due = since >= DISPLAY_EVERY or (reports.arming_checks_due and since > DISPLAY_PAUSE)
+    reports.arming_checks_due |= bool(found) and vehicle.arming.checks_passed
     vehicle.arming.checks_passed = not found
     if due:
-        vehicle.reports.arming_checks_at = vehicle.uptime()
-        vehicle.reports.arming_checks_due = False
+        reports.arming_checks_at = vehicle.uptime()
+        reports.arming_checks_due = False
         for text in found:
             vehicle.send_text(CRITICAL, f"PreArm: {text}")
 
 
 CUSTOM_MODE_ENABLED = 1
 
+AUTO, AUTO_RTL = 3, 27
+"""Numbers of a copter's modes."""
 MISSION_MODES = ("AUTO", "AUTO_RTL")
 """Names of the modes that fly the mission."""
 
@@ -252,6 +275,18 @@ WITHOUT_EFFECT = {
 
 CUSTOM, GUIDED, STABILIZED, MANUAL = 1, 8, 16, 64
 """MAV_MODE_FLAG."""
+MANUAL_BITS = CUSTOM | STABILIZED | MANUAL
+AUTO_BITS = MANUAL_BITS | GUIDED
+"""``base_mode`` of a disarmed copter, as recorded."""
+RATE_CONTROL, ATTITUDE_CONTROL, YAW_CONTROL, Z_CONTROL, XY_CONTROL = (
+    1 << 10,
+    1 << 11,
+    1 << 12,
+    1 << 13,
+    1 << 14,
+)
+"""MAV_SYS_STATUS_SENSOR."""
+LEVEL_AND_HEIGHT = XY_CONTROL | Z_CONTROL
 
 
 def set_mode(vehicle: Vehicle, base_mode: int, number: int) -> int:
@@ -273,33 +308,21 @@ def change_mode(vehicle: Vehicle, number: int) -> bool:
     if mode is None:
         vehicle.send_text(WARNING, f"No such mode {number}")
         return False
-    if mode.number == AUTO_RTL and vehicle.flies:
-        return _land_by_sequence(vehicle, mode)
+    entry = build_of(vehicle).entries.get(number)
+    return enter(vehicle, mode) if entry is None else entry(vehicle, mode)
+
+
+def enter(vehicle: Vehicle, mode: Mode, problem: str = "") -> bool:
+    """Enter a mode unless the vehicle may not; then report the reason. Return whether the mode is flown.
+
+    Args:
+        vehicle: The vehicle.
+        mode: The mode; if it is flown already, nothing changes.
+        problem: Why a feature does not permit the mode, or empty.
+    """
     if mode is vehicle.mode:
         return True
-    return _enter(vehicle, mode)
-
-
-def _land_by_sequence(vehicle: Vehicle, mode: Mode) -> bool:
-    """Enter AUTO_RTL at the nearest start of a landing, also from a later place of the sequence."""
-    start = nearest_landing(vehicle)
-    if start is None:
-        vehicle.send_text(WARNING, "Unable to start landing sequence")
-        vehicle.send_text(WARNING, "Mode change to AUTO RTL failed: No landing sequence found")
-        return False
-    plan = vehicle.mission
-    before, complete = plan.current, plan.complete
-    vehicle.choose_item(start)
-    vehicle.send_text(INFO, "Landing sequence start")
-    if mode is vehicle.mode or _enter(vehicle, mode):
-        return True
-    plan.current, plan.complete = before, complete
-    return False
-
-
-def _enter(vehicle: Vehicle, mode: Mode) -> bool:
-    """Enter a mode unless the vehicle may not; then report the reason. Return whether the mode is flown."""
-    reason = _not_set_up(vehicle, mode) or (refusal(vehicle, mode) if vehicle.armed else "")
+    reason = problem or _not_set_up(vehicle, mode) or (refusal(vehicle, mode) if vehicle.armed else "")
     if reason:
         words = (
             f"Mode change to {mode.name} failed: {reason}" if vehicle.flies else "Flight mode change failed"
@@ -312,15 +335,10 @@ def _enter(vehicle: Vehicle, mode: Mode) -> bool:
 
 def _not_set_up(vehicle: Vehicle, mode: Mode) -> str:
     """Return why a vehicle may not enter a mode, armed or not, or an empty text."""
-    if (mode.name == "THROW" and vehicle.armed) or (mode.name == "FLIP" and not may_flip(vehicle)):
-        return "init failed"
     if mode.name == "SMART_RTL" and not vehicle.ground.track:
         return "init failed"
     if mode.name == "AUTO" and not vehicle.flies and len(vehicle.mission) <= 1:
         vehicle.send_text(NOTICE, "No Mission. Can't set AUTO.")
-        return "init failed"
-    if mode.name == "FOLLOW" and not vehicle.parameters["FOLL_ENABLE"]:
-        vehicle.send_text(WARNING, "Set FOLL_ENABLE = 1")
         return "init failed"
     return ""
 

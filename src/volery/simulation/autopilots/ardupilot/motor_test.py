@@ -6,15 +6,19 @@ tested in ArduPilot's order, clockwise from the front; a rover's throttle really
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 from math import isfinite
 
-from volery.base.time import from_seconds
+from volery.base.time import Ns, from_seconds
+from volery.simulation.autopilots.ardupilot.failsafes import conditions_of
+from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
 from volery.simulation.autopilots.ardupilot.modes import CRITICAL, INFO, arm, disarm
+from volery.simulation.autopilots.ardupilot.pilot_input import switches_of
 from volery.simulation.autopilots.autopilot_parameters import single
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command
-from volery.simulation.autopilots.state_groups import MotorTestState
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import OFF, Vehicle
 from volery.simulation.world.body_specs import FRAMES, Multirotor
 
@@ -33,6 +37,26 @@ THROTTLE, STEERING, RIGHT_THROTTLE = 1, 2, 4
 """Outputs of a rover."""
 
 
+@dataclass
+class MotorTestState:
+    """Test of motors on the ground."""
+
+    running: bool = False
+    motor: int = 0
+    """Number of the motor in the order of the test, from 1."""
+    motors_left: int = 1
+    """Motors that are tested yet, with this one."""
+    kind: int = 0
+    """MOTOR_TEST_THROTTLE_TYPE."""
+    value: float = 0.0
+    since: Ns = NEVER
+    period: Ns = 0
+    """Time for which each motor turns."""
+
+
+test_of = Kept(MotorTestState)
+
+
 def _refused(vehicle: Vehicle, text: str) -> int:
     vehicle.send_text(CRITICAL, f"Motor Test: {text}")
     return FAILED
@@ -44,11 +68,11 @@ def on_copter_test(vehicle: Vehicle, command: Command) -> int:
     param1 is the first motor in the order of the test, param2 the kind of param3, param4 the seconds of each
     motor and param5 the number of motors.
     """
-    test = vehicle.outputs.motor_test
+    test = test_of(vehicle)
     if not test.running:
         if not vehicle.landed:
             return _refused(vehicle, "vehicle not landed")
-        if vehicle.switches.emergency_stop:
+        if switches_of(vehicle).emergency_stop:
             return _refused(vehicle, "Motor Emergency Stopped")
         if not vehicle.armed:
             vehicle.arm()
@@ -57,18 +81,9 @@ def on_copter_test(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-def on_rover_test(
-    vehicle: Vehicle, command: Command, problems: Callable[[Vehicle], list[str]], words: tuple[str, str]
-) -> int:
-    """Handle DO_MOTOR_TEST of a rover: param1 is the output, the others are as for a copter.
-
-    Args:
-        vehicle: The vehicle.
-        command: The command.
-        problems: Returns the texts that forbid arming.
-        words: Status texts of arming and disarming.
-    """
-    test, kind, value = vehicle.outputs.motor_test, round(command.param2), command.param3
+def on_rover_test(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_MOTOR_TEST of a rover: param1 is the output, the others are as for a copter."""
+    test, kind, value = test_of(vehicle), round(command.param2), command.param3
     if not test.running:
         if not 0 <= command.param1 <= RIGHT_THROTTLE:
             return _refused(vehicle, f"invalid motor ({round(command.param1)})")
@@ -78,16 +93,17 @@ def on_rover_test(
             return _refused(vehicle, f"pwm ({round(value)}) too high")
         if kind == PERCENT and value > 100.0:
             return _refused(vehicle, f"percentage ({round(value)}) too high")
-        if arm(vehicle, problems, words[0], force=False) != ACCEPTED:
+        if arm(vehicle) != ACCEPTED:
             return FAILED
     _start(vehicle, command, LONGEST_OF_ROVER)
     return ACCEPTED
 
 
 def _start(vehicle: Vehicle, command: Command, longest: float) -> None:
-    test = vehicle.outputs.motor_test
+    test = test_of(vehicle)
     seconds = command.param4 if isfinite(command.param4) else 0.0
     test.running, test.since = True, vehicle.kernel.now()
+    conditions_of(vehicle).suspended = True
     test.period = from_seconds(min(longest, max(0.0, seconds)))
     test.motor, test.kind, test.value = round(command.param1), round(command.param2), command.param3
 
@@ -115,43 +131,46 @@ def _order(vehicle: Vehicle) -> Sequence[int]:
     return ORDER_OF_PLUS if round(vehicle.parameters["FRAME_TYPE"]) == PLUS else ORDER
 
 
-def turn_tested_motor(vehicle: Vehicle) -> bool:
-    """Turn the motor whose test it is, at each tick, and return whether a test runs."""
-    test, now = vehicle.outputs.motor_test, vehicle.kernel.now()
+def _end(vehicle: Vehicle) -> None:
+    test_of(vehicle).running = conditions_of(vehicle).suspended = False
+
+
+def turn_tested_motor(vehicle: Vehicle) -> None:
+    """Turn the motor whose test it is, at each tick."""
+    test, now = test_of(vehicle), vehicle.kernel.now()
     if not test.running:
-        return False
+        return
     over = now - test.since >= test.period
     if over and test.motors_left > 1 and 2 * (now - test.since) < 3 * test.period:
         vehicle.drive(OFF)  # a pause of half the time
-        return True
+        return
     if over and test.motors_left > 1:
         test.motor += 1
         test.motors_left -= 1
         test.since, over = now, False
     pulse = None if over or not vehicle.armed else _pulse(vehicle, test)
     if pulse is None:
-        test.running = False
+        _end(vehicle)
         vehicle.send_text(INFO, "finished motor test")
         vehicle.disarm()
-        return False
+        return
     order = _order(vehicle)
     if 1 <= test.motor <= len(order):
         share = min(1.0, max(0.0, pulse / 1000.0 - 1.0))
         vehicle.drive(Setpoint(Control.MOTOR, motor=order[test.motor - 1], throttle=share))
     else:
         vehicle.drive(OFF)
-    return True
 
 
-def drive_tested_output(vehicle: Vehicle, words: str) -> None:
-    """Drive the output whose test it is, at each tick; *words* are the text of disarming."""
-    test = vehicle.outputs.motor_test
+def drive_tested_output(vehicle: Vehicle) -> None:
+    """Drive the output whose test it is, at each tick."""
+    test = test_of(vehicle)
     if not test.running:
         return
     share = _share_of_rover(vehicle, test)
     if share is None or not vehicle.armed or vehicle.kernel.now() - test.since >= test.period:
-        test.running = False
-        disarm(vehicle, words, force=True)
+        _end(vehicle)
+        disarm(vehicle, force=True)
     elif test.motor == STEERING:
         vehicle.drive(Setpoint(Control.STEER, steering=share))
     else:
@@ -172,3 +191,14 @@ def _share_of_rover(vehicle: Vehicle, test: MotorTestState) -> float | None:
         channel, travel = (sticks.roll, travels[0]) if steers else (sticks.throttle, travels[2])
         share = travel.deflection(vehicle.rc[channel])
     return min(1.0, max(-1.0, share))
+
+
+COPTER = Feature(
+    parameters={
+        "MOT_PWM_MAX": ("µs", "pulse width of a motor test at 100 %"),
+        "MOT_PWM_MIN": ("µs", "pulse width of a motor test at 0 %"),
+    },
+    commands={MOTOR_TEST: on_copter_test},
+    on_tick=turn_tested_motor,
+)
+ROVER = Feature(commands={MOTOR_TEST: on_rover_test}, on_tick=drive_tested_output)

@@ -7,17 +7,19 @@ vehicle. MNT1_TYPE counts from the next boot on.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from math import degrees, hypot, nan, pi, radians
 
 from volery.base.elementary import atan2, cos, sin, tan
 from volery.base.frames import Vector, euler_to_quaternion, wrap
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.ardupilot.failsafes import radio_lost
+from volery.simulation.autopilots.ardupilot.feature import TICK, Kept
 from volery.simulation.autopilots.ardupilot.parameters import channel_range
 from volery.simulation.autopilots.ardupilot.servo_outputs import channels, move
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
 from volery.simulation.autopilots.mavlink.messages import Fields, boot_ms
-from volery.simulation.autopilots.state_groups import MountState
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 SERVO = 1
@@ -35,9 +37,40 @@ RETRACTED, IS_NEUTRAL, LOCKS_ROLL, LOCKS_PITCH, LOCKS_YAW = 1, 2, 4, 8, 16
 """GIMBAL_DEVICE_FLAGS and GIMBAL_MANAGER_FLAGS."""
 
 
+@dataclass
+class MountState:
+    """Camera mount. Angles are roll, pitch and yaw [rad]; places are north, east, down [m]."""
+
+    present: bool | None = None
+    """Whether the vehicle has booted with a mount; ``None``: not known yet."""
+    mode: int = 0
+    """MAV_MOUNT_MODE."""
+    angles: Vector = (0.0, 0.0, 0.0)
+    """Target: roll and pitch about the horizon, yaw from the nose or from north."""
+    from_north: bool = False
+    rates: Vector | None = None
+    """Rates at which the target turns; ``None``: it has angles only."""
+    rates_from_north: bool = False
+    place: Vector | None = None
+    """Region of interest."""
+    follows: int = 0
+    """System whose positions it follows, and where that was last."""
+    followed: Vector | None = None
+    yaw_locked: bool = False
+    """Whether the pilot's yaw counts from north."""
+    pilot_pulses: list[int] = field(default_factory=lambda: [0, 0, 0])
+    """Pulse widths [us] of the pilot's channels when they last counted."""
+    controller: tuple[int, int] = (0, 0)
+    """System and component that are in control, for others to read."""
+    warned_at: Ns = NEVER
+
+
+mount_state = Kept(MountState)
+
+
 def mount_of(vehicle: Vehicle) -> MountState | None:
     """Return the mount, or ``None`` if the vehicle has booted without one."""
-    mount = vehicle.outputs.mount
+    mount = mount_state(vehicle)
     return mount if mount.present else None
 
 
@@ -53,14 +86,14 @@ def _within(value: float, ends: tuple[float, float]) -> float:
 def pans(vehicle: Vehicle) -> bool:
     """Return whether the mount turns about the vertical: if not, a copter turns its nose."""
     low, high = limits(vehicle, "YAW")
-    return vehicle.outputs.mount.present is True and bool(channels(vehicle, PAN)) and low < high
+    return mount_state(vehicle).present is True and bool(channels(vehicle, PAN)) and low < high
 
 
 def set_mount_mode(vehicle: Vehicle, mode: int) -> bool:
     """Set the MAV_MOUNT_MODE and return whether there is such a mode."""
     valid = RETRACT <= mode <= AT_HOME
     if valid:
-        vehicle.outputs.mount.mode = mode
+        mount_state(vehicle).mode = mode
     return valid
 
 
@@ -71,7 +104,7 @@ def set_default_mode(vehicle: Vehicle) -> None:
 
 def point_by_angles(vehicle: Vehicle, roll: float, pitch: float, yaw: float, *, from_north: bool) -> None:
     """Point to angles [degrees], within the ends of the axes; the yaw from north has none."""
-    mount = vehicle.outputs.mount
+    mount = mount_state(vehicle)
     if not from_north:
         yaw = _within(yaw - 360.0 if yaw > 180.0 else yaw, limits(vehicle, "YAW"))
     roll, pitch = _within(roll, limits(vehicle, "ROLL")), _within(pitch, limits(vehicle, "PITCH"))
@@ -81,7 +114,7 @@ def point_by_angles(vehicle: Vehicle, roll: float, pitch: float, yaw: float, *, 
 
 def point_by_rates(vehicle: Vehicle, roll: float, pitch: float, yaw: float, *, from_north: bool) -> None:
     """Turn at rates [degrees/s]."""
-    mount = vehicle.outputs.mount
+    mount = mount_state(vehicle)
     mount.rates, mount.rates_from_north = (radians(roll), radians(pitch), radians(yaw)), from_north
     mount.mode = BY_MESSAGE
 
@@ -91,7 +124,7 @@ def point_at(vehicle: Vehicle, place: Vector | None) -> None:
 
     The nose of a copter follows the place if the mount does not pan, or if there is none.
     """
-    mount = vehicle.outputs.mount
+    mount = mount_state(vehicle)
     vehicle.commanded.look_at = None if pans(vehicle) else place
     mount.place = place
     if place is not None:
@@ -100,9 +133,9 @@ def point_at(vehicle: Vehicle, place: Vector | None) -> None:
         set_default_mode(vehicle)
 
 
-def update_mount(vehicle: Vehicle, tick: Ns) -> None:
+def update_mount(vehicle: Vehicle) -> None:
     """Move the target and the outputs, at each tick."""
-    mount = vehicle.outputs.mount
+    mount = mount_state(vehicle)
     if mount.present is None:
         mount.present = vehicle.parameters["MNT1_TYPE"] == SERVO
         mount.follows = round(vehicle.parameters["MNT1_SYSID_DFLT"])
@@ -116,7 +149,7 @@ def update_mount(vehicle: Vehicle, tick: Ns) -> None:
         mount.angles, mount.from_north, mount.rates = (roll, pitch, yaw), False, None
         outputs = mount.angles
     else:
-        _aim(vehicle, mount, to_seconds(tick))
+        _aim(vehicle, mount, to_seconds(TICK))
         outputs = _compensated(vehicle, mount)
     move(vehicle, OPEN, float(mount.mode != RETRACT))
     for function, axis, angle in zip((ROLL, TILT, PAN), ("ROLL", "PITCH", "YAW"), outputs, strict=True):

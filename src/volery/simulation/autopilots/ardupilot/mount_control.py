@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from math import isnan, radians
 from typing import Any
 
 from volery.base.time import S
+from volery.simulation.autopilots.ardupilot.commands import is_place
+from volery.simulation.autopilots.ardupilot.feature import Feature, Item, as_command
 from volery.simulation.autopilots.ardupilot.modes import WARNING
 from volery.simulation.autopilots.ardupilot.mount import (
     AT_HOME,
@@ -19,34 +20,43 @@ from volery.simulation.autopilots.ardupilot.mount import (
     LOCKS_ROLL,
     LOCKS_YAW,
     NEUTRAL,
+    PILOT_PITCH,
+    PILOT_ROLL,
+    PILOT_YAW,
     RETRACT,
     RETRACTED,
+    attitude_status,
     limits,
     mount_of,
+    mount_state,
     pans,
+    point_at,
     point_by_angles,
     point_by_rates,
     set_default_mode,
     set_mount_mode,
+    update_mount,
 )
 from volery.simulation.autopilots.mavlink.messages import (
     ACCEPTED,
     FAILED,
     Command,
     Fields,
-    Handler,
     boot_ms,
     finite,
 )
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
+ROI_LOCATION, ROI_NONE, ROI = 195, 197, 201
 ROI_SYSTEM, MOUNT_CONFIGURE, MOUNT_CONTROL, GIMBAL_PITCHYAW, GIMBAL_CONFIGURE = 198, 204, 205, 1000, 1001
 """MAV_CMD."""
 
 LARGEST_PITCH, LARGEST_ROLL, LARGEST_YAW = 90.0, 180.0, 360.0
 """Angles [degrees] beyond which MOUNT_CONTROL is refused: they were stated in 1/100 degree."""
 WARNS_EVERY = 30 * S
+RETRACT_SWITCH, LOCK_SWITCH = 27, 163
+"""RCn_OPTION."""
 LEAVE, TAKE, GIVE_BACK = -1, -2, -3
 """Values of param1 of GIMBAL_CONFIGURE; others are system ids."""
 
@@ -66,7 +76,7 @@ def on_mount_configure(vehicle: Vehicle, command: Command) -> int:
 
 def _warn(vehicle: Vehicle, text: str) -> int:
     """Send a warning, at most one in 30 s, and return FAILED."""
-    mount, now = vehicle.outputs.mount, vehicle.kernel.now()
+    mount, now = mount_state(vehicle), vehicle.kernel.now()
     if now - mount.warned_at >= WARNS_EVERY:
         mount.warned_at = now
         vehicle.send_text(WARNING, f"Mount: {text}")
@@ -99,7 +109,7 @@ def on_mount_control(vehicle: Vehicle, command: Command) -> int:
 
 def _point_at_place(vehicle: Vehicle, latitude: float, longitude: float, height: float) -> None:
     """Point at a place [1/1e7 degree] at a height above home [m]. The nose does not follow it."""
-    mount = vehicle.outputs.mount
+    mount = mount_state(vehicle)
     mount.place = vehicle.point(GLOBAL_RELATIVE, latitude / 1e7, longitude / 1e7, height)
     mount.mode = AT_POINT
 
@@ -159,13 +169,19 @@ def on_roi_system(vehicle: Vehicle, command: Command) -> int:
     return ACCEPTED
 
 
-MOUNT_COMMANDS: Mapping[int, Handler] = {
-    ROI_SYSTEM: on_roi_system,
-    MOUNT_CONFIGURE: on_mount_configure,
-    MOUNT_CONTROL: on_mount_control,
-    GIMBAL_PITCHYAW: on_gimbal_pitchyaw,
-    GIMBAL_CONFIGURE: on_gimbal_configure,
-}
+def on_region(vehicle: Vehicle, command: Command) -> int:
+    """Handle DO_SET_ROI and its two forms: without a mount that pans, the nose turns to the place.
+
+    Without a place the nose turns along the path again, also after CONDITION_YAW.
+    """
+    if command.number == ROI_NONE or (command.x == 0.0 and command.y == 0.0):
+        point_at(vehicle, None)
+        vehicle.commanded.forget_heading()
+        return ACCEPTED
+    if not is_place(command):
+        return FAILED
+    point_at(vehicle, vehicle.point(command.frame, command.x, command.y, command.z))
+    return ACCEPTED
 
 
 def on_other_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
@@ -205,7 +221,7 @@ def retract_by_switch(vehicle: Vehicle, position: int) -> None:
 
 def lock_by_switch(vehicle: Vehicle, position: int) -> None:
     """Let the pilot's yaw count from north with the switch up."""
-    vehicle.outputs.mount.yaw_locked = position > 0
+    mount_state(vehicle).yaw_locked = position > 0
 
 
 def manager_information(vehicle: Vehicle) -> Fields | None:
@@ -236,3 +252,63 @@ def manager_status(vehicle: Vehicle) -> Fields | None:
         "secondary_control_sysid": 0,
         "secondary_control_compid": 0,
     }
+
+
+def _leave_to_channel(_vehicle: Vehicle, _position: int) -> None:
+    """Do nothing: the pulse width of the channel counts, not its position as a switch."""
+
+
+COPTER = ROVER = Feature(
+    parameters={
+        "MNT1_TYPE": ("", "1: there is a camera mount with servos, from the next boot on"),
+        "MNT1_DEFLT_MODE": ("", "first mode of the mount"),
+        "MNT1_RC_RATE": ("°/s", "positive: the pilot turns the mount at up to this rate; else to angles"),
+        "MNT1_SYSID_DFLT": ("", "system that the mount follows before one is commanded"),
+        "MNT1_LEAD_RLL": ("s", "time by which the mount leads the vehicle's roll"),
+        "MNT1_LEAD_PTCH": ("s", "time by which the mount leads the vehicle's pitch"),
+        **{
+            f"MNT1_{axis}_{end}": ("°", f"{words} of the mount's {axis.lower()}")
+            for axis in ("ROLL", "PITCH", "YAW")
+            for end, words in (("MIN", "lower end"), ("MAX", "upper end"))
+        },
+        **{
+            f"MNT1_{place}_{axis}": ("°", f"angle of the {words} mount")
+            for place, words in (("RETRACT", "retracted"), ("NEUTRAL", "neutral"))
+            for axis in "XYZ"
+        },
+    },
+    commands={
+        ROI: on_region,
+        ROI_LOCATION: on_region,
+        ROI_NONE: on_region,
+        ROI_SYSTEM: on_roi_system,
+        MOUNT_CONFIGURE: on_mount_configure,
+        MOUNT_CONTROL: on_mount_control,
+        GIMBAL_PITCHYAW: on_gimbal_pitchyaw,
+        GIMBAL_CONFIGURE: on_gimbal_configure,
+    },
+    nan_commands=(GIMBAL_PITCHYAW,),
+    messages={
+        "GLOBAL_POSITION_INT": on_other_position,
+        "MOUNT_CONFIGURE": on_mount_configure_message,
+        "MOUNT_CONTROL": on_mount_control_message,
+    },
+    items={
+        ROI_LOCATION: Item("SetROI", as_command(on_region), keeps_frame=True),
+        ROI_NONE: Item("SetROI", as_command(on_region)),
+        ROI: Item("SetROI", as_command(on_region), keeps_frame=True),
+        MOUNT_CONTROL: Item("MountControl", as_command(on_mount_control)),
+        GIMBAL_PITCHYAW: Item("GimbalPitchYaw", as_command(on_gimbal_pitchyaw), silent=True),
+    },
+    switches={
+        RETRACT_SWITCH: retract_by_switch,
+        LOCK_SWITCH: lock_by_switch,
+        **dict.fromkeys((PILOT_ROLL, PILOT_PITCH, PILOT_YAW), _leave_to_channel),
+    },
+    on_tick=update_mount,
+    telemetry={
+        "GIMBAL_DEVICE_ATTITUDE_STATUS": attitude_status,
+        "GIMBAL_MANAGER_INFORMATION": manager_information,
+        "GIMBAL_MANAGER_STATUS": manager_status,
+    },
+)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
+from volery.simulation.autopilots.ardupilot.feature import Feature
 from volery.simulation.autopilots.autopilot_parameters import Parameters
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -145,3 +146,16 @@ def source_problems(vehicle: Vehicle) -> list[str]:
         if sensor in required and names and not any(enabling):
             return [f"AHRS: EK3 sources require {sensor}"]
     return []
+
+
+_CHECKED = dict.fromkeys(
+    SOURCE_PARAMETERS, ("", "source of the estimator, or its sensor: checked before arming")
+)
+COPTER = Feature(
+    parameters={**_CHECKED, **dict.fromkeys(COPTER_PARAMETERS, ("", "checked before arming"))},
+    problems=copter_problems,
+)
+ROVER = Feature(
+    parameters={**_CHECKED, WHEEL_ENCODER: ("", "source of the estimator: checked before arming")},
+    problems=source_problems,
+)

@@ -7,14 +7,17 @@ an output: its state shows in telemetry and in SIM_PIN_MASK.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from volery.base.time import MS, S, from_seconds
+from volery.simulation.autopilots.ardupilot.feature import Feature, Item, as_command
 from volery.simulation.autopilots.ardupilot.modes import INFO
+from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, boot_ms
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
-SET_RELAY, SET_SERVO, GRIPPER = 181, 183, 211
+SET_RELAY, REPEAT_RELAY, SET_SERVO, REPEAT_SERVO, GRIPPER = 181, 182, 183, 184, 211
 """Commands that are mission items, too."""
 
 RELAYS = 6
@@ -33,6 +36,8 @@ LET_GO, GRAB = 0, 1
 """Values of param2 of DO_GRIPPER."""
 GRIPS_WITHIN = 2 * S
 """Time of a servo gripper from the command to the report of its end."""
+GRIPPER_SWITCH, RELAY_SWITCHES = 19, (28, 34, 35, 36, 66, 67)
+"""Values of RCn_OPTION."""
 
 
 def _is_free(vehicle: Vehicle, channel: int, pulse: int) -> bool:
@@ -51,7 +56,7 @@ def set_servo(vehicle: Vehicle, channel: int, pulse: int) -> bool:
     if not _is_free(vehicle, channel, pulse):
         return False
     _stop_repeating(vehicle, ("servo", channel))
-    vehicle.outputs.servos[channel] = pulse
+    outputs_of(vehicle).servos[channel] = pulse
     return True
 
 
@@ -72,7 +77,9 @@ def set_relay(vehicle: Vehicle, number: int, state: int) -> bool:
     if not has_relay(vehicle, number):
         return False
     _stop_repeating(vehicle, ("relay", number))
-    _write_relay(vehicle, number, bool(state) if state in (0, 1) else number not in vehicle.outputs.relays)
+    _write_relay(
+        vehicle, number, bool(state) if state in (0, 1) else number not in outputs_of(vehicle).relays
+    )
     return True
 
 
@@ -85,7 +92,7 @@ def relays_at_boot(vehicle: Vehicle) -> None:
 
 
 def _write_relay(vehicle: Vehicle, number: int, on: bool) -> None:
-    relays = vehicle.outputs.relays
+    relays = outputs_of(vehicle).relays
     (relays.add if on else relays.discard)(number)
     pin = f"RELAY{number + 1}_PIN"
     if pin in vehicle.parameters and 0.0 <= vehicle.parameters[pin] < PINS:
@@ -100,7 +107,7 @@ def relay_status(vehicle: Vehicle) -> Fields:
     """Return RELAY_STATUS."""
     return {
         "time_boot_ms": boot_ms(vehicle),
-        "on": sum(1 << number for number in vehicle.outputs.relays),
+        "on": sum(1 << number for number in outputs_of(vehicle).relays),
         "present": sum(1 << number for number in range(RELAYS) if has_relay(vehicle, number)),
     }
 
@@ -111,7 +118,7 @@ def move_gripper(vehicle: Vehicle, action: int) -> bool:
     if said is None or not vehicle.parameters["GRIP_ENABLE"]:
         return False
     vehicle.send_text(INFO, f"{said}ing")
-    outputs = vehicle.outputs
+    outputs = outputs_of(vehicle)
     outputs.gripper = None
 
     def finish() -> None:
@@ -145,7 +152,7 @@ def _repeat(
         change: Called with the number of changes left, which is even for the first half of a period.
     """
     outputs, every = (
-        vehicle.outputs,
+        outputs_of(vehicle),
         max(CHANGES_EVERY, from_seconds(min(max(0.0, period), LONGEST_PERIOD)) // 2),
     )
     outputs.repeated = output
@@ -155,7 +162,7 @@ def _repeat(
     def go_on(left: int) -> None:
         if (
             not left
-            or vehicle.outputs is not outputs
+            or outputs_of(vehicle) is not outputs
             or (outputs.repetitions, outputs.repeated) != (this, output)
         ):
             return
@@ -166,8 +173,8 @@ def _repeat(
 
 
 def _stop_repeating(vehicle: Vehicle, output: tuple[str, int]) -> None:
-    if vehicle.outputs.repeated == output:
-        vehicle.outputs.repeated = None
+    if outputs_of(vehicle).repeated == output:
+        outputs_of(vehicle).repeated = None
 
 
 def on_repeat_relay(vehicle: Vehicle, command: Command) -> int:
@@ -180,7 +187,7 @@ def on_repeat_relay(vehicle: Vehicle, command: Command) -> int:
         ("relay", number),
         command.param2,
         command.param3,
-        lambda _left: _write_relay(vehicle, number, number not in vehicle.outputs.relays),
+        lambda _left: _write_relay(vehicle, number, number not in outputs_of(vehicle).relays),
     )
     return ACCEPTED
 
@@ -193,7 +200,7 @@ def on_repeat_servo(vehicle: Vehicle, command: Command) -> int:
     trim = round(vehicle.parameters[f"SERVO{channel}_TRIM"])
 
     def change(left: int) -> None:
-        vehicle.outputs.servos[channel] = trim if left % 2 else pulse
+        outputs_of(vehicle).servos[channel] = trim if left % 2 else pulse
 
     _repeat(vehicle, ("servo", channel), command.param3, command.param4, change)
     return ACCEPTED
@@ -213,3 +220,49 @@ def act_on_payload(vehicle: Vehicle, item: MissionItem) -> None:
     elif item.command == GRIPPER:
         move_gripper(vehicle, round(item.param2))
         vehicle.send_text(INFO, "Gripper Grabbed" if round(item.param2) == GRAB else "Gripper Released")
+
+
+def _switch_gripper(vehicle: Vehicle, position: int) -> None:
+    if position:
+        move_gripper(vehicle, GRAB if position > 0 else LET_GO)
+
+
+def _switch_relay(vehicle: Vehicle, position: int, number: int) -> None:
+    set_relay(vehicle, number, int(position > 0))
+
+
+COPTER = ROVER = Feature(
+    parameters={
+        "GRIP_ENABLE": ("", "any value but 0: there is a gripper"),
+        "SIM_PIN_MASK": ("", "bits of the pins that are high: relays set them, buttons are read from them"),
+        **{
+            f"RELAY{number}_{part}": ("", f"{words} of that relay")
+            for number in range(1, RELAYS + 1)
+            for part, words in (
+                ("FUNCTION", "1: commands switch it; function"),
+                ("PIN", "pin"),
+                ("DEFAULT", "state at the boot"),
+            )
+        },
+    },
+    commands={
+        SET_SERVO: on_set_servo,
+        REPEAT_SERVO: on_repeat_servo,
+        SET_RELAY: on_set_relay,
+        REPEAT_RELAY: on_repeat_relay,
+        GRIPPER: on_gripper,
+    },
+    items={
+        SET_RELAY: Item("SetRelay", act_on_payload, silent=True),
+        SET_SERVO: Item("SetServo", act_on_payload, silent=True),
+        GRIPPER: Item("Gripper", act_on_payload, silent=True),
+        REPEAT_RELAY: Item("RepeatRelay", as_command(on_repeat_relay), silent=True),
+        REPEAT_SERVO: Item("RepeatServo", as_command(on_repeat_servo), silent=True),
+    },
+    switches={
+        GRIPPER_SWITCH: _switch_gripper,
+        **{option: partial(_switch_relay, number=number) for number, option in enumerate(RELAY_SWITCHES)},
+    },
+    at_boot=relays_at_boot,
+    telemetry={"RELAY_STATUS": relay_status},
+)

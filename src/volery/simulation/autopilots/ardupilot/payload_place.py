@@ -10,12 +10,14 @@ from enum import Enum, auto
 
 from volery.base.frames import Vector
 from volery.base.time import MS, from_seconds
+from volery.simulation.autopilots.ardupilot.feature import Feature, Item
 from volery.simulation.autopilots.ardupilot.modes import INFO, WARNING
 from volery.simulation.autopilots.ardupilot.payload import LET_GO, move_gripper
+from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Leg, item_point
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint, stopping_point
-from volery.simulation.autopilots.onboard_mission import MissionItem
+from volery.simulation.autopilots.onboard_mission import PAYLOAD_PLACE, MissionItem
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
 SETTLES = 500 * MS
@@ -84,12 +86,12 @@ class PlacePayload(Manoeuvre):
         vehicle, now = self.vehicle, self.vehicle.kernel.now()
         if self._stage is _Stage.FLY and self._going.arrived():
             self._sink()
-        if vehicle.outputs.gripper == LET_GO and self._stage in (_Stage.FLY, _Stage.SINK):
+        if outputs_of(vehicle).gripper == LET_GO and self._stage in (_Stage.FLY, _Stage.SINK):
             self._say(INFO, "Manual release")
             self._stage, self._down_at = (_Stage.WAIT if self._stage is _Stage.SINK else _Stage.DONE), now
         elif self._stage is _Stage.SINK:
             self._watch_descent()
-        elif self._stage is _Stage.RELEASE and vehicle.outputs.gripper == LET_GO:
+        elif self._stage is _Stage.RELEASE and outputs_of(vehicle).gripper == LET_GO:
             self._stage = _Stage.WAIT
         if self._stage is _Stage.WAIT:
             delay = from_seconds(max(0.0, vehicle.parameters["PLDP_DELAY"]))
@@ -147,3 +149,13 @@ class PlacePayload(Manoeuvre):
                 tilt=tuning.tilt,
             )
         )
+
+
+COPTER = Feature(
+    parameters={
+        "PLDP_DELAY": ("s", "time between the release of a load and the climb"),
+        "PLDP_SPEED_DN": ("m/s", "rate of descent to put down a load; 0: LAND_SPEED"),
+    },
+    items={PAYLOAD_PLACE: Item("PayloadPlace", leg=payload_leg, placed=True)},
+)
+ROVER = Feature(items={PAYLOAD_PLACE: Item("PayloadPlace", placed=True)})

@@ -7,14 +7,15 @@ three for a rover.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass, field
 from math import radians
 from typing import Any
 
 from volery.base.elementary import cos, sin
 from volery.base.time import MS, Ns, S, from_seconds
 from volery.simulation.autopilots.ardupilot.failsafes import radio_lost
-from volery.simulation.autopilots.ardupilot.modes import WARNING, arm, change_mode, disarm
+from volery.simulation.autopilots.ardupilot.feature import Kept
+from volery.simulation.autopilots.ardupilot.modes import WARNING, arm, change_mode, disarm, received_of
 from volery.simulation.autopilots.manual_control import ChannelRange
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -24,6 +25,51 @@ LAST_PLAIN_CHANNEL = 8
 INVALID_AXIS = 32_767
 
 
+@dataclass
+class SwitchState:
+    """Switches of the transmitter, as the firmware has read them. Times in ns."""
+
+    mode: int = 0
+    """Position of the mode switch, from 1; 0: not read yet."""
+    read: int = 0
+    """Position that it may have moved to."""
+    read_since: Ns = NEVER
+    rudder_since: Ns = NEVER
+    """Since when the yaw stick has been at the same end with the throttle closed."""
+    rudder: int = 0
+    """That end: 1 right, -1 left."""
+    options: dict[int, int] = field(default_factory=dict)
+    """Position of the switch by channel: 1 up, 0 in the middle, -1 down."""
+    emergency_stop: bool = False
+    interlock_closed: bool = False
+    overrides_denied: bool = False
+    """Whether a switch denies the sticks of a ground station."""
+    mixed_steering: tuple[float, float] = (0.0, 0.0)
+    """Steering that the pilot adds to that of the controls, and the share that these lose, as last given."""
+    read_from: tuple[list[int], int] | None = None
+    """Pulse widths of all channels, and changes of parameters, that all of them were last read from."""
+
+
+switches_of = Kept(SwitchState)
+
+
+@dataclass
+class SimulatedFaults:
+    """Faults that parameters inject."""
+
+    values: tuple[float, ...] = (0.0, 0.0, 1.0, 0.0, 180.0, 12.6, 0.0, 0.0)
+    """Values of the parameters as they were last applied."""
+    compared_at: int = -1
+    """Changes of parameters when these were last compared."""
+    no_receiver_since: Ns = NEVER
+    """Since when the parameters have left the autopilot without a receiver of satellites."""
+    pushed: bool = False
+    """Whether a simulated force from outside acts."""
+
+
+faults_of = Kept(SimulatedFaults)
+
+
 def _is_my_station(vehicle: Vehicle, sender: int) -> bool:
     return sender == round(vehicle.parameters["SYSID_MYGCS"])
 
@@ -31,7 +77,7 @@ def _is_my_station(vehicle: Vehicle, sender: int) -> bool:
 def on_heartbeat(vehicle: Vehicle, _fields: dict[str, Any], sender: int) -> None:
     """Handle HEARTBEAT."""
     if _is_my_station(vehicle, sender):
-        vehicle.failsafes.station_last_ns = vehicle.kernel.now()
+        received_of(vehicle).station_at = vehicle.kernel.now()
 
 
 def on_override(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
@@ -42,8 +88,8 @@ def on_override(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
     if not _is_my_station(vehicle, sender):
         return
     now = vehicle.kernel.now()
-    vehicle.failsafes.station_last_ns = now
-    if vehicle.switches.overrides_denied:
+    received_of(vehicle).station_at = now
+    if switches_of(vehicle).overrides_denied:
         return
     for channel in range(1, len(vehicle.rc.transmitter) + 1):
         pulse = fields[f"chan{channel}_raw"]
@@ -60,8 +106,8 @@ def on_manual_control(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> 
     if not _is_my_station(vehicle, sender) or fields["target"] != vehicle.system:
         return
     now = vehicle.kernel.now()
-    vehicle.failsafes.station_last_ns = now
-    if vehicle.switches.overrides_denied:
+    received_of(vehicle).station_at = now
+    if switches_of(vehicle).overrides_denied:
         return
     sticks = vehicle.tuning.sticks
     roll, pitch, throttle, yaw = sticks.travels
@@ -102,11 +148,12 @@ def sticks_moved(vehicle: Vehicle) -> None:
 def on_step(vehicle: Vehicle) -> None:
     """Simulate a failing transmitter and expire overrides, at each tick."""
     simulate_rc_failure(vehicle)
-    if not vehicle.failsafes.rc_received:
+    received, faults = received_of(vehicle), faults_of(vehicle)
+    if not received.transmitter:
         pulses = vehicle.parameters["SIM_RC_FAIL"] != NO_PULSES
-        vehicle.failsafes.rc_received = pulses or bool(vehicle.rc.overridden)
-    if vehicle.parameters.changes != vehicle.failsafes.simulated_at:
-        vehicle.failsafes.simulated_at = vehicle.parameters.changes
+        received.transmitter = pulses or bool(vehicle.rc.overridden)
+    if vehicle.parameters.changes != faults.compared_at:
+        faults.compared_at = vehicle.parameters.changes
         simulate_push(vehicle)
         simulate_faults(vehicle)
     expire_overrides(vehicle)
@@ -125,15 +172,16 @@ def simulate_faults(vehicle: Vehicle) -> None:
     blocked = no_receiver or parameters["SIM_GPS_DISABLE"] != 0.0
     volts = round(parameters["SIM_BATT_VOLTAGE"], 3)
     glitch = parameters["SIM_GPS_GLITCH_X"], parameters["SIM_GPS_GLITCH_Y"]
+    faults = faults_of(vehicle)
     if not no_receiver:
-        vehicle.failsafes.no_receiver_since = NEVER
-    elif vehicle.failsafes.no_receiver_since == NEVER:
-        vehicle.failsafes.no_receiver_since = vehicle.kernel.now()
+        faults.no_receiver_since = NEVER
+    elif faults.no_receiver_since == NEVER:
+        faults.no_receiver_since = vehicle.kernel.now()
     wanted = (float(blocked), *motor_and_share, *wind, volts, *glitch)
-    before = vehicle.failsafes.simulated
+    before = faults.values
     if wanted == before:
         return
-    vehicle.failsafes.simulated = wanted
+    faults.values = wanted
     if volts != before[5]:
         vehicle.flight.set_voltage(None if volts == OWN_VOLTAGE else volts)
     if wind != before[3:5]:
@@ -152,17 +200,17 @@ def simulate_faults(vehicle: Vehicle) -> None:
 
 def simulate_push(vehicle: Vehicle) -> None:
     """Push a copter by SIM_SHOVE_X, _Y and _Z, forward, right, down, for SIM_SHOVE_TIME, then 0."""
-    parameters, failsafes = vehicle.parameters, vehicle.failsafes
+    parameters, faults = vehicle.parameters, faults_of(vehicle)
     lasts = round(parameters["SIM_SHOVE_TIME"]) * MS
     if lasts <= 0 or not vehicle.flies:
         return
     vehicle.flight.push(parameters["SIM_SHOVE_X"], -parameters["SIM_SHOVE_Y"], -parameters["SIM_SHOVE_Z"])
-    if failsafes.pushed:
+    if faults.pushed:
         return
-    failsafes.pushed = True
+    faults.pushed = True
 
     def end() -> None:
-        failsafes.pushed = False
+        faults.pushed = False
         vehicle.flight.push(0.0, 0.0, 0.0)
         parameters.set("SIM_SHOVE_TIME", 0.0)
 
@@ -188,6 +236,19 @@ def simulate_rc_failure(vehicle: Vehicle) -> None:
         vehicle.rc.transmitter[throttle - 1] = vehicle.rules.rc.transmitter[throttle - 1]
 
 
+LACKING = 0.3
+"""Share of a motor's thrust up to which the copter cannot be held."""
+
+
+def lacks_motor(vehicle: Vehicle) -> bool:
+    """Return whether SIM_ENGINE_MUL has taken a motor from a copter.
+
+    The original's simulator sets a falling copter level at its first contact, and its landed detector waits
+    for the lower limit of the motors: such a copter is neither crashed nor landed, and stays armed.
+    """
+    return vehicle.parameters["SIM_ENGINE_MUL"] <= LACKING
+
+
 FULL_STICK_US = 400.0
 """Deflection of the stick from its trim at which the pilot alone steers [us]."""
 
@@ -202,8 +263,8 @@ def mix_steering(vehicle: Vehicle) -> None:
         steering = travel.deflection(pulse)
         if steering:
             mixed = steering, min(1.0, abs(pulse - travel.trim) / FULL_STICK_US)
-    if mixed != vehicle.switches.mixed_steering:
-        vehicle.switches.mixed_steering = mixed
+    if mixed != switches_of(vehicle).mixed_steering:
+        switches_of(vehicle).mixed_steering = mixed
         vehicle.flight.mix_steering(*mixed)
 
 
@@ -236,7 +297,7 @@ def sticks_rest(vehicle: Vehicle) -> bool:
 
     So it is while no channel and no parameter has changed, and neither mode switch nor rudder is timed.
     """
-    switches = vehicle.switches
+    switches = switches_of(vehicle)
     read_from = vehicle.rc.pulses(), vehicle.parameters.changes
     rest = read_from == switches.read_from and not switches.rudder and switches.read in (0, switches.mode)
     switches.read_from = read_from
@@ -251,7 +312,7 @@ def _mode_position(vehicle: Vehicle, channel: str) -> int | None:
 
 def keep_mode(vehicle: Vehicle, channel: str) -> None:
     """Count the mode switch as read: a warm vehicle has taken its mode from it before the run."""
-    vehicle.switches.mode = vehicle.switches.read = _mode_position(vehicle, channel) or 0
+    switches_of(vehicle).mode = switches_of(vehicle).read = _mode_position(vehicle, channel) or 0
 
 
 def read_mode_switch(vehicle: Vehicle, channel: str, modes: str) -> None:
@@ -267,7 +328,7 @@ def read_mode_switch(vehicle: Vehicle, channel: str, modes: str) -> None:
     no_pulses = vehicle.parameters["SIM_RC_FAIL"] == NO_PULSES
     if position is None or booting or no_pulses or radio_lost(vehicle):
         return
-    now, switches = vehicle.kernel.now(), vehicle.switches
+    now, switches = vehicle.kernel.now(), switches_of(vehicle)
     if position != switches.read:
         switches.read, switches.read_since = position, now
     if not position or now - switches.read_since < SETTLED or position == switches.mode:
@@ -276,19 +337,15 @@ def read_mode_switch(vehicle: Vehicle, channel: str, modes: str) -> None:
     change_mode(vehicle, round(vehicle.parameters[f"{modes}{position}"]))
 
 
-def read_rudder(
-    vehicle: Vehicle, problems: Callable[[Vehicle], list[str]], words: tuple[str, str], hold: Ns
-) -> None:
+def read_rudder(vehicle: Vehicle, hold: Ns) -> None:
     """Arm with the yaw stick right and disarm with it left, the throttle closed.
 
     Args:
         vehicle: The vehicle.
-        problems: Returns the texts that forbid arming.
-        words: Status texts of arming and disarming.
         hold: Time for which the stick must be held [ns].
     """
     permitted = round(vehicle.parameters["ARMING_RUDDER"])
-    sticks, switches, now = vehicle.tuning.sticks, vehicle.switches, vehicle.kernel.now()
+    sticks, switches, now = vehicle.tuning.sticks, switches_of(vehicle), vehicle.kernel.now()
     stick = 3 if vehicle.flies else 0
     yaw = sticks.travels[stick].deflection(vehicle.rc[sticks.yaw if vehicle.flies else sticks.roll])
     if vehicle.flies:
@@ -302,9 +359,9 @@ def read_rudder(
         return
     switches.rudder_since = NEVER_AGAIN
     if side > 0 and not vehicle.armed:
-        arm(vehicle, problems, words[0], force=False)
+        arm(vehicle, by_rudder=True)
     elif side < 0 and permitted == 2 and vehicle.armed and (vehicle.landed or not vehicle.flies):
-        disarm(vehicle, words[1], force=False)
+        disarm(vehicle, force=False)
 
 
 def keep_track(vehicle: Vehicle) -> None:

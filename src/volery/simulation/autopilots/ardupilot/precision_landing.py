@@ -7,19 +7,21 @@ not tried again (PLND_STRICT, PLND_RET_MAX).
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import hypot, radians, sqrt
 from typing import Any
 
 from volery.base.elementary import cos, sin, tan
 from volery.base.frames import Vector, world_to_body
 from volery.base.time import MS, Ns, to_seconds
+from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, LogForm
 from volery.simulation.autopilots.ardupilot.modes import CRITICAL, INFO
 from volery.simulation.autopilots.ardupilot.range_finder import range_below
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
 from volery.simulation.autopilots.mavlink.messages import to_uint32
 from volery.simulation.autopilots.onboard_log import LogRow
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 COMPANION, IRLOCK, SIMULATED = 1, 2, 4
@@ -42,9 +44,33 @@ ACCEPTABLE, LEAST_DESCENT = 0.15, 0.1
 """Error that stops the descent there [m], down to that rate [m/s]."""
 
 
+@dataclass
+class PrecisionState:
+    """Target of a precision landing. Lengths in metres, times in ns."""
+
+    kind: int | None = None
+    """Type that the vehicle has booted with; ``None``: not known yet."""
+    found: bool = False
+    """Whether the target is seen, and since when."""
+    found_at: Ns = NEVER
+    acquired: bool = False
+    """Whether it counts."""
+    measured_at: Ns = NEVER
+    place: tuple[float, float] = (0.0, 0.0)
+    """Estimated place, north, east about the estimator's origin, and its variance [m^2]."""
+    variance: float = 0.0
+    down: float = 0.0
+    """Distance below the vehicle at the last measurement."""
+    loiters: bool = False
+    """Whether LOITER is held over it."""
+
+
+precision_of = Kept(PrecisionState)
+
+
 def _kind(vehicle: Vehicle) -> int:
     """Return the type that the vehicle has booted with, 0 without precision landing."""
-    state, parameters = vehicle.precision, vehicle.parameters
+    state, parameters = precision_of(vehicle), vehicle.parameters
     if state.kind is None:
         state.kind = round(parameters["PLND_TYPE"]) if parameters["PLND_ENABLED"] else 0
     return state.kind
@@ -90,7 +116,7 @@ def _measure(vehicle: Vehicle, sight: Vector, distance: float) -> None:
 
 def _fuse(vehicle: Vehicle, place: tuple[float, float], down: float, rate: float) -> None:
     """Update the target's place by a measurement; the first one begins a search."""
-    state, now = vehicle.precision, vehicle.kernel.now()
+    state, now = precision_of(vehicle), vehicle.kernel.now()
     sigma = down * (0.01 + 0.01 * rate) + 0.02
     state.down = down
     if not state.found:
@@ -115,7 +141,7 @@ def update_target(vehicle: Vehicle) -> None:
     """Measure the simulated beacon; begin to believe a target, and lose it."""
     if _kind(vehicle) in (IRLOCK, SIMULATED):
         _see_beacon(vehicle)
-    state, now = vehicle.precision, vehicle.kernel.now()
+    state, now = precision_of(vehicle), vehicle.kernel.now()
     if state.acquired:
         if now - state.measured_at > LOST_AFTER:
             vehicle.send_text(CRITICAL, "PrecLand: Target Lost")
@@ -145,14 +171,14 @@ def target_place(vehicle: Vehicle) -> Vector:
     """Return where the copter is to stand: at the target, PLND_LAND_OFS_X ahead and _Y to the right."""
     p, heading = vehicle.parameters, vehicle.estimate.attitude[2]
     ahead, right = p["PLND_LAND_OFS_X"] / 100.0, p["PLND_LAND_OFS_Y"] / 100.0
-    north, east = vehicle.precision.place
+    north, east = precision_of(vehicle).place
     c, s = cos(heading), sin(heading)
     return north + ahead * c - right * s, east + ahead * s + right * c, 0.0
 
 
 def aim(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     """Return the set-point of a landing, or of LOITER with the switch up, over the target if one is seen."""
-    state, manoeuvre = vehicle.precision, vehicle.manoeuvre.flown
+    state, manoeuvre = precision_of(vehicle), vehicle.manoeuvre.flown
     if not state.acquired or vehicle.landed:
         return setpoint
     if vehicle.manoeuvre.landing and setpoint.control is Control.POSITION_CLIMB:
@@ -174,7 +200,7 @@ def _descent(vehicle: Vehicle, place: Vector, rate: float) -> float:
     error = hypot(place[0] - here[0], place[1] - here[1])
     if error > farthest > 0.0:
         return 0.0
-    if SLOW_TO < vehicle.precision.down < SLOW_FROM:
+    if SLOW_TO < precision_of(vehicle).down < SLOW_FROM:
         most = vehicle.tuning.land_speed / 2.0
         return max(LEAST_DESCENT, most - error * most / ACCEPTABLE)
     return rate
@@ -183,17 +209,46 @@ def _descent(vehicle: Vehicle, place: Vector, rate: float) -> float:
 def switch_loiter(vehicle: Vehicle, position: int) -> None:
     """Hold LOITER over the target while the switch is up."""
     if position:
-        vehicle.precision.loiters = position > 0
+        precision_of(vehicle).loiters = position > 0
 
 
 def precision_rows(vehicle: Vehicle) -> tuple[LogRow, ...]:
     """Return PL of the log on board."""
     if not _kind(vehicle):
         return ()
-    state, here = vehicle.precision, vehicle.estimate.position
+    state, here = precision_of(vehicle), vehicle.estimate.position
     north, east = (there - at for there, at in zip(state.place, here[:2], strict=True))
     speed = vehicle.estimate.velocity
     seen = (north, east, -speed[0], -speed[1], north, east, state.down) if state.acquired else (0.0,) * 7
     at_ms = to_uint32(max(0, (state.measured_at - vehicle.boot_at) // MS))
     kind = vehicle.parameters["PLND_EST_TYPE"]
     return (("PL", (1.0, float(state.acquired), *seen, float(at_ms), 0.0, kind)),)
+
+
+COPTER = Feature(
+    parameters={
+        "PLND_ENABLED": ("", "any value but 0: landings are over a target, from the next boot on"),
+        "PLND_TYPE": ("", "1: LANDING_TARGET finds it; 2 and 4: a simulated beacon"),
+        "PLND_EST_TYPE": ("", "0: its place as measured; 1: filtered, after two seconds"),
+        "PLND_LAND_OFS_X": ("cm", "distance of the landing ahead of it"),
+        "PLND_LAND_OFS_Y": ("cm", "distance of the landing to its right"),
+        "PLND_XY_DIST_MAX": ("m", "distance from it beyond which the copter does not descend; 0: any"),
+        "PLND_YAW_ALIGN": ("0.01°", "direction of the sensor's forward axis from the nose"),
+        "SIM_PLD_ENABLE": ("", "any value but 0: there is a simulated beacon"),
+        "SIM_PLD_LAT": ("°", "its latitude"),
+        "SIM_PLD_LON": ("°", "its longitude"),
+        "SIM_PLD_HEIGHT": ("m", "its height above home"),
+        "SIM_PLD_ALT_LMT": ("m", "height above it up to which it is seen"),
+        "SIM_PLD_DIST_LMT": ("m", "distance from it in the plane up to which it is seen"),
+    },
+    messages={"LANDING_TARGET": on_landing_target},
+    switches={PRECISION_LOITER: switch_loiter},
+    at_once=(PRECISION_LOITER,),
+    on_tick=update_target,
+    limit=aim,
+    log_forms=(
+        LogForm(140, "PL", "QBBfffffffIIB", "TimeUS,Heal,TAcq,pX,pY,vX,vY,mX,mY,mZ,LastMeasMS,EKFOutl,Est"),
+    ),
+    log_rows=precision_rows,
+)
+ROVER = Feature(switches=COPTER.switches, at_once=COPTER.at_once)

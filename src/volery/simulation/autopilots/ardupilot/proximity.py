@@ -8,16 +8,17 @@ the next boot on.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from math import degrees, hypot, inf, pi, radians
 from typing import Any
 
 from volery.base.elementary import atan2, cos, sin
-from volery.base.time import MS, S, to_seconds
+from volery.base.time import MS, Ns, S, to_seconds
+from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Kept, LogForm
 from volery.simulation.autopilots.ardupilot.fence_shapes import Level, shapes
-from volery.simulation.autopilots.ardupilot.modes import Check
 from volery.simulation.autopilots.mavlink.messages import Fields, all_within, boot_ms, to_uint16
 from volery.simulation.autopilots.onboard_log import LogRow
-from volery.simulation.autopilots.state_groups import NEVER, ProximityState
+from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 MESSAGES, FENCE = 2, 10
@@ -43,11 +44,41 @@ FARTHEST_FENCE, FENCE_ACCURACY = 200.0, 0.1
 """Range and resolution of the sensor that measures the fence [m]."""
 NEAREST_EDGE = 0.6
 """Least distance of the boundary about the vehicle [m]."""
+SENSOR = 1 << 26
+"""MAV_SYS_STATUS_SENSOR."""
+
+
+@dataclass
+class ProximityState:
+    """Proximity sensor. Distances are in metres, directions eighths of a turn clockwise from the nose."""
+
+    kind: int | None = None
+    """Type that the vehicle has booted with; ``None``: not known yet."""
+    range: tuple[float, float] = (0.0, 0.0)
+    """Least and largest distance that the sensor states."""
+    distances: dict[int, float] = field(default_factory=dict)
+    """Last distance by direction."""
+    filtered: dict[int, float] = field(default_factory=dict)
+    """The same after the low-pass."""
+    angles: dict[int, float] = field(default_factory=dict)
+    """Angle of each last distance from the nose, clockwise [degrees]."""
+    measured_at: dict[int, Ns] = field(default_factory=dict)
+    collected: dict[int, tuple[float, float]] = field(default_factory=dict)
+    """Least distance by direction and its angle, of the messages with the time stamp that came last."""
+    stamp: int = -1
+    received_at: Ns = NEVER
+    """When a message came last."""
+    upward: float = 0.0
+    """Distance above the vehicle."""
+    upward_at: Ns = NEVER
+
+
+proximity_of = Kept(ProximityState)
 
 
 def update_proximity(vehicle: Vehicle) -> None:
     """Forget old distances, and measure the fence, at each tick."""
-    sensor, now = vehicle.proximity, vehicle.kernel.now()
+    sensor, now = proximity_of(vehicle), vehicle.kernel.now()
     if sensor.kind is None:
         sensor.kind = round(vehicle.parameters["PRX1_TYPE"])
     if sensor.kind == FENCE:
@@ -59,7 +90,7 @@ def update_proximity(vehicle: Vehicle) -> None:
 
 def is_healthy(vehicle: Vehicle) -> bool:
     """Return whether there is a proximity sensor, and it measures."""
-    sensor, now = vehicle.proximity, vehicle.kernel.now()
+    sensor, now = proximity_of(vehicle), vehicle.kernel.now()
     if sensor.kind == MESSAGES:
         return now - max(sensor.received_at, sensor.upward_at) <= SILENCE
     return sensor.kind == FENCE and any(shape.inside for shape in shapes(vehicle))
@@ -67,7 +98,7 @@ def is_healthy(vehicle: Vehicle) -> bool:
 
 def is_there(vehicle: Vehicle) -> bool:
     """Return whether the vehicle has booted with a proximity sensor."""
-    return vehicle.proximity.kind in (MESSAGES, FENCE)
+    return proximity_of(vehicle).kind in (MESSAGES, FENCE)
 
 
 def lacks_data(vehicle: Vehicle) -> bool:
@@ -75,19 +106,15 @@ def lacks_data(vehicle: Vehicle) -> bool:
     return is_there(vehicle) and not is_healthy(vehicle)
 
 
-PROXIMITY_CHECK = Check("PRX1: No Data", lacks_data)
-"""Arming check of the sensor."""
-
-
 def closest(vehicle: Vehicle) -> tuple[float, float] | None:
     """Return the least distance [m] and its angle from the nose [degrees]; ``None`` without an obstacle."""
-    sensor = vehicle.proximity
+    sensor = proximity_of(vehicle)
     return min(((far, sensor.angles[direction]) for direction, far in sensor.distances.items()), default=None)
 
 
 def upward(vehicle: Vehicle) -> float | None:
     """Return the distance above the vehicle [m]; ``None``: not measured."""
-    sensor = vehicle.proximity
+    sensor = proximity_of(vehicle)
     if sensor.kind == FENCE:
         return max(0.0, vehicle.parameters["FENCE_ALT_MAX"] - vehicle.height) if vehicle.flies else None
     fresh = sensor.kind == MESSAGES and vehicle.kernel.now() - sensor.upward_at <= SILENCE
@@ -100,7 +127,7 @@ def edges(vehicle: Vehicle) -> list[tuple[Level, Level]]:
     A corner lies between two directions at the lesser of their distances; beside the last direction with an
     obstacle the boundary goes on by one more corner.
     """
-    sensor = vehicle.proximity
+    sensor = proximity_of(vehicle)
     known = {direction: sensor.filtered[direction] for direction in sensor.distances}
     corners = [_corner(known, direction) for direction in range(DIRECTIONS)]
     pairs = zip(corners, (*corners[1:], corners[0]), strict=True)
@@ -122,7 +149,7 @@ def _corner(known: dict[int, float], direction: int) -> Level | None:
 
 def _store(vehicle: Vehicle, direction: int, far: float, angle: float) -> None:
     """Store a distance [m] at an angle from the nose [degrees], and pass it through the low-pass."""
-    sensor, now = vehicle.proximity, vehicle.kernel.now()
+    sensor, now = proximity_of(vehicle), vehicle.kernel.now()
     passed, cutoff = now - sensor.measured_at.get(direction, NEVER), vehicle.parameters["PRX_FILT"]
     before = sensor.filtered.get(direction, far)
     share = 1.0
@@ -134,7 +161,7 @@ def _store(vehicle: Vehicle, direction: int, far: float, angle: float) -> None:
 
 
 def _measure_fence(vehicle: Vehicle) -> None:
-    sensor, uploaded = vehicle.proximity, shapes(vehicle)
+    sensor, uploaded = proximity_of(vehicle), shapes(vehicle)
     if not any(shape.inside for shape in uploaded):
         return
     sensor.range = (0.0, FARTHEST_FENCE)
@@ -166,7 +193,7 @@ def _is_admitted(vehicle: Vehicle, far: float) -> bool:
 
 def _begin(vehicle: Vehicle, stamp: int) -> ProximityState:
     """Note a message; with a new time stamp the distances that were collected before it count from now on."""
-    sensor, now = vehicle.proximity, vehicle.kernel.now()
+    sensor, now = proximity_of(vehicle), vehicle.kernel.now()
     if stamp != sensor.stamp or now - sensor.received_at > TOGETHER:
         for direction, (far, angle) in sensor.collected.items():
             _store(vehicle, direction, far, angle)
@@ -184,7 +211,7 @@ def _collect(sensor: ProximityState, far: float, angle: float) -> None:
 def on_distance_sensor(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle DISTANCE_SENSOR of a direction, or upward."""
     orientation, far = fields["orientation"], fields["current_distance"] / 100.0
-    if vehicle.proximity.kind != MESSAGES:
+    if proximity_of(vehicle).kind != MESSAGES:
         return
     if orientation < DIRECTIONS:
         sensor = _begin(vehicle, fields["time_boot_ms"])
@@ -192,12 +219,12 @@ def on_distance_sensor(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -
         if sensor.range[0] <= far <= sensor.range[1] and _is_admitted(vehicle, far):
             _collect(sensor, far, 45.0 * orientation)
     elif orientation == UPWARD:
-        vehicle.proximity.upward, vehicle.proximity.upward_at = far, vehicle.kernel.now()
+        proximity_of(vehicle).upward, proximity_of(vehicle).upward_at = far, vehicle.kernel.now()
 
 
 def on_obstacle_distance(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle OBSTACLE_DISTANCE: distances at equal steps of the angle, the nearest by direction counts."""
-    sensor = vehicle.proximity
+    sensor = proximity_of(vehicle)
     offset = fields.get("angle_offset", 0.0)
     step = fields.get("increment_f", 0.0) or float(fields["increment"])
     if sensor.kind != MESSAGES or not step or not all_within((step, offset)):
@@ -221,10 +248,13 @@ def on_obstacle_distance(vehicle: Vehicle, fields: dict[str, Any], _sender: int)
 
 def on_obstacle_3d(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
     """Handle OBSTACLE_DISTANCE_3D: a point forward, right and down of the vehicle."""
-    if vehicle.proximity.kind != MESSAGES:
+    if proximity_of(vehicle).kind != MESSAGES:
         return
     if fields["frame"] != BODY_FRD:
-        vehicle.proximity.stamp, vehicle.proximity.received_at = fields["time_boot_ms"], vehicle.kernel.now()
+        proximity_of(vehicle).stamp, proximity_of(vehicle).received_at = (
+            fields["time_boot_ms"],
+            vehicle.kernel.now(),
+        )
         return
     point, limits = (fields["x"], fields["y"], fields["z"]), (fields["min_distance"], fields["max_distance"])
     sensor = _begin(vehicle, fields["time_boot_ms"])
@@ -249,7 +279,7 @@ NO_DATA, GOOD = 1, 2
 
 def log_rows(vehicle: Vehicle) -> tuple[LogRow, ...]:
     """Return PRX, and with PRX_LOG_RAW also PRXR, while there is a distance; open directions: the range."""
-    sensor = vehicle.proximity
+    sensor = proximity_of(vehicle)
     nearest = closest(vehicle)
     if nearest is None:
         return ()
@@ -268,7 +298,7 @@ def log_rows(vehicle: Vehicle) -> tuple[LogRow, ...]:
 
 def reports(vehicle: Vehicle) -> list[Fields]:
     """Return DISTANCE_SENSOR of each direction with a distance, and upward."""
-    sensor = vehicle.proximity
+    sensor = proximity_of(vehicle)
     measured = [(direction, direction, sensor.distances[direction]) for direction in sorted(sensor.distances)]
     above = upward(vehicle)
     if above is not None:
@@ -285,3 +315,51 @@ def reports(vehicle: Vehicle) -> list[Fields]:
         }
         for number, orientation, far in measured
     ]
+
+
+def _amend_status(vehicle: Vehicle, status: Fields) -> Fields:
+    """Return SYS_STATUS with the sensor, if there is one."""
+    if not is_there(vehicle):
+        return status
+    present, enabled, health = (
+        f"onboard_control_sensors_{name}" for name in ("present", "enabled", "health")
+    )
+    healthy = status[health] | SENSOR if is_healthy(vehicle) else status[health] & ~SENSOR
+    return {
+        **status,
+        present: status[present] | SENSOR,
+        enabled: status[enabled] | SENSOR,
+        health: healthy,
+    }
+
+
+COPTER = ROVER = Feature(
+    parameters={
+        "PRX1_MAX": ("m", "largest distance of the proximity sensor that counts; 0: any"),
+        "PRX1_MIN": ("m", "least distance of the proximity sensor that counts"),
+        "PRX1_ORIENT": ("", "any value but 0: OBSTACLE_DISTANCE counts anticlockwise"),
+        "PRX1_TYPE": ("", "from the next boot on: 2 distances come by messages, 10 the fence is measured"),
+        "PRX1_YAW_CORR": ("°", "angle that is added to those of OBSTACLE_DISTANCE"),
+        "PRX_LOG_RAW": ("", "any value but 0: the log has distances before the low-pass, too"),
+        "PRX_FILT": ("Hz", "cut-off frequency of the distances that avoidance reads; 0: no filter"),
+    },
+    messages={
+        "DISTANCE_SENSOR": on_distance_sensor,
+        "OBSTACLE_DISTANCE": on_obstacle_distance,
+        "OBSTACLE_DISTANCE_3D": on_obstacle_3d,
+    },
+    checks=(Check("PRX1: No Data", lacks_data),),
+    on_tick=update_proximity,
+    amends={"SYS_STATUS": _amend_status},
+    extends={"DISTANCE_SENSOR": reports},
+    log_forms=(
+        LogForm(
+            137,
+            "PRX",
+            "QBBfffffffffff",
+            "TimeUS,Layer,He,D0,D45,D90,D135,D180,D225,D270,D315,DUp,CAn,CDis",
+        ),
+        LogForm(138, "PRXR", "QBffffffff", "TimeUS,Layer,D0,D45,D90,D135,D180,D225,D270,D315"),
+    ),
+    log_rows=log_rows,
+)

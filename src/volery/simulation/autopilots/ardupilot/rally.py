@@ -9,6 +9,7 @@ from math import hypot
 from typing import Any
 
 from volery.base.frames import Vector
+from volery.simulation.autopilots.ardupilot.feature import Feature
 from volery.simulation.autopilots.ardupilot.fence_points import RALLY, RALLY_POINT
 from volery.simulation.autopilots.ardupilot.modes import WARNING
 from volery.simulation.autopilots.mavlink.channel import Peer
@@ -61,3 +62,15 @@ def on_rally_point(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> No
         points = [*points, *([blank] * (index + 1 - len(points)))]
         points[index] = blank._replace(x=fields["lat"], y=fields["lng"], z=float(fields["alt"]))
         vehicle.points[RALLY] = points
+
+
+COPTER = ROVER = Feature(
+    parameters={
+        "RALLY_INCL_HOME": ("", "any value but 0: home counts as a rally point of the return"),
+        "RALLY_LIMIT_KM": ("km", "distance beyond which a rally point is not used; 0: none"),
+        "RALLY_TOTAL": ("", "number of rally points"),
+    },
+    messages={"RALLY_POINT": on_rally_point},
+    questions={"RALLY_FETCH_POINT": on_rally_fetch},
+    return_point=return_point,
+)

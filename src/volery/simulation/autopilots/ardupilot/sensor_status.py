@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from volery.base.time import S
-from volery.simulation.autopilots.ardupilot import airspeed, proximity
 from volery.simulation.autopilots.ardupilot.battery import MEASURED_AFTER, gauge
+from volery.simulation.autopilots.ardupilot.pilot_input import faults_of
 from volery.simulation.autopilots.mavlink.messages import Fields
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -22,14 +22,7 @@ POSITION_KEPT = 7.0
 # MAV_SYS_STATUS_SENSOR
 GYROSCOPES, ACCELEROMETERS, MAG, PRESSURE = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 DIFFERENTIAL_PRESSURE, GPS, RC_RECEIVER = 1 << 4, 1 << 5, 1 << 16
-RATE_CONTROL, ATTITUDE_CONTROL, YAW_CONTROL, Z_CONTROL, XY_CONTROL = (
-    1 << 10,
-    1 << 11,
-    1 << 12,
-    1 << 13,
-    1 << 14,
-)
-GEOFENCE, PROXIMITY = 1 << 20, 1 << 26
+GEOFENCE = 1 << 20
 AHRS, TERRAIN, LOGGING, BATTERY, PREARM = 1 << 21, 1 << 22, 1 << 24, 1 << 25, 1 << 28
 
 
@@ -54,7 +47,7 @@ def is_logging(vehicle: Vehicle) -> bool:
 
 def receiver_is_lost(vehicle: Vehicle) -> bool:
     """Return whether no message of a receiver has come for GPS_TIMEOUT_MS of AP_GPS."""
-    since = vehicle.failsafes.no_receiver_since
+    since = faults_of(vehicle).no_receiver_since
     return since != NEVER and vehicle.kernel.now() - since > 4 * S
 
 
@@ -76,11 +69,6 @@ def sys_status(vehicle: Vehicle, health: Health) -> Fields:
         enabled &= ~LOGGING
     if not vehicle.arming.checks_passed:
         healthy &= ~PREARM
-    if vehicle.parameters["FENCE_ENABLE"]:
-        enabled |= GEOFENCE if vehicle.parameters["FENCE_ACTION"] else 0
-        healthy = healthy & ~GEOFENCE if vehicle.fence.breached else healthy | GEOFENCE
-    added, used, failed = _of_sensors(vehicle)
-    present, enabled, healthy = present | added, enabled | used, (healthy | added) & ~failed
     volts, amps, left = gauge(vehicle)
     return {
         "onboard_control_sensors_present": present & ~missing,
@@ -91,10 +79,3 @@ def sys_status(vehicle: Vehicle, health: Health) -> Fields:
         "current_battery": amps,
         "battery_remaining": left,
     }
-
-
-def _of_sensors(vehicle: Vehicle) -> tuple[int, int, int]:
-    """Return the bits of sensors that parameters add, those that are used of these, and those that failed."""
-    used = PROXIMITY if proximity.is_there(vehicle) else 0
-    failed = PROXIMITY if proximity.lacks_data(vehicle) else 0
-    return used | (DIFFERENTIAL_PRESSURE if airspeed.is_there(vehicle) else 0), used, failed

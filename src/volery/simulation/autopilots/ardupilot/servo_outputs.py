@@ -6,7 +6,10 @@ transmitter through are set here, too. A channel that nothing has driven since t
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 from volery.simulation.autopilots.ardupilot.failsafes import radio_lost
+from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
 from volery.simulation.autopilots.ardupilot.parameters import channel_range
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -18,6 +21,28 @@ PASSES_SCALED = range(140, 156)
 """SERVOn_FUNCTION of outputs that follow the transmitter: pulse widths as they are, or scaled."""
 
 
+@dataclass
+class OutputState:
+    """Outputs beside the motors, as commands have set them."""
+
+    servos: dict[int, int] = field(default_factory=dict)
+    """Pulse widths [us] by channel, from 1."""
+    relays: set[int] = field(default_factory=set)
+    """Relays that are on, from 0."""
+    repeated: tuple[str, int] | None = None
+    """Kind and number of the output that changes by itself."""
+    repetitions: int = 0
+    """Number of the last order to change an output repeatedly."""
+    gripper: int | None = None
+    """What the gripper has done: 0 released, 1 grabbed; ``None``: it is neutral or moves."""
+    functions: dict[int, int] = field(default_factory=dict)
+    """Function by channel, of the channels that have one, and the changes of parameters that it holds for."""
+    functions_at: int = -1
+
+
+outputs_of = Kept(OutputState)
+
+
 def channels(vehicle: Vehicle, function: int) -> list[int]:
     """Return the channels with a function, from 1."""
     return [channel for channel, its in _functions(vehicle).items() if its == function]
@@ -25,7 +50,7 @@ def channels(vehicle: Vehicle, function: int) -> list[int]:
 
 def _functions(vehicle: Vehicle) -> dict[int, int]:
     """Return SERVOn_FUNCTION by channel, without the channels that have none."""
-    outputs, parameters = vehicle.outputs, vehicle.parameters
+    outputs, parameters = outputs_of(vehicle), vehicle.parameters
     if outputs.functions_at != parameters.changes:
         outputs.functions_at = parameters.changes
         found = {n: round(parameters[f"SERVO{n}_FUNCTION"]) for n in OUTPUTS}
@@ -36,7 +61,7 @@ def _functions(vehicle: Vehicle) -> dict[int, int]:
 def write(vehicle: Vehicle, function: int, pulse: int) -> None:
     """Give the channels with a function a pulse width [us]; 0 ends their pulses."""
     for channel in channels(vehicle, function):
-        vehicle.outputs.servos[channel] = pulse
+        outputs_of(vehicle).servos[channel] = pulse
 
 
 def move(vehicle: Vehicle, function: int, share: float) -> None:
@@ -44,13 +69,15 @@ def move(vehicle: Vehicle, function: int, share: float) -> None:
     for channel in channels(vehicle, function):
         low, _, high, is_reversed = _travel(vehicle, channel)
         along = min(1.0, max(0.0, share))
-        vehicle.outputs.servos[channel] = low + int((1.0 - along if is_reversed else along) * (high - low))
+        outputs_of(vehicle).servos[channel] = low + int(
+            (1.0 - along if is_reversed else along) * (high - low)
+        )
 
 
 def deflect(vehicle: Vehicle, function: int, deflection: float) -> None:
     """Deflect the channels with a function from their middle: -1 and 1 are the ends."""
     for channel in channels(vehicle, function):
-        vehicle.outputs.servos[channel] = _deflected(vehicle, channel, deflection)
+        outputs_of(vehicle).servos[channel] = _deflected(vehicle, channel, deflection)
 
 
 def _travel(vehicle: Vehicle, channel: int) -> tuple[int, int, int, bool]:
@@ -70,9 +97,9 @@ def pass_transmitter_through(vehicle: Vehicle) -> None:
     """Set the channels that follow the transmitter, at each tick."""
     for channel, function in _functions(vehicle).items():
         if function == PASSES_OWN_CHANNEL:
-            vehicle.outputs.servos[channel] = vehicle.rc[channel]
+            outputs_of(vehicle).servos[channel] = vehicle.rc[channel]
         elif function in PASSES_CHANNEL:
-            vehicle.outputs.servos[channel] = vehicle.rc[function - PASSES_CHANNEL.start + 1]
+            outputs_of(vehicle).servos[channel] = vehicle.rc[function - PASSES_CHANNEL.start + 1]
         elif function in PASSES_SCALED:
             _pass_scaled(vehicle, channel, function - PASSES_SCALED.start + 1)
 
@@ -90,4 +117,26 @@ def _pass_scaled(vehicle: Vehicle, channel: int, source: int) -> None:
         deflection = 0.0
     else:
         return
-    vehicle.outputs.servos[channel] = _deflected(vehicle, channel, deflection)
+    outputs_of(vehicle).servos[channel] = _deflected(vehicle, channel, deflection)
+
+
+COPTER = ROVER = Feature(
+    parameters={
+        **{
+            f"SERVO{channel}_{part}": (unit, f"{words} of output {channel}")
+            for channel in OUTPUTS
+            for part, unit, words in (
+                ("FUNCTION", "", "function"),
+                ("MIN", "µs", "lower end"),
+                ("TRIM", "µs", "middle"),
+                ("MAX", "µs", "upper end"),
+                ("REVERSED", "", "direction"),
+            )
+        },
+        "SERVO_RC_FS_MSK": (
+            "",
+            "channels whose scaled outputs go to their middle when the transmitter is lost",
+        ),
+    },
+    on_tick=pass_transmitter_through,
+)

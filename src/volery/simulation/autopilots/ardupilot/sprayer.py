@@ -5,16 +5,19 @@ It runs by DO_SPRAYER, its mission item or a switch. Nothing is sprayed here: th
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import hypot
 
-from volery.base.time import MS, S
+from volery.base.time import MS, Ns, S
+from volery.simulation.autopilots.ardupilot.feature import Feature, Item, Kept
 from volery.simulation.autopilots.ardupilot.servo_outputs import channels, move, write
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
-DO_SPRAYER = 216
+DO_SPRAYER, SPRAYER_SWITCH = 216, 15
+"""MAV_CMD, and value of RCn_OPTION."""
 PUMP, SPINNER = 22, 23
 """SERVOn_FUNCTION."""
 STARTS_AFTER, STOPS_AFTER = 100 * MS, S
@@ -23,9 +26,25 @@ TESTED_AT = 1.0
 """Speed [m/s] for which a switch turns the pump of a disarmed vehicle."""
 
 
+@dataclass
+class SprayerState:
+    """Crop sprayer."""
+
+    running: bool = False
+    """Whether it may spray."""
+    tested: bool = False
+    """Whether the pump turns at rest."""
+    spraying: bool = False
+    changes_since: Ns = NEVER
+    """Since when the speed has been where it starts or stops to spray."""
+
+
+sprayer_of = Kept(SprayerState)
+
+
 def run_sprayer(vehicle: Vehicle, on: bool) -> None:
     """Let the sprayer run or not; it sprays while it runs above SPRAY_SPEED_MIN."""
-    sprayer = vehicle.outputs.sprayer
+    sprayer = sprayer_of(vehicle)
     if on == sprayer.running:
         return
     sprayer.running = on and bool(vehicle.parameters["SPRAY_ENABLE"])
@@ -34,7 +53,7 @@ def run_sprayer(vehicle: Vehicle, on: bool) -> None:
 
 
 def _stop(vehicle: Vehicle) -> None:
-    vehicle.outputs.sprayer.spraying = False
+    sprayer_of(vehicle).spraying = False
     move(vehicle, PUMP, 0.0)
     move(vehicle, SPINNER, 0.0)
 
@@ -42,7 +61,7 @@ def _stop(vehicle: Vehicle) -> None:
 def switch_sprayer(vehicle: Vehicle, position: int) -> None:
     """Run the sprayer with the switch up; while disarmed this tests the pump."""
     run_sprayer(vehicle, position > 0)
-    vehicle.outputs.sprayer.tested = position > 0 and not vehicle.armed
+    sprayer_of(vehicle).tested = position > 0 and not vehicle.armed
 
 
 def on_sprayer(vehicle: Vehicle, command: Command) -> int:
@@ -61,7 +80,7 @@ def act_on_sprayer(vehicle: Vehicle, item: MissionItem) -> None:
 
 def update_sprayer(vehicle: Vehicle) -> None:
     """Set pump and spinner of a sprayer that runs, at each tick."""
-    sprayer, parameters = vehicle.outputs.sprayer, vehicle.parameters
+    sprayer, parameters = sprayer_of(vehicle), vehicle.parameters
     if not sprayer.running:
         return
     if not parameters["SPRAY_ENABLE"]:
@@ -84,7 +103,7 @@ def update_sprayer(vehicle: Vehicle) -> None:
 
 def _sprays(vehicle: Vehicle, speed: float) -> bool:
     """Return whether it sprays: the speed [m/s] was beyond its limit for long enough."""
-    sprayer, now = vehicle.outputs.sprayer, vehicle.kernel.now()
+    sprayer, now = sprayer_of(vehicle), vehicle.kernel.now()
     fast = 100.0 * speed >= vehicle.parameters["SPRAY_SPEED_MIN"]
     if fast == sprayer.spraying:
         sprayer.changes_since = NEVER
@@ -94,3 +113,18 @@ def _sprays(vehicle: Vehicle, speed: float) -> bool:
         sprayer.changes_since = NEVER
         return fast
     return sprayer.spraying
+
+
+COPTER = ROVER = Feature(
+    parameters={
+        "SPRAY_ENABLE": ("", "any value but 0: there is a sprayer"),
+        "SPRAY_PUMP_MIN": ("%", "least share of the pump"),
+        "SPRAY_PUMP_RATE": ("%", "share of the pump at 1 m/s"),
+        "SPRAY_SPEED_MIN": ("cm/s", "speed over ground below which it does not spray"),
+        "SPRAY_SPINNER": ("µs", "pulse width of the spinner"),
+    },
+    commands={DO_SPRAYER: on_sprayer},
+    items={DO_SPRAYER: Item("Sprayer", act_on_sprayer, silent=True)},
+    switches={SPRAYER_SWITCH: switch_sprayer},
+    on_tick=update_sprayer,
+)

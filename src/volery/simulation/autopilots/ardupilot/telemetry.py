@@ -10,9 +10,8 @@ from math import degrees, hypot, nan, pi
 from volery.base.elementary import atan2
 from volery.base.frames import attitude_enu_to_ned, euler_to_quaternion, quaternion_to_euler
 from volery.base.time import US, S
-from volery.simulation.autopilots.ardupilot import airspeed, proximity
 from volery.simulation.autopilots.ardupilot.sensor_status import FIX_AFTER, NO_FIX_AFTER, receiver_is_lost
-from volery.simulation.autopilots.ardupilot.takeoff_check import has_speed_telemetry, reported_rotor_speed
+from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
 from volery.simulation.autopilots.ardupilot.versions import Version
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.to_point import bearing
@@ -74,9 +73,8 @@ def vfr_hud(vehicle: Vehicle) -> Fields:
     estimate = vehicle.estimate
     north, east, down = estimate.velocity
     ground = hypot(north, east)
-    measured = airspeed.speed(vehicle)
     return {
-        "airspeed": hypot(ground, down) if measured is None else measured,
+        "airspeed": hypot(ground, down),
         "groundspeed": ground,
         "heading": int(degrees(estimate.attitude[2]) % 360.0) % 360,
         "throttle": round(abs(estimate.throttle) * 100.0) if vehicle.armed else 0,
@@ -322,27 +320,6 @@ def origin(vehicle: Vehicle) -> Fields | None:
     }
 
 
-def rangefinder(vehicle: Vehicle) -> Fields | None:
-    """Return RANGEFINDER while a configured rangefinder measures."""
-    distance = vehicle.estimate.rangefinder if vehicle.parameters["RNGFND1_TYPE"] else None
-    return None if distance is None else {"distance": distance, "voltage": 0.0}
-
-
-def distance_sensor(vehicle: Vehicle) -> list[Fields]:
-    """Return DISTANCE_SENSOR of a configured rangefinder (downwards) while it measures, and of proximity."""
-    distance = vehicle.estimate.rangefinder if vehicle.parameters["RNGFND1_TYPE"] else None
-    if distance is None:
-        return proximity.reports(vehicle)
-    downward = {
-        "time_boot_ms": boot_ms(vehicle),
-        "min_distance": 20,
-        "max_distance": 3000,
-        "current_distance": to_uint16(distance * 100.0),
-        "orientation": 25,
-    }
-    return [downward, *proximity.reports(vehicle)]
-
-
 ARMED = 128
 """MAV_MODE_FLAG_SAFETY_ARMED."""
 
@@ -409,7 +386,7 @@ def servo_output(vehicle: Vehicle) -> Fields:
         "time_usec": to_uint32(boot_us(vehicle)),
         "port": 0,
         **{f"servo{motor}_raw": pulse for motor, pulse in enumerate(vehicle.estimate.motor_pwm, start=1)},
-        **{f"servo{channel}_raw": pulse for channel, pulse in vehicle.outputs.servos.items()},
+        **{f"servo{channel}_raw": pulse for channel, pulse in outputs_of(vehicle).servos.items()},
     }
 
 
@@ -439,9 +416,6 @@ def mission_current(vehicle: Vehicle) -> Fields:
 WITHOUT_POSITION, WITH_POSITION, STARTING = 167, 831, 1024
 """EKF_STATUS_FLAGS as recorded: attitude and height only, with a position, not initialised."""
 
-GLITCHING = 1 << 15
-"""Bit of the same: satellites are refused."""
-
 EKF_REPORTS_AFTER, EKF_STARTS_AFTER, EKF_ALIGNED_AFTER = int(3.3 * S), int(5.3 * S), int(5.75 * S)
 
 
@@ -455,7 +429,7 @@ def ekf_status(vehicle: Vehicle) -> Fields | None:
     estimate = vehicle.estimate
     flags = WITH_POSITION if vehicle.has_position else WITHOUT_POSITION
     return {
-        "flags": flags | GLITCHING if vehicle.failsafes.glitching else flags,
+        "flags": flags,
         "velocity_variance": 0.007,
         "pos_horiz_variance": estimate.gps_innovation / 5.0,
         "pos_vert_variance": 0.002,
@@ -491,21 +465,6 @@ def attitude_target(vehicle: Vehicle) -> Fields:
     estimate = vehicle.estimate
     q = euler_to_quaternion(*estimate.target_attitude)
     return {"time_boot_ms": boot_ms(vehicle), "q": q, "thrust": estimate.throttle if vehicle.armed else 0.0}
-
-
-def esc_telemetry(vehicle: Vehicle) -> Fields | None:
-    """Return ESC_TELEMETRY_1_TO_4 with the constants of the firmware's simulator."""
-    if not has_speed_telemetry(vehicle):
-        return None
-    count = vehicle.uptime() // (S // 10) % 65_536
-    return {
-        "temperature": (32,) * 4,
-        "voltage": (1679,) * 4,
-        "current": (80,) * 4,
-        "totalcurrent": (1,) * 4,
-        "rpm": (to_uint16(reported_rotor_speed(vehicle)),) * 4,
-        "count": (count,) * 4,
-    }
 
 
 def power_status(_vehicle: Vehicle) -> Fields:

@@ -10,11 +10,12 @@ from math import dist, hypot
 
 from volery.base.elementary import cos
 from volery.base.time import MS, Ns
-from volery.simulation.autopilots.ardupilot.modes import INFO, change_mode
+from volery.simulation.autopilots.ardupilot.feature import Feature
+from volery.simulation.autopilots.ardupilot.modes import INFO, MANUAL_BITS, change_mode, enter
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import BRAKE_ACCEL, root_speed
 from volery.simulation.autopilots.state_groups import NEVER
-from volery.simulation.autopilots.vehicle_state import IDLE, OFF, Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import IDLE, OFF, Manoeuvre, Mode, Vehicle
 
 GRAVITY = 9.80665
 DROP = 1
@@ -35,6 +36,8 @@ VERTICAL_SPEED = 2.5
 """BRAKE_MODE_SPEED_Z [m/s]."""
 NEXT_MODES = (3, 4, 5, 6, 9, 17)
 """Modes that THROW_NEXTMODE may name."""
+THROW = 18
+"""Number of the mode."""
 
 
 class _Stage(IntEnum):
@@ -138,3 +141,21 @@ class Throw(Manoeuvre):
             accel_z=BRAKE_ACCEL,
             tilt=tuning.tilt,
         )
+
+
+def _enter_throw(vehicle: Vehicle, mode: Mode) -> bool:
+    return enter(vehicle, mode, "init failed" if vehicle.armed else "")
+
+
+COPTER = Feature(
+    parameters={
+        "THROW_ALT_MAX": ("m", "height from which a throw does not count; 0: none"),
+        "THROW_ALT_MIN": ("m", "height below which a throw does not count; 0: none"),
+        "THROW_MOT_START": ("", "1: motors idle before a throw"),
+        "THROW_NEXTMODE": ("", "mode after a throw; 18: none"),
+        "THROW_TYPE": ("", "1: the copter is dropped, not thrown upwards"),
+    },
+    modes=(Mode(THROW, "THROW", MANUAL_BITS, Throw, needs_position=True, manual_throttle=True),),
+    entries={THROW: _enter_throw},
+    tumbling=("THROW",),
+)

@@ -7,19 +7,21 @@ two aircraft is taken in centimetres beside rates in m/s.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from math import hypot, radians
 from typing import Any
 
 from volery.base.elementary import cos, sin
 from volery.base.frames import Vector
-from volery.base.time import S
-from volery.simulation.autopilots.ardupilot.modes import COPTER_DISARMED, Check, change_mode, disarm
+from volery.base.time import Ns, S
+from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Kept
+from volery.simulation.autopilots.ardupilot.modes import AUTO_BITS, LEVEL_AND_HEIGHT, change_mode, disarm
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided
 from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.onboard_mission import GLOBAL
-from volery.simulation.autopilots.state_groups import Aircraft
-from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.simulation.autopilots.state_groups import NEVER
+from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
 
 BY_ADSB, BY_POSITION = 0, 1
 """MAV_COLLISION_SRC."""
@@ -43,6 +45,51 @@ VALID_PLACE = 0b11
 LARGEST_ADDRESS = 0xFFFFFF
 SLOW = 1.0
 """Speed of another aircraft below which the copter flies straight away from it [m/s]."""
+
+
+@dataclass
+class Aircraft:
+    """Another aircraft: its last report, and the threat that it is. Lengths in metres, times in ns."""
+
+    place: Vector
+    """North, east, down about the estimator's origin."""
+    velocity: Vector
+    """North, east, down [m/s]."""
+    at: Ns
+    """Time of the report."""
+    level: int = 0
+    """MAV_COLLISION_THREAT_LEVEL."""
+    nearest: float = 0.0
+    """Least horizontal distance to come."""
+    nearest_height: float = 0.0
+    """Least vertical distance to come."""
+    time: float = 0.0
+    """Time until the least horizontal distance [s]."""
+    reported_at: Ns = NEVER
+
+
+@dataclass
+class TrafficState:
+    """Other aircraft, and the response to the most serious threat. Times in ns."""
+
+    others: dict[tuple[int, int], Aircraft] = field(default_factory=dict)
+    """By the kind of report and the address or system id."""
+    level: int = 0
+    """Level of threat that the vehicle responds to."""
+    level_since: Ns = NEVER
+    action: int = 0
+    """MAV_COLLISION_ACTION that was last possible."""
+    active: bool = False
+    """Whether avoidance acts."""
+    mode_before: int = 0
+    """Number of the mode before avoidance."""
+    mode_entered: int | None = None
+    """Number of the mode that avoidance has entered."""
+    threatened_at: Ns = NEVER
+    """When a threat was last reported."""
+
+
+traffic_of = Kept(TrafficState)
 
 
 def on_adsb(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
@@ -71,7 +118,7 @@ def on_position(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
 
 def _note(vehicle: Vehicle, key: tuple[int, int], seen: Aircraft) -> None:
     """Keep a report; where AVD_OBS_MAX aircraft are known already, in place of the oldest."""
-    others = vehicle.traffic.others
+    others = traffic_of(vehicle).others
     if not vehicle.parameters["AVD_ENABLE"]:
         return
     if key in others:
@@ -86,7 +133,7 @@ def _note(vehicle: Vehicle, key: tuple[int, int], seen: Aircraft) -> None:
 
 def update_traffic(vehicle: Vehicle) -> None:
     """Find the most serious threat, act on it and report it, at each tick."""
-    traffic = vehicle.traffic
+    traffic = traffic_of(vehicle)
     if not vehicle.parameters["AVD_ENABLE"]:
         if traffic.others:
             traffic.others.clear()
@@ -110,11 +157,7 @@ def update_traffic(vehicle: Vehicle) -> None:
 
 def is_threatened(vehicle: Vehicle) -> bool:
     """Return whether avoidance acts on a threat."""
-    return vehicle.traffic.active
-
-
-TRAFFIC_CHECK = Check("ADSB threat detected", is_threatened)
-"""Arming check of other aircraft."""
+    return traffic_of(vehicle).active
 
 
 # -- threats
@@ -166,7 +209,7 @@ def _nearest_height(vehicle: Vehicle, other: Aircraft, horizon: float) -> float:
 
 def _respond(vehicle: Vehicle, threat: Aircraft | None) -> None:
     """Follow the level upwards at once and downwards slowly, and act on a high one."""
-    p, traffic, now = vehicle.parameters, vehicle.traffic, vehicle.kernel.now()
+    p, traffic, now = vehicle.parameters, traffic_of(vehicle), vehicle.kernel.now()
     level = threat.level if threat is not None else NO_THREAT
     action = round(p["AVD_F_ACTION"]) if level == HIGH else NONE
     lowest = p["AVD_F_ALT_MIN"]
@@ -183,14 +226,14 @@ def _respond(vehicle: Vehicle, threat: Aircraft | None) -> None:
 
 def _act(vehicle: Vehicle, threat: Aircraft, action: int) -> int:
     """Avoid another aircraft, and return the action that was possible."""
-    traffic = vehicle.traffic
+    traffic = traffic_of(vehicle)
     begins = not traffic.active
     if begins:
         traffic.active, traffic.mode_before = True, vehicle.mode.number
     if vehicle.mode.number == LAND:
         return NONE
     if _may_disarm(vehicle):
-        disarm(vehicle, COPTER_DISARMED, force=True)
+        disarm(vehicle, force=True)
         return NONE
     if action in (RETURN, HOVER):
         entered = not begins or _enter(vehicle, RTL if action == RETURN else LOITER)
@@ -220,7 +263,7 @@ def _may_disarm(vehicle: Vehicle) -> bool:
 def _enter(vehicle: Vehicle, mode: int) -> bool:
     entered = change_mode(vehicle, mode)
     if entered:
-        vehicle.traffic.mode_entered = mode
+        traffic_of(vehicle).mode_entered = mode
     return entered
 
 
@@ -258,7 +301,7 @@ def _escape(vehicle: Vehicle, threat: Aircraft, action: int) -> Vector | None:
 
 def _recover(vehicle: Vehicle, recovery: int) -> None:
     """End avoidance; unless the mode was changed meanwhile, enter the one that AVD_F_RCVRY names."""
-    traffic = vehicle.traffic
+    traffic = traffic_of(vehicle)
     if not traffic.active:
         return
     traffic.active = False
@@ -274,7 +317,7 @@ def _recover(vehicle: Vehicle, recovery: int) -> None:
 
 def _report(vehicle: Vehicle, key: tuple[int, int], threat: Aircraft) -> None:
     """Send COLLISION once a second, for some seconds after the threat, too."""
-    traffic, now = vehicle.traffic, vehicle.kernel.now()
+    traffic, now = traffic_of(vehicle), vehicle.kernel.now()
     if threat.level != NO_THREAT:
         traffic.threatened_at = now
     if now - traffic.threatened_at > CLEARED_FOR or now - threat.reported_at <= REPORT_EVERY:
@@ -290,3 +333,41 @@ def _report(vehicle: Vehicle, key: tuple[int, int], threat: Aircraft) -> None:
         "horizontal_minimum_delta": threat.nearest,
     }
     vehicle.output.send_event("COLLISION", fields)
+
+
+COPTER = Feature(
+    parameters={
+        "ADSB_ICAO_ID": ("", "address of the vehicle itself, which is no other aircraft"),
+        "ADSB_LIST_ALT": ("m", "difference of height from which other aircraft do not count; 0: any counts"),
+        "ADSB_LIST_RADIUS": ("m", "distance from which other aircraft do not count; 0: any counts"),
+        "ADSB_TYPE": ("", "any value but 0: ADSB_VEHICLE counts"),
+        "AVD_ENABLE": ("", "any value but 0: other aircraft are avoided"),
+        "AVD_F_ACTION": (
+            "",
+            "2 climbs or descends, 3 moves away level, 4 in three axes, 5 returns, 6 hovers",
+        ),
+        "AVD_F_ALT_MIN": ("m", "height above the sea below which other aircraft are reported only; 0: none"),
+        "AVD_F_RCVRY": ("", "mode after that: 0 stays, 1 the one before, 2 RTL, 3 AUTO if it was that"),
+        "AVD_OBS_MAX": ("", "number of other aircraft"),
+        **{
+            f"AVD_{level}_{limit}": (
+                unit,
+                f"{words} of a threat that is {'avoided' if level == 'F' else 'reported'}",
+            )
+            for level in "FW"
+            for limit, unit, words in (
+                ("TIME", "s", "time ahead"),
+                ("DIST_XY", "m", "horizontal distance"),
+                ("DIST_Z", "m", "vertical distance"),
+            )
+        },
+    },
+    modes=(
+        Mode(
+            AVOID_ADSB, "AVOID_ADSB", AUTO_BITS, Guided, LEVEL_AND_HEIGHT, needs_position=True, armable=False
+        ),
+    ),
+    messages={"ADSB_VEHICLE": on_adsb, "GLOBAL_POSITION_INT": on_position},
+    checks=(Check("ADSB threat detected", is_threatened),),
+    on_tick=update_traffic,
+)

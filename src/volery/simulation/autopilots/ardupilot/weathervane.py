@@ -6,12 +6,14 @@ The turned heading is the commanded one while it lasts, so every manoeuvre that 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import copysign, degrees, hypot, radians
 
 from volery.base.elementary import exp, log
 from volery.base.time import Ns, S, to_seconds
+from volery.simulation.autopilots.ardupilot.feature import TICK, Feature
 from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
-from volery.simulation.autopilots.state_groups import NEVER, VaneState
+from volery.simulation.autopilots.state_groups import NEVER, CommandedLimits
 from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.simulation.world.arithmetic import wrap_angle
 
@@ -30,14 +32,32 @@ INFO = 6
 """MAV_SEVERITY."""
 
 
-def turn_into_wind(vehicle: Vehicle, period: Ns) -> None:
-    """Move the commanded heading while the copter weathervanes, and give it back afterwards.
+@dataclass
+class VaneState:
+    """Turning into the wind."""
 
-    Args:
-        vehicle: The vehicle.
-        period: Time since the last call [ns].
-    """
-    vane = vehicle.commanded.vane
+    commanded: CommandedLimits
+    """Limits of the mode in which it began: it begins anew with another mode."""
+    since: Ns = NEVER
+    """Since when [ns] the conditions have held."""
+    turning: bool = False
+    rate: float = 0.0
+    """Rate of the turn, clockwise [degrees/s]."""
+    heading: float = 0.0
+    """Heading that it has commanded, clockwise from north [rad], and the command before it."""
+    before: float | None = None
+
+
+def _vane_of(vehicle: Vehicle) -> VaneState:
+    vane: VaneState | None = vehicle.kept.get(VaneState)
+    if vane is None or vane.commanded is not vehicle.commanded:
+        vane = vehicle.kept[VaneState] = VaneState(vehicle.commanded)
+    return vane
+
+
+def turn_into_wind(vehicle: Vehicle) -> None:
+    """Move the commanded heading while the copter weathervanes, and give it back afterwards."""
+    vane = _vane_of(vehicle)
     if not vehicle.parameters["WVANE_ENABLE"]:
         if vane.since != NEVER:
             _give_back(vehicle, vane)
@@ -55,16 +75,16 @@ def turn_into_wind(vehicle: Vehicle, period: Ns) -> None:
         vane.turning, vane.before = True, vehicle.commanded.yaw
         vane.heading = vehicle.estimate.attitude[2]
         vehicle.send_text(INFO, f"Weathervane Active: {WORDS[side]}")
-    kept = exp(DECAY * to_seconds(period))
+    kept = exp(DECAY * to_seconds(TICK))
     vane.rate = kept * vane.rate + (1.0 - kept) * vehicle.parameters["WVANE_GAIN"] * _rate(vehicle, side)
-    vane.heading = wrap_angle(vane.heading + radians(vane.rate) * to_seconds(period))
+    vane.heading = wrap_angle(vane.heading + radians(vane.rate) * to_seconds(TICK))
     vehicle.commanded.yaw = vane.heading
 
 
 def _give_back(vehicle: Vehicle, vane: VaneState) -> None:
     if vane.turning and vehicle.commanded.yaw == vane.heading:
         vehicle.commanded.yaw = vane.before
-    vehicle.commanded.vane = VaneState()
+    vehicle.kept[VaneState] = VaneState(vehicle.commanded)
 
 
 def _side(vehicle: Vehicle) -> int:
@@ -112,3 +132,23 @@ def _rate(vehicle: Vehicle, side: int) -> float:
     if by_pitch and away > dead:
         size = abs(roll) + away - dead
     return copysign(size, roll if side == NOSE else -roll)
+
+
+COPTER = Feature(
+    parameters={
+        "GUID_OPTIONS": ("", "bit 7 allows weathervaning"),
+        "WVANE_ENABLE": (
+            "",
+            "weathervaning: 1 nose, 2 nose or tail, 3 side, 4 tail into the wind; -1 as below",
+        ),
+        "WVANE_ANG_MIN": ("°", "lean up to which it does not turn"),
+        "WVANE_GAIN": ("°/s per °", "rate of the turn for each degree of lean"),
+        "WVANE_HGT_MIN": ("m", "height above home up to which it does not weathervane"),
+        "WVANE_LAND": ("", "as WVANE_ENABLE, while it lands; -1: as there"),
+        "WVANE_OPTIONS": ("", "bit 0: the pitch turns it, too"),
+        "WVANE_SPD_MAX": ("m/s", "speed in the plane above which it does not weathervane; 0: none"),
+        "WVANE_TAKEOFF": ("", "as WVANE_ENABLE, during a take-off; -1: as there"),
+        "WVANE_VELZ_MAX": ("m/s", "climb or descent above which it does not weathervane; 0: none"),
+    },
+    on_tick=turn_into_wind,
+)

@@ -5,20 +5,22 @@ The line follows the ordered rate exactly, as ArduPilot assumes: nothing hangs o
 
 from __future__ import annotations
 
-from volery.base.time import Ns, to_seconds
+from dataclasses import dataclass
+
+from volery.base.time import to_seconds
+from volery.simulation.autopilots.ardupilot.feature import TICK, Check, Feature, Item, Kept
 from volery.simulation.autopilots.ardupilot.modes import INFO
 from volery.simulation.autopilots.ardupilot.parameters import channel_range
 from volery.simulation.autopilots.ardupilot.servo_outputs import channels, deflect, write
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command
 from volery.simulation.autopilots.onboard_mission import MissionItem
-from volery.simulation.autopilots.state_groups import WinchState
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
 DO_WINCH = 42_600
 WINCH = 88
 """SERVOn_FUNCTION."""
-CONTROL = 45
-"""RCn_OPTION of the channel that sets the rate."""
+WINCH_SWITCH, CONTROL = 44, 45
+"""RCn_OPTION of the switch, and of the channel that sets the rate."""
 SERVO = 1
 """WINCH_TYPE."""
 RELAXED, BY_LENGTH, BY_RATE = 0, 1, 2
@@ -28,6 +30,28 @@ FREE_AT_START, VERBOSE = 1, 2
 FIRST_SWITCH = 5
 LEAST_DEAD_ZONE = 30
 """Dead zone of the channel that sets the rate [us], where RCn_DZ states none."""
+
+
+@dataclass
+class WinchState:
+    """Winch."""
+
+    action: int = 0
+    """WINCH_ACTIONS."""
+    started: bool = False
+    """Whether the first action has been taken."""
+    rate: float = 0.0
+    """Rate that is wanted [m/s], positive out, and the same with limited acceleration."""
+    limited_rate: float = 0.0
+    length: float = 0.0
+    """Line that is out [m], and the length that is wanted."""
+    target: float = 0.0
+    by_pilot: bool = False
+    pilot_pulse: int | None = None
+    """Pulse width [us] of the pilot's channel when it last counted."""
+
+
+winch_of = Kept(WinchState)
 
 
 def _is_there(vehicle: Vehicle) -> bool:
@@ -50,7 +74,7 @@ def _order(vehicle: Vehicle, action: int, length: float, rate: float) -> bool:
     """
     if not _is_there(vehicle):
         return False
-    winch, parameters = vehicle.outputs.winch, vehicle.parameters
+    winch, parameters = winch_of(vehicle), vehicle.parameters
     if action == BY_RATE:
         fastest = parameters["WINCH_RATE_MAX"]
         winch.rate = min(fastest, max(-fastest, rate))
@@ -81,15 +105,15 @@ def switch_winch(vehicle: Vehicle, position: int) -> None:
     _order(vehicle, BY_RATE if position > 0 else RELAXED, 0.0, 0.0)
 
 
-def update_winch(vehicle: Vehicle, tick: Ns) -> None:
+def update_winch(vehicle: Vehicle) -> None:
     """Turn the winch, and pay out the line, at each tick."""
     if not _is_there(vehicle) or not channels(vehicle, WINCH):
         return
-    winch, parameters = vehicle.outputs.winch, vehicle.parameters
+    winch, parameters = winch_of(vehicle), vehicle.parameters
     if not winch.started:
         winch.started = True
         _order(vehicle, RELAXED if round(parameters["WINCH_OPTIONS"]) & FREE_AT_START else BY_RATE, 0.0, 0.0)
-    fastest, seconds = parameters["WINCH_RATE_MAX"], to_seconds(tick)
+    fastest, seconds = parameters["WINCH_RATE_MAX"], to_seconds(TICK)
     _read_pilot(vehicle, winch, fastest)
     if winch.action == RELAXED:
         winch.limited_rate = 0.0
@@ -120,3 +144,26 @@ def _read_pilot(vehicle: Vehicle, winch: WinchState, fastest: float) -> None:
     if winch.by_pilot:
         winch.pilot_pulse = rc[channel]
         winch.rate = travel.deflection(rc[channel]) * fastest
+
+
+def _leave_to_channel(_vehicle: Vehicle, _position: int) -> None:
+    """Do nothing: the pulse width of the channel counts, not its position as a switch."""
+
+
+COPTER = Feature(
+    parameters={
+        "WINCH_OPTIONS": ("", "bit 0: the winch is let go at the start; bit 1: lengths are reported"),
+        "WINCH_POS_P": ("1/s", "rate for each metre of line that is missing"),
+        "WINCH_RATE_MAX": ("m/s", "largest rate of the winch"),
+        "WINCH_TYPE": ("", "1: there is a winch with a servo"),
+    },
+    commands={DO_WINCH: on_winch},
+    items={DO_WINCH: Item("Winch", act_on_winch)},
+    switches={WINCH_SWITCH: switch_winch, CONTROL: _leave_to_channel},
+    checks=(Check("winch unhealthy", no_servo),),
+    on_tick=update_winch,
+)
+ROVER = Feature(
+    items={DO_WINCH: Item("Winch")},  # stored and passed over
+    switches=COPTER.switches,
+)

@@ -124,13 +124,11 @@ class MavlinkEndpoint:
 
     def _mark_high_latency(self, channels: Sequence[MavlinkChannel]) -> None:
         """Note which of these links are of high latency."""
-        numbers = self.firmware.telemetry.high_latency_links
-        slow = numbers(self._vehicle) if numbers is not None else frozenset()
+        links = self.firmware.telemetry.high_latency
+        slow = links.links(self._vehicle) if links is not None else frozenset()
         for channel in channels:
-            channel.silent = self._is_silent if channel.index in slow else None
-
-    def _is_silent(self) -> bool:
-        return not self._vehicle.reports.high_latency
+            carries = links is not None and channel.index in slow
+            channel.silent = partial(links.muted, self._vehicle) if links is not None and carries else None
 
     def disconnect(self, link: Link) -> None:
         """Stop serving *link*."""

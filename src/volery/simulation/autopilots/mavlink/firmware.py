@@ -105,6 +105,14 @@ QuestionHandler = Callable[[Vehicle, dict[str, Any], Peer], None]
 """Answers a message: vehicle, fields, sender."""
 
 
+class HighLatency(NamedTuple):
+    """Links that carry HIGH_LATENCY2 instead of HEARTBEAT, and nothing while they are muted."""
+
+    links: Callable[[Vehicle], frozenset[int]]
+    """Returns their numbers."""
+    muted: Callable[[Vehicle], bool]
+
+
 class BootBytes(NamedTuple):
     """Bytes that are no message, sent a fixed time after boot."""
 
@@ -138,10 +146,8 @@ class TelemetryPolicy:
     """Called with the vehicle, the index of the link, the stream and its rate [Hz]."""
     link_uses: Mapping[str, Mapping[str, Ns]] = field(default_factory=lambda: {"": {}})
     """What a link is used for, to the periods of its unrequested streams. The first use is the default."""
-    high_latency_links: Callable[[Vehicle], frozenset[int]] | None = None
-    """Numbers of the links that carry HIGH_LATENCY2 instead of HEARTBEAT, and nothing until they are switched
-    on (``ReportState.high_latency``); ``None``: there are none.
-    """
+    high_latency: HighLatency | None = None
+    """``None``: the firmware has no such links."""
     least_period: Ns = 3 * MS
     """Shortest period of a stream."""
     intervals_after: Ns = 0

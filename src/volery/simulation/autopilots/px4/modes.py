@@ -488,14 +488,14 @@ class Commander:
     def stop_motors(self) -> None:
         """Stop the motors, armed or not; the vehicle stays armed and cannot be armed again."""
         self.terminated = True
-        if self.vehicle.switches.motors_stopped_at == NEVER:
-            self.vehicle.switches.motors_stopped_at = self.vehicle.kernel.now()
+        if self.vehicle.arming.motors_stopped_at == NEVER:
+            self.vehicle.arming.motors_stopped_at = self.vehicle.kernel.now()
         self.vehicle.run_manoeuvre()
 
     def release_motors(self) -> None:
         """Let the motors turn again."""
         self.terminated = False
-        self.vehicle.switches.motors_stopped_at = NEVER
+        self.vehicle.arming.motors_stopped_at = NEVER
 
     def terminate(self) -> None:
         """Enter the mode TERMINATION, which nothing leaves, and stop the motors."""

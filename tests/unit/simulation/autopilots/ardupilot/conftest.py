@@ -31,7 +31,13 @@ class ArduPilotStation(Station):
             self.run(0.1)
 
 
+class FullStation(ArduPilotStation):
+    """One with all features on."""
+
+    features = "all"
+
+
 @pytest.fixture
-def station() -> type[ArduPilotStation]:
+def station(request: pytest.FixtureRequest) -> type[ArduPilotStation]:
     """Makes vehicles: ``station("rover", warm=False)`` a rover that boots."""
-    return ArduPilotStation
+    return FullStation if request.node.get_closest_marker("optional") else ArduPilotStation

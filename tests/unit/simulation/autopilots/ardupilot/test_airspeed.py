@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 REQUEST, VFR_HUD, SYS_STATUS = 512, 74, 1
 DIFFERENTIAL_PRESSURE, GPS, PROXIMITY, BATTERY = 1 << 4, 1 << 5, 1 << 26, 1 << 25
 

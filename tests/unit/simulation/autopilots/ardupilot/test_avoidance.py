@@ -9,7 +9,14 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as some
 
-from volery.simulation.autopilots.ardupilot.avoidance import Law, _to_crossing, _within_circle, _within_edges
+from volery.simulation.autopilots.ardupilot.avoidance import (
+    Law,
+    _to_crossing,
+    _within_circle,
+    _within_edges,
+    avoidance_of,
+)
+from volery.simulation.autopilots.ardupilot.fence import fence_of
 from volery.simulation.autopilots.ardupilot.fence_shapes import Circle, Polygon
 
 SLIDE, STOP, ROVER = Law(1.0, 1.0, False), Law(1.0, 1.0, True), Law(0.0, 0.5, True)
@@ -160,7 +167,7 @@ def test_a_copter_stands_before_a_wall(behaviour: int, flying: Any) -> None:
 def test_without_avoidance_it_flies_on(parameters: dict[str, float], flying: Any) -> None:
     rig = flying(LOITER, **parameters)
     if "RC7_OPTION" in parameters:
-        rig.vehicle.avoidance.by_proximity = False
+        avoidance_of(rig.vehicle).by_proximity = False
     fly(rig, 25.0, 1400, wall=25.0)
     assert rig.vehicle.estimate.position[0] > 28.0
 
@@ -251,4 +258,4 @@ def test_a_rover_on_its_way_to_a_point_stands_before_an_exclusion(station: Any) 
     north, east, _ = rig.vehicle.estimate.position
     assert north == pytest.approx(18.0, abs=0.7)
     assert abs(east) < 1.0
-    assert not rig.vehicle.fence.breached
+    assert not fence_of(rig.vehicle).breached

@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 ARM = 400
 ARMING, EMERGENCY_STOP = 153, 31
 BUTTON = {"BTN_ENABLE": 1.0, "BTN_PIN4": 3.0}

@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
+
 REQUEST_MESSAGE, FEEDBACK, AUX_FUNCTION = 512, 180, 218
 CONFIGURE, CONTROL, TRIGGER_DISTANCE, START, STOP = 202, 203, 206, 2000, 2001
 CAMERA = {"CAM1_TYPE": 1, "SERVO9_FUNCTION": 10}
@@ -27,14 +29,14 @@ def pictures(rig: Any) -> list[int]:
 
 
 def test_a_command_presses_the_trigger_and_reports_the_place(rig: Any) -> None:
-    assert rig.vehicle.outputs.servos[9] == RELEASED
+    assert outputs_of(rig.vehicle).servos[9] == RELEASED
     assert rig.command(CONTROL, 0, 0, 0, 0, 1) == 0
-    assert rig.vehicle.outputs.servos[9] == PRESSED
+    assert outputs_of(rig.vehicle).servos[9] == PRESSED
     report = rig.latest["CAMERA_FEEDBACK"]
     assert report["img_idx"] == 1
     assert report["lat"] == pytest.approx(rig.vehicle.estimate.geodetic[0] * 1e7, abs=20)
     rig.run(0.3)
-    assert rig.vehicle.outputs.servos[9] == RELEASED
+    assert outputs_of(rig.vehicle).servos[9] == RELEASED
     assert rig.command_int(CONTROL, x=1, y=0, z=0.0, frame=0) == 0
     assert rig.command(CONTROL, 0, 0, 0, 0, 0) == 0  # no shooting command
     assert pictures(rig) == [1, 2]

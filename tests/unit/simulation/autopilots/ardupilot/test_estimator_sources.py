@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from volery.simulation.autopilots.ardupilot.estimator_sources import sources_of
+
 SET_SOURCES, ARM, REQUEST_MESSAGE, GPS_RAW_INT, AUX_FUNCTION = 42_007, 400, 512, 24, 218
 ACCEPTED, DENIED, FAILED = 0, 2, 4
 GUIDED, FIX_3D = 4, 3
@@ -40,4 +42,4 @@ def test_a_switch_chooses_the_set(station: Any) -> None:
     rig.run(0.5)
     for position, ignored in ((2, True), (0, False), (1, True)):
         assert rig.command(AUX_FUNCTION, 90, position) == ACCEPTED
-        assert rig.vehicle.switches.satellites_ignored is ignored
+        assert sources_of(rig.vehicle).ignored is ignored

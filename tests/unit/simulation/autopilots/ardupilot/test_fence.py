@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from volery.simulation.autopilots.ardupilot.fence import fence_of
+
 ENABLE = 207
 GEOFENCE = 1 << 20
 ON = {"FENCE_ENABLE": 1, "FENCE_TYPE": 7}
@@ -40,10 +42,10 @@ def test_without_a_fence_no_limit_forbids_arming(station: Any) -> None:
 def test_the_floor_counts_after_the_command_only(station: Any) -> None:
     rig = station(parameters={"FENCE_ENABLE": 1, "FENCE_TYPE": 15, "FENCE_ALT_MIN": 5, "FENCE_ALT_MAX": 50})
     rig.run(0.5)
-    assert not rig.vehicle.fence.breached
+    assert not fence_of(rig.vehicle).breached
     rig.command(ENABLE, 1)
     rig.run(0.5)
-    assert list(rig.vehicle.fence.breached) == [8]
+    assert list(fence_of(rig.vehicle).breached) == [8]
     rig.command(512, 1)
     assert not rig.latest["SYS_STATUS"]["onboard_control_sensors_health"] & GEOFENCE
     assert rig.latest["SYS_STATUS"]["onboard_control_sensors_enabled"] & GEOFENCE

@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 ARM, MODE, TAKEOFF, AUX = 400, 176, 22, 218
 ALT_HOLD, GUIDED, LOITER, FLIP = 2, 4, 5, 14
 

@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 FOLLOW, GUIDED, SET_MODE, ARM, TAKEOFF = 23, 4, 176, 400, 22
 LEAD = 77
 HEIGHT = 20.0

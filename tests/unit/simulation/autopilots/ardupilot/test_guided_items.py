@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 AUTO = {"copter": 3, "rover": 10}
 SPEEDS_ONLY = 0b110111000111
 """``type_mask`` of SET_POSITION_TARGET_LOCAL_NED: velocity alone."""

@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 REQUEST, INTERVAL, CONTROL, ARM, TAKEOFF, MODE = 512, 511, 2600, 400, 22, 176
 HIGH_LATENCY2, HEARTBEAT = 235, 0
 GPS, DIFFERENTIAL_PRESSURE = 1, 2

@@ -6,6 +6,10 @@ from typing import Any
 
 import pytest
 
+from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
+
+pytestmark = pytest.mark.optional
+
 CONFIGURE, AUX_FUNCTION, REQUEST_MESSAGE = 2520, 218, 512
 SERVO_OUTPUT_RAW = 36
 GEAR = {
@@ -19,7 +23,7 @@ UP, DOWN = 1001, 1999
 
 
 def output(rig: Any) -> int | None:
-    pulse: int | None = rig.vehicle.outputs.servos.get(10)
+    pulse: int | None = outputs_of(rig.vehicle).servos.get(10)
     return pulse
 
 

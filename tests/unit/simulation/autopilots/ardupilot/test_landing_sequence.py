@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 TARGET = {"target_system": 1, "target_component": 1}
 ARM, MISSION_START, LAND_START, SET_CURRENT = 400, 300, 189, 224
 ACCEPTED, FAILED = 0, 4

@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 MOTOR_TEST, ARM = 209, 400
 PERCENT, PULSE, PILOT = 0, 1, 2
 

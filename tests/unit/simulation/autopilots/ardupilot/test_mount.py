@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 
 from volery.base.frames import quaternion_to_euler
+from volery.simulation.autopilots.ardupilot.mount import mount_state
+from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
 
 REQUEST_MESSAGE, ATTITUDE_STATUS, MANAGER_STATUS, MANAGER_INFORMATION = 512, 285, 281, 280
 CONFIGURE, CONTROL, PITCHYAW, MANAGE, ROI, ROI_NONE, ROI_SYSTEM = 204, 205, 1000, 1001, 195, 197, 198
@@ -59,7 +61,7 @@ def test_the_pilot_points_it_by_angle_and_by_rate(rig: Any) -> None:
     assert angles(rig) == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
     rig.vehicle.rc.transmitter[5] = 1700
     assert angles(rig)[1] == pytest.approx(18.0, abs=0.1)
-    assert rig.vehicle.outputs.servos[10] == pytest.approx(1660, abs=2)
+    assert outputs_of(rig.vehicle).servos[10] == pytest.approx(1660, abs=2)
     rig.vehicle.set_parameter("MNT1_RC_RATE", 10.0)
     before = angles(rig)[1]
     rig.run(2.0)
@@ -92,10 +94,10 @@ def test_retracted_and_neutral_angles_are_parameters(rig: Any) -> None:
     rig.vehicle.set_parameter("MNT1_RETRACT_Y", -33.0)
     assert rig.command(CONFIGURE, RETRACT) == 0
     assert angles(rig)[1] == pytest.approx(-33.0, abs=0.01)
-    assert rig.vehicle.outputs.servos[12] == 1100
+    assert outputs_of(rig.vehicle).servos[12] == 1100
     assert rig.command(CONFIGURE, NEUTRAL) == 0
     assert angles(rig) == (0.0, 0.0, 0.0)
-    assert rig.vehicle.outputs.servos[12] == 1900
+    assert outputs_of(rig.vehicle).servos[12] == 1900
 
 
 def test_a_place_keeps_its_direction_as_the_nose_turns(rig: Any) -> None:
@@ -110,10 +112,10 @@ def test_a_place_keeps_its_direction_as_the_nose_turns(rig: Any) -> None:
 
 def test_a_region_of_interest_is_for_the_mount_or_for_the_nose(rig: Any) -> None:
     assert rig.command(ROI, 0, 0, 0, 0, 46.001, 7.0, 0.0) == 0
-    assert rig.vehicle.outputs.mount.mode == AT_POINT
+    assert mount_state(rig.vehicle).mode == AT_POINT
     assert rig.vehicle.commanded.look_at is None
     assert rig.command(ROI_NONE) == 0
-    assert rig.vehicle.outputs.mount.mode == BY_PILOT  # MNT1_DEFLT_MODE
+    assert mount_state(rig.vehicle).mode == BY_PILOT  # MNT1_DEFLT_MODE
     rig.vehicle.set_parameter("SERVO11_FUNCTION", 0.0)
     assert rig.command(ROI, 0, 0, 0, 0, 46.001, 7.0, 0.0) == 0
     assert rig.vehicle.commanded.look_at is not None
@@ -144,7 +146,7 @@ def test_the_gimbal_manager_takes_angles_rates_and_flags(rig: Any) -> None:
     assert -27.0 < angles(rig)[1] < -22.0
     assert rig.command(PITCHYAW, NAN, NAN, NAN, NAN) == 4
     assert rig.command(PITCHYAW, 0, 0, 0, 0, 2) == 0
-    assert rig.vehicle.outputs.mount.mode == NEUTRAL
+    assert mount_state(rig.vehicle).mode == NEUTRAL
     assert rig.command(PITCHYAW, 0, 0, 0, 0, 0, 0, 3) == 4
 
 
@@ -190,6 +192,6 @@ def test_outputs_compensate_the_lean_and_the_report_does_not(rig: Any) -> None:
     rig.run_until(lambda: rig.vehicle.estimate.attitude[1] < -0.1, 20.0)
     rig.run(0.1)
     lean = degrees(rig.vehicle.estimate.attitude[1])
-    turned = (rig.vehicle.outputs.servos[10] - 1500) / 800 * 90.0
+    turned = (outputs_of(rig.vehicle).servos[10] - 1500) / 800 * 90.0
     assert turned == pytest.approx(-lean, abs=3.0)
     assert angles(rig)[1] == pytest.approx(0.0, abs=0.01)

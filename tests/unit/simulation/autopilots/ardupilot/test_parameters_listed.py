@@ -34,13 +34,13 @@ def asked(rig: Any, name: str) -> Any:
 def test_a_parameter_of_a_subsystem_that_is_off_is_read_by_name(
     station: Any, name: str, default: float
 ) -> None:
-    rig = station("copter")
+    rig = station("copter", features="all")
     answer = asked(rig, name)
     assert (answer["param_value"], answer["param_count"]) == (default, RECORDED_COUNT)
 
 
 def test_switching_the_gripper_on_lists_its_parameters_without_a_reboot(station: Any) -> None:
-    rig = station("copter")
+    rig = station("copter", features="all")
     rig.send(
         "PARAM_SET",
         target_system=1,

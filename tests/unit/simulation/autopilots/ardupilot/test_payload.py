@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
+
 ACCEPTED, FAILED = 0, 4
 AUTO, RELAY, GRIPPER, REQUEST_MESSAGE, RELAY_STATUS = 10, 181, 211, 512, 376
 
@@ -84,22 +86,25 @@ def over_time(rig: Any, of: Any) -> list[Any]:
 def test_a_repeated_relay_goes_on_and_off_and_ends_as_it_was(station: Any) -> None:
     rig = station("rover", parameters={"RELAY1_FUNCTION": 1})
     assert rig.command(REPEAT_RELAY, 0, 1, 1.0) == ACCEPTED
-    assert over_time(rig, lambda: 0 in rig.vehicle.outputs.relays) == [True, False, False, False]
+    assert over_time(rig, lambda: 0 in outputs_of(rig.vehicle).relays) == [True, False, False, False]
     assert rig.command(REPEAT_RELAY, 0, -1, 1.0) == ACCEPTED  # without end
     rig.run(20.0)
-    assert over_time(rig, lambda: 0 in rig.vehicle.outputs.relays) in ([True, False] * 2, [False, True] * 2)
+    assert over_time(rig, lambda: 0 in outputs_of(rig.vehicle).relays) in (
+        [True, False] * 2,
+        [False, True] * 2,
+    )
     assert rig.command(RELAY, 0, 1) == ACCEPTED  # ends the repetition
-    assert over_time(rig, lambda: 0 in rig.vehicle.outputs.relays) == [True] * 4
+    assert over_time(rig, lambda: 0 in outputs_of(rig.vehicle).relays) == [True] * 4
     assert rig.command(REPEAT_RELAY, 3, 1, 1.0) == FAILED
 
 
 def test_a_repeated_servo_goes_to_its_pulse_and_back_to_the_trim(station: Any) -> None:
     rig = station("rover", parameters={"SERVO11_TRIM": 1400})
     assert rig.command(REPEAT_SERVO, 11, 1700, 2, 1.0) == ACCEPTED
-    assert over_time(rig, lambda: rig.vehicle.outputs.servos[11]) == [1700, 1400, 1700, 1400]
+    assert over_time(rig, lambda: outputs_of(rig.vehicle).servos[11]) == [1700, 1400, 1700, 1400]
     assert rig.command(REPEAT_SERVO, 11, 1700, 5, 1.0) == ACCEPTED
     assert rig.command(SET_SERVO, 11, 1200) == ACCEPTED  # ends the repetition
-    assert over_time(rig, lambda: rig.vehicle.outputs.servos[11]) == [1200] * 4
+    assert over_time(rig, lambda: outputs_of(rig.vehicle).servos[11]) == [1200] * 4
 
 
 def test_a_reboot_ends_a_repetition(station: Any) -> None:
@@ -107,7 +112,7 @@ def test_a_reboot_ends_a_repetition(station: Any) -> None:
     assert rig.command(REPEAT_RELAY, 0, -1, 1.0) == ACCEPTED
     assert rig.command(246, 1) == ACCEPTED
     rig.run(0.1)
-    assert over_time(rig, lambda: 0 in rig.vehicle.outputs.relays) == [False] * 4
+    assert over_time(rig, lambda: 0 in outputs_of(rig.vehicle).relays) == [False] * 4
 
 
 def test_a_boot_switches_relays_to_their_defaults_and_keeps_the_other_pins(station: Any) -> None:
@@ -117,4 +122,4 @@ def test_a_boot_switches_relays_to_their_defaults_and_keeps_the_other_pins(stati
     rig = station("rover", warm=False, parameters=pins)
     rig.run(3.0)
     assert rig.vehicle.parameters["SIM_PIN_MASK"] == 0b11101
-    assert rig.vehicle.outputs.relays == {1}
+    assert outputs_of(rig.vehicle).relays == {1}

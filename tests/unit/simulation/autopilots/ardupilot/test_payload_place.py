@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 PLACE, AUTO, TAKEOFF, LAND = 94, 3, 22, 21
 GRIPPER = {"GRIP_ENABLE": 1, "AUTO_OPTIONS": 3}
 THERE = {"x": 460_002_000, "y": 70_000_000, "z": 10.0}

@@ -6,7 +6,7 @@ from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
 from volery.simulation.autopilots.ardupilot import FIRMWARE
-from volery.simulation.autopilots.ardupilot.pilot_input import sticks_rest
+from volery.simulation.autopilots.ardupilot.pilot_input import sticks_rest, switches_of
 from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor
@@ -24,10 +24,10 @@ def test_sticks_are_read_again_after_a_channel_or_a_parameter_has_changed() -> N
     assert sticks_rest(vehicle)
     assert vehicle.set_parameter("RC6_OPTION", 11.0)
     assert not sticks_rest(vehicle)
-    vehicle.switches.mode = -1  # a switch of modes was released: the mode switch counts again
+    switches_of(vehicle).mode = -1  # a switch of modes was released: the mode switch counts again
     assert not sticks_rest(vehicle)
     kernel.run(6 * S)
-    assert vehicle.switches.mode == vehicle.switches.read
+    assert switches_of(vehicle).mode == switches_of(vehicle).read
     assert sticks_rest(vehicle)
 
 

@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from volery.simulation.autopilots.ardupilot.pilot_input import switches_of
+
 ARM, GUIDED, HOLD, YAW_SPEED = 400, 15, 4, 213
 
 
@@ -52,4 +54,4 @@ def test_a_rover_that_holds_does_not_steer(station: Any) -> None:
     rig.vehicle.rc.transmitter[0] = 1900
     rig.vehicle.enter_mode(rig.vehicle.rules.modes[HOLD])
     rig.run(0.3)
-    assert rig.vehicle.switches.mixed_steering == (0.0, 0.0)
+    assert switches_of(rig.vehicle).mixed_steering == (0.0, 0.0)

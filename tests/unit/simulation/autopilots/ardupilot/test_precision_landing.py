@@ -9,7 +9,9 @@ import pytest
 
 from volery.base.frames import world_to_body
 from volery.base.time import MS
-from volery.simulation.autopilots.ardupilot import dataflash
+from volery.simulation.autopilots.ardupilot.dataflash import encode
+from volery.simulation.autopilots.ardupilot.feature import build_of
+from volery.simulation.autopilots.ardupilot.precision_landing import precision_of
 from volery.simulation.autopilots.ardupilot.versions import V4_5
 
 ARM, MODE, TAKEOFF, AUX = 400, 176, 22, 218
@@ -86,7 +88,7 @@ def test_the_range_finder_gives_the_distance_that_the_message_lacks(flying: Any)
     rig = flying(RNGFND1_TYPE=1, RNGFND1_MAX_CM=4000)
     shows(rig, 3.0, 0.0, distance=False)
     rig.run(3.0)
-    assert rig.vehicle.precision.place == pytest.approx((3.0, 0.0), abs=0.3)
+    assert precision_of(rig.vehicle).place == pytest.approx((3.0, 0.0), abs=0.3)
 
 
 def test_a_target_that_is_lost_no_longer_counts(flying: Any) -> None:
@@ -131,7 +133,9 @@ def test_a_simulated_beacon_is_seen_by_the_range_finder_and_logged(kind: int, fl
     rig.run_until(lambda: not rig.vehicle.armed)
     rig.run(0.5)
     assert from_target(rig, 4.0, 0.0) < 0.6  # the parameters are single precision
-    assert b"\xa3\x95" + bytes([dataflash.PL.number]) in dataflash.encode(rig.vehicle.logs[0], V4_5)
+    forms = build_of(rig.vehicle).log_forms
+    number = next(form.number for form in forms if form.name == "PL")
+    assert b"\xa3\x95" + bytes([number]) in encode(rig.vehicle.logs[0], V4_5, forms)
 
 
 def test_without_precision_landing_the_message_means_nothing(flying: Any) -> None:

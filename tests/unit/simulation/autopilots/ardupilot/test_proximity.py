@@ -10,6 +10,7 @@ import pytest
 from pymavlink import DFReader
 
 from volery.simulation.autopilots.ardupilot.dataflash import encode
+from volery.simulation.autopilots.ardupilot.feature import build_of
 from volery.simulation.autopilots.ardupilot.proximity import edges
 from volery.simulation.autopilots.ardupilot.versions import V4_5
 
@@ -235,7 +236,7 @@ def test_the_log_on_board_has_the_distances(station: Any, tmp_path: Path) -> Non
     assert rig.command(ARM, 0.0) == 0
     rig.run(0.3)
     file = tmp_path / "1.bin"
-    file.write_bytes(encode(rig.vehicle.logs[0], V4_5))
+    file.write_bytes(encode(rig.vehicle.logs[0], V4_5, build_of(rig.vehicle).log_forms))
     found: dict[str, Any] = {}
     log = DFReader.DFReader_binary(str(file))
     while (message := log.recv_msg()) is not None:

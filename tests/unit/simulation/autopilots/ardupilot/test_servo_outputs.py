@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
+
 SCALED_7 = {
     "SERVO9_FUNCTION": 146,
     "SERVO9_MIN": 1000,
@@ -19,7 +21,7 @@ SCALED_7 = {
 
 def output(rig: Any, channel: int = 9) -> int:
     rig.run(0.3)
-    return int(rig.vehicle.outputs.servos[channel])
+    return int(outputs_of(rig.vehicle).servos[channel])
 
 
 def test_pulses_pass_as_they_are(station: Any) -> None:

@@ -6,6 +6,11 @@ from typing import Any
 
 import pytest
 
+from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
+from volery.simulation.autopilots.ardupilot.sprayer import sprayer_of
+
+pytestmark = pytest.mark.optional
+
 AUX_FUNCTION, SET_MODE, ARM, TAKEOFF, DO_SPRAYER = 218, 176, 400, 22, 216
 SPRAYER = {
     "SPRAY_ENABLE": 1,
@@ -19,7 +24,7 @@ STOPPED = (1050, 975)
 
 
 def outputs(rig: Any) -> tuple[int | None, int | None]:
-    servos = rig.vehicle.outputs.servos
+    servos = outputs_of(rig.vehicle).servos
     return servos.get(9), servos.get(10)
 
 
@@ -44,7 +49,7 @@ def test_without_a_sprayer_nothing_runs(station: Any) -> None:
     assert rig.command(DO_SPRAYER, 1) == 0
     rig.run(0.5)
     assert outputs(rig) == STOPPED
-    assert not rig.vehicle.outputs.sprayer.running
+    assert not sprayer_of(rig.vehicle).running
 
 
 def test_a_switch_tests_the_pump_of_a_disarmed_vehicle(station: Any) -> None:

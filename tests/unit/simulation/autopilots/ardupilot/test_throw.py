@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 ARM, MODE, THROW, RTL, BRAKE, AUTO = 400, 176, 18, 6, 17, 3
 STAGES = [
     "waiting for throw",

@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 ARM, TAKEOFF, MODE = 400, 22, 176
 AVOIDING = {"AVD_ENABLE": 1, "ADSB_TYPE": 1, "AVD_F_ACTION": 2, "ARMING_CHECK": 1}
 GUIDED, LOITER, RTL, AVOID_ADSB = 4, 5, 6, 19

@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+pytestmark = pytest.mark.optional
+
 GUIDED, SET_MODE, ARM, TAKEOFF, CONDITION_YAW = 4, 176, 400, 22, 115
 NOSE, NOSE_OR_TAIL, SIDE, TAIL = 1, 2, 3, 4
 WIND = {"SIM_WIND_SPD": 10, "SIM_WIND_DIR": 100, "GUID_OPTIONS": 128, "WVANE_GAIN": 3}

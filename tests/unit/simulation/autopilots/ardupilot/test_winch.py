@@ -6,13 +6,18 @@ from typing import Any
 
 import pytest
 
+from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
+from volery.simulation.autopilots.ardupilot.winch import winch_of
+
+pytestmark = pytest.mark.optional
+
 DO_WINCH, ARM, AUX_FUNCTION = 42_600, 400, 218
 WINCH = {"WINCH_TYPE": 1, "SERVO9_FUNCTION": 88, "RC9_OPTION": 45}
 RELAXED, BY_LENGTH, BY_RATE = 0, 1, 2
 
 
 def output(rig: Any) -> int | None:
-    pulse: int | None = rig.vehicle.outputs.servos.get(9)
+    pulse: int | None = outputs_of(rig.vehicle).servos.get(9)
     return pulse
 
 
@@ -46,7 +51,7 @@ def test_a_length_is_paid_out_and_hauled_in(station: Any) -> None:
     assert output(rig) == 1900
     rig.run(9.0)
     assert output(rig) == 1500
-    assert rig.vehicle.outputs.winch.length == pytest.approx(2.0, abs=0.01)
+    assert winch_of(rig.vehicle).length == pytest.approx(2.0, abs=0.01)
     assert rig.command(DO_WINCH, 1, BY_LENGTH, -0.5) == 0
     rig.run(0.5)
     assert (output(rig) or 0) < 1500
