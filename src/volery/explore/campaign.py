@@ -11,7 +11,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -91,6 +91,7 @@ class Campaign:
     ) -> None:
         self.folder = Path(folder)
         self._model, self._on, self._workers, self._show = model, on, workers, show
+        self._engine: tuple[Executor, int] | None = None
         self._store = CampaignStore(self.folder)
         self.stated = self._store.specification()
 
@@ -108,8 +109,15 @@ class Campaign:
         self.close()
 
     def close(self) -> None:
-        """Close the files."""
+        """Close the files and leave the engine."""
+        self.leave_engine()
         self._store.close()
+
+    def leave_engine(self) -> None:
+        """End the processes of the engine, or leave the cluster. The next run opens it again."""
+        engine, self._engine = self._engine, None
+        if engine is not None:
+            engine[0].shutdown(wait=sys.exc_info()[0] is None, cancel_futures=True)
 
     # -- reading
 
@@ -196,6 +204,8 @@ class Campaign:
     def evaluate(self, points: Sequence[Point]) -> list[Row]:
         """Run points and return their rows, in the order of *points*; rows that exist are not made again.
 
+        The engine stays open for more of them until ``close``.
+
         Raises:
             UsageError: The model or volery is not the one that the campaign began with, another process
                 writes the campaign, or the engine is not there.
@@ -252,7 +262,9 @@ class Campaign:
             )
 
     def _run_unfinished(self) -> None:
-        executor, workers = open_executor(self._on, self._workers)
+        if self._engine is None:
+            self._engine = open_executor(self._on, self._workers)
+        executor, workers = self._engine
         waiting: dict[Future[Row], int] = {}
         unfinished = self._store.unfinished()
         progress = _ProgressClock(self._store, self._show)
@@ -275,8 +287,9 @@ class Campaign:
                 for one in done:
                     del waiting[one]
                     finished.append(self._result(one, finished))
-        finally:
-            executor.shutdown(wait=sys.exc_info()[0] is None, cancel_futures=True)
+        except BaseException:
+            self.leave_engine()
+            raise
 
     def _result(self, done: Future[Row], finished: Sequence[Row]) -> Row:
         """Return the row of a finished run. If the engine failed, keep the other rows first."""
@@ -372,6 +385,7 @@ def explore(
         model, out, space, specification=specification, on=on, workers=workers, show=show, **stated
     )
     campaign.run(campaign.specification.run_points())
+    campaign.leave_engine()
     with suppress(MissingExtraError):
         campaign.export()
     return campaign

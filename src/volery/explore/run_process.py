@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import atexit
 import ctypes
+import gc
 import hashlib
 import os
 import pickle
@@ -28,6 +29,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import recv_handle, send_handle
 from pathlib import Path
 from typing import Any, Final
 
@@ -169,7 +171,7 @@ def execute(task: Task) -> Row:
             f"{task.setting.version}: install the same version on both"
         )
     for attempt in range(ATTEMPTS):
-        with _processes.taken() as process:
+        with _processes.taken(task) as process:
             row = process.make(task)
         if row is not None:
             return replace(row, attempt=task.attempt + attempt)
@@ -188,8 +190,12 @@ def _ended(task: Task, status: str, reason: str, wall_s: float, attempt: int = 1
     )
 
 
-class RunProcess:
-    """A child process that makes one run after another."""
+class _Template:
+    """A process that has read and compiled what runs need, and forks those that make them.
+
+    So nothing is compiled twice, and what replaces a process that died begins at once. It has no threads. It
+    dies with the thread that has started it, and those that it has forked die with it.
+    """
 
     def __init__(self) -> None:
         ours, theirs = socket.socketpair()
@@ -198,7 +204,7 @@ class RunProcess:
                 f"import sys; sys.path[:] = {sys.path!r}; from volery.explore.run_process import main; "
                 f"main({theirs.fileno()}, {os.getpid()})"
             )
-            self._child = subprocess.Popen(
+            self._process = subprocess.Popen(
                 [sys.executable, "-c", script],
                 env={"OPENBLAS_NUM_THREADS": "1", **os.environ},  # more threads, other last bits
                 pass_fds=[theirs.fileno()],
@@ -208,11 +214,62 @@ class RunProcess:
                 start_new_session=True,  # Ctrl-C reaches the coordinator, which ends the campaign in order
             )
         self._link = Connection(ours.detach())
+        self._guard = threading.Lock()
+
+    @property
+    def alive(self) -> bool:
+        """Whether it can fork."""
+        return self._process.poll() is None
+
+    def fork(self, task: Task) -> tuple[int, Connection]:
+        """Return number and link of a new process for runs such as *task*. Raises ``OSError`` if it died."""
+        ours, theirs = socket.socketpair()
+        with self._guard, theirs:
+            self._link.send((_FORK, task))
+            send_handle(self._link, theirs.fileno(), self._process.pid)
+            if not self._link.poll(BEGIN_S):
+                self.kill()
+                raise TimeoutError("it does not answer")
+            return self._link.recv(), Connection(ours.detach())
+
+    def exit_status(self, pid: int) -> int | None:
+        """Return how a process ended, None if it has not; as if killed where that cannot be known."""
+        try:
+            with self._guard:
+                self._link.send((_WAIT, pid))
+                status: int | None = self._link.recv()
+                return status
+        except (EOFError, OSError):
+            return -signal.SIGKILL
+
+    def kill(self) -> None:
+        """End it and what it has forked."""
+        self._process.kill()
+        self._process.wait()
+
+
+_FORK, _WAIT = "fork", "wait"
+
+
+class RunProcess:
+    """A process that makes one run after another.
+
+    Args:
+        template: What forks it.
+        task: Its first run.
+    """
+
+    def __init__(self, template: _Template, task: Task) -> None:
+        self._template = template
+        self._status: int | None = None
+        self._pid, self._link = template.fork(task)
 
     @property
     def alive(self) -> bool:
         """Whether it can take a run."""
-        return self._child.poll() is None
+        if self._status is None:
+            self._status = self._template.exit_status(self._pid)
+        return self._status is None
 
     def make(self, task: Task) -> Row | None:
         """Return the row of a run; None if the process was killed from outside."""
@@ -247,23 +304,25 @@ class RunProcess:
             left = max(0.0, until - time.monotonic())
             if self._link.poll(min(left, LOOK_EVERY_S) if memory_mb else left):
                 return self._link.recv()
-            if memory_mb and _resident_mb(self._child.pid) > memory_mb:
+            if memory_mb and _resident_mb(self._pid) > memory_mb:
                 return OVER_MEMORY
             if left <= 0.0:
                 return OVER_TIME
 
     def kill(self) -> None:
         """End the process, whatever it does."""
-        self._child.kill()
-        self._child.wait()
+        if self.alive:  # and until its status has been asked for, no other gets its number
+            os.kill(self._pid, signal.SIGKILL)
 
     def _exit_status(self) -> int:
         """Return how a process ended that has closed its end of the link."""
-        try:
-            return self._child.wait(DEATH_S)
-        except subprocess.TimeoutExpired:
-            self._child.kill()
-            return self._child.wait()
+        until = time.monotonic() + DEATH_S
+        while self.alive:
+            if time.monotonic() > until:
+                self.kill()
+            time.sleep(LOOK_EVERY_S)
+        assert self._status is not None, "it has ended"
+        return self._status
 
 
 def _resident_mb(pid: int) -> float:
@@ -277,48 +336,61 @@ def _resident_mb(pid: int) -> float:
 
 
 class _Processes:
-    """The child processes of this process: one for each run at a time, kept for the next runs.
-
-    They are started by a thread that lives as long as this process: they die with the thread that has started
-    them, so that no signal to this process leaves one behind.
-    """
+    """The processes of this process: one for each run at a time, kept for the next runs."""
 
     def __init__(self) -> None:
         self._guard = threading.Lock()
         self._idle: list[RunProcess] = []
-        self._busy: set[RunProcess] = set()
         self._stops = 0
+        self._template: _Template | None = None
         self._starter: ThreadPoolExecutor | None = None
 
     @contextmanager
-    def taken(self) -> Iterator[RunProcess]:
-        """Return a process for one run."""
+    def taken(self, task: Task) -> Iterator[RunProcess]:
+        """Return a process for a run."""
+        stops = self._stops
         with self._guard:
-            stops = self._stops
             process = self._idle.pop() if self._idle else None
             if process is None or not process.alive:
-                if self._starter is None:
-                    self._starter = ThreadPoolExecutor(1, "starts-run-processes")
-                    atexit.register(self.stop)
-                process = self._starter.submit(RunProcess).result()
-            self._busy.add(process)
+                process = self._new(task, stops)
         try:
             yield process
         finally:
             with self._guard:
-                self._busy.discard(process)
-                if process.alive and stops == self._stops:
+                if stops == self._stops and process.alive:
                     self._idle.append(process)
+        self._check(stops)
+
+    def _new(self, task: Task, stops: int) -> RunProcess:
+        """Return a new process; its template is started anew if it died."""
+        for _ in range(ATTEMPTS):
+            self._check(stops)
+            if self._template is None or not self._template.alive:
+                if self._starter is None:
+                    self._starter = ThreadPoolExecutor(1, "starts-templates")  # a thread that stays
+                    atexit.register(self.stop)
+                self._template = self._starter.submit(_Template).result()
+                if stops != self._stops:
+                    self._template.kill()
+                    continue
+            with suppress(EOFError, OSError):  # it was killed meanwhile
+                return RunProcess(self._template, task)
+        self._check(stops)
+        raise VoleryError("the process that reads the model was killed twice, as when memory is short")
+
+    def _check(self, stops: int) -> None:
+        """Raise ``StoppedError`` if the processes have been stopped since."""
         if stops != self._stops:
             raise StoppedError("the campaign was stopped during this run")
 
     def stop(self) -> None:
-        """See ``stop_processes``."""
+        """See ``stop_processes``. It does not wait for what is being read or compiled."""
+        self._stops += 1
+        if self._template is not None:
+            self._template.kill()
         with self._guard:
-            self._stops += 1
-            idle, self._idle = self._idle, []
-            for process in (*idle, *self._busy):
-                process.kill()
+            self._idle = []
+            self._template = None
 
 
 _processes = _Processes()
@@ -328,37 +400,69 @@ _processes = _Processes()
 
 
 def main(descriptor: int, parent: int) -> None:
-    """Make runs as they come over a connection, until it is closed."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it died before the call above
-        return
-    link = Connection(descriptor)
-    child = _Child(lambda: link.send(BEGINS))
+    """Be a template: fork processes, and say how they ended, until the link is closed."""
+    _die_with(parent)
+    link, maker = Connection(descriptor), _Maker()
     with suppress(EOFError, OSError):
         while True:
-            link.send(child.made(link.recv()))
+            what, argument = link.recv()
+            if what == _WAIT:
+                pid, status = os.waitpid(argument, os.WNOHANG)
+                link.send(os.waitstatus_to_exitcode(status) if pid else None)
+                continue
+            handle = recv_handle(link)
+            maker.prepare(argument)
+            template = os.getpid()
+            pid = os.fork()
+            if not pid:
+                _die_with(template)
+                link.close()
+                maker.serve(Connection(handle))
+                os._exit(0)
+            os.close(handle)
+            link.send(pid)
+
+
+def _die_with(parent: int) -> None:
+    """End this process when its parent ends."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:  # it died before the call above
+        os._exit(0)
 
 
 _PR_SET_PDEATHSIG = 1
 
 
-class _Child:
-    """What a child process keeps from run to run.
+class _Maker:
+    """Makes runs, and keeps what it has read and compiled from run to run."""
 
-    Args:
-        begins: Called when a run begins: when all that it needs has been read and compiled.
-    """
-
-    def __init__(self, begins: Callable[[], None]) -> None:
-        self._begins = begins
+    def __init__(self) -> None:
         self._systems: OrderedDict[tuple[bytes, str], System] = OrderedDict()
+        self._compiled: set[bytes] = set()
 
-    def made(self, task: Task) -> Row | VoleryError:
-        """Make a run and return its row, or the error that ends the campaign."""
+    def prepare(self, task: Task) -> None:
+        """Read and compile what runs such as *task* need. What is wrong is said when the run is made."""
+        with suppress(Exception):
+            self._system(task)
+        gc.collect()
+        gc.freeze()  # what all processes share is not looked at again, and so not copied
+
+    def serve(self, link: Connection) -> None:
+        """Make runs as they come over a link, until it is closed."""
+        with suppress(EOFError, OSError):
+            while True:
+                task = link.recv()
+                link.send(self.made(task, lambda: link.send(BEGINS)))
+
+    def made(self, task: Task, begins: Callable[[], None]) -> Row | VoleryError:
+        """Make a run and return its row, or the error that ends the campaign.
+
+        *begins* is called when all that it needs has been read and compiled.
+        """
         began, used = time.monotonic(), _used_s()
         try:
             system = self._system(task)
-            self._begins()
+            begins()
             began, used = time.monotonic(), _used_s()
             row = run_row(task, system)
         except VersionMismatchError as error:
@@ -373,14 +477,16 @@ class _Child:
         return replace(row, wall_s=wall_s, cpu_s=cpu_s, host=socket.gethostname())
 
     def _system(self, task: Task) -> System:
-        key = (pickle.dumps(task.setting), task.point.variant)
+        setting = pickle.dumps(task.setting)
+        key = (setting, task.point.variant)
         if key not in self._systems:
-            first = not self._systems
-            if first:
+            if setting not in self._compiled:
                 _check_digest(task.setting)
-            self._systems[key] = read_variant(task.setting.model, task.point.values)
-            if first:
-                _compile(self._systems[key], task.setting.fidelity)
+            system = read_variant(task.setting.model, task.point.values)
+            if setting not in self._compiled:
+                _compile(system, task.setting.fidelity)
+                self._compiled.add(setting)
+            self._systems[key] = system
             if len(self._systems) > SYSTEMS_KEPT:
                 self._systems.popitem(last=False)
         self._systems.move_to_end(key)
