@@ -2,7 +2,8 @@
 
 Every Python file is loaded as a run loads it: its imports and its top level are executed, its classes are
 compared with the ports, parameters and operations of the model. Nothing is constructed and no time passes.
-C++ components are compiled, unless there is no compiler; the objects are kept for the run.
+C++ components are compiled, unless there is no compiler; the objects are kept for the run. The firmware of
+each vehicle has to be there in its version and with its features.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from volery.base.errors import ModelError, VoleryError
+from volery.base.errors import ModelError, UsageError, VoleryError
 from volery.components.cpp.sources import find_sources
 from volery.components.loader import Loader
 from volery.components.programs import ScriptProgram
@@ -65,7 +66,7 @@ def _kinds(*more: Path) -> dict[str, ProcessorKind]:
 
 
 def check_components(system: System, languages: Iterable[str]) -> None:
-    """Load the components of *system* and compare them with the model.
+    """Load the components of *system* and compare them with the model; find the firmware of each vehicle.
 
     Args:
         system: The model.
@@ -83,6 +84,11 @@ def check_components(system: System, languages: Iterable[str]) -> None:
 
 
 def _faults(system: System, languages: frozenset[str]) -> Iterator[ModelError]:
+    for vehicle in system.environment.vehicles:
+        try:
+            firmwares.load(vehicle.autopilot).of_version(vehicle.version).with_features(vehicle.features)
+        except UsageError as error:
+            yield ModelError(str(error), f"environment.vehicles.{vehicle.name}", vehicle.where)
     try:
         system = with_executables(system)
     except ModelError as error:

@@ -39,6 +39,18 @@ def test_the_starter_itself_is_right(starter):
 @pytest.mark.parametrize(
     ("file", "old", "new", "expected"),
     [
+        (
+            "model.yaml",
+            "autopilot: ardupilot,",
+            "autopilot: ardupilot, features: winsh,",
+            "drone_1: a simulated ardupilot has no feature 'winsh'; off by default: airspeed, all, buttons",
+        ),
+        (
+            "model.yaml",
+            "autopilot: ardupilot,",
+            'autopilot: ardupilot, version: "9",',
+            "environment.vehicles.drone_1: a simulated ardupilot has no version '9'; there is 4.5 or 4.8",
+        ),
         (PATROL, "class Patrol:", "class Patrl:", "patrol.py:1: no class 'Patrol' (did you mean 'Patrl'?)"),
         (PATROL, "def run(self):", "def run(self)", "patrol.py:16: not Python: expected ':'"),
         (
