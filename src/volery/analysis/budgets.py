@@ -185,10 +185,9 @@ def hovers(system: System) -> tuple[Hover, ...]:
     """Return how each vehicle hovers whose airframe or payload the model states."""
     found = []
     for vehicle in system.vehicles:
-        if vehicle.airframe is None and not vehicle.payload_kg:
-            continue
         body, reserve = body_of(vehicle), _reserve(system, vehicle)
-        assert isinstance(body, Multirotor)  # no other has an airframe
+        if not isinstance(body, Multirotor) or not (body.frame or body.payload):
+            continue
         seconds = hover_time(body, body.hover_power, reserve)
         mass = body.mass + body.payload
         made = (body.frame or "quad-x", mass, body.hover_throttle, body.hover_power, seconds, reserve)

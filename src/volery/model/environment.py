@@ -18,7 +18,7 @@ from volery.base.errors import Location, choices
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns
-from volery.model.airframes import AIRFRAME, BATTERY, LOAD, Airframe, Battery
+from volery.model.airframes import AIRFRAME, BATTERY, LOAD, MASS, Airframe, Battery
 from volery.model.faults import FAULT, Fault
 from volery.model.fields import (
     ADDED_SENSOR,
@@ -489,10 +489,11 @@ class _Vehicle(Record):
         """See ``Syntax``. An airframe must be one that the autopilot flies, with the payload."""
         made: Vehicle = super().read(node, path, reading)
         problems, airframe = reading.problems, made.airframe
-        if made.kind != "multirotor" and (airframe is not None or made.payload_kg):
-            key = "payload" if airframe is None else "airframe"
-            here = reading.where((*path, *(("payload",) if airframe is None else ("airframe", "file"))))
-            problems.add((*path, key), f"a {made.kind} has no {key}; only a multirotor has one", here)
+        if made.kind != "multirotor" and airframe is not None:
+            here = reading.where((*path, "airframe", "file"))
+            problems.add(
+                (*path, "airframe"), f"a {made.kind} has no airframe; only a multirotor has one", here
+            )
         elif airframe is not None:
             flying = sorted(reading.vocabulary.airframes)
             if made.autopilot not in flying:
@@ -509,6 +510,15 @@ class _Vehicle(Record):
     def schema(self, definitions: Schema) -> Schema:
         """See ``Syntax``."""
         return Record(VehicleText).schema(definitions)
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """Something that a gripper takes and carries, such as a parcel."""
+
+    name: str
+    at: Annotated[Place, PLACE, "Where it lies at the start."]
+    mass_kg: Annotated[float, MASS, "Its mass, which is part of the vehicle's while it is carried."]
 
 
 @dataclass(frozen=True, slots=True)
@@ -564,6 +574,11 @@ class Environment:
     wind: Annotated[Wind, Shorter(Record(Wind), key="speed"), "Wind over all of the world."] = Wind()
     vehicles: Annotated[
         tuple[Vehicle, ...], MapOf(_Vehicle(Vehicle), values_only=True), "Drones and rovers, by name."
+    ] = ()
+    loads: Annotated[
+        tuple[Load, ...],
+        MapOf(Record(Load), values_only=True),
+        "What grippers take and carry, by name: a gripper that closes within 2 m takes the nearest.",
     ] = ()
     workload: Annotated[
         Workload, _Resolved(Record(WorkloadText), _workload), "What is requested from the system."

@@ -309,7 +309,20 @@ def processors_grid(record: RunRecord) -> Grid:
 
 def vehicles_grid(record: RunRecord) -> Grid:
     """Return the distance, time, energy and errors of each vehicle."""
-    rows = tuple(_vehicle_row(name, one) for name, one in record.vehicles.items())
+    swapped = any(one.battery_swaps for one in record.vehicles.values())
+    charged = any(one.charging_s for one in record.vehicles.values())
+    rows = tuple(
+        (
+            *_vehicle_row(name, one),
+            *((Cell(number(one.battery_swaps, 0)),) if swapped else ()),
+            *((Cell(number(one.charging_s)),) if charged else ()),
+        )
+        for name, one in record.vehicles.items()
+    )
+    served = (
+        *((Column("battery\nswaps", True),) if swapped else ()),
+        *((Column("charged\ns", True, "time for which places charged it"),) if charged else ()),
+    )
     columns = (
         Column("vehicle"),
         Column("kind", essential=False),
@@ -324,6 +337,7 @@ def vehicles_grid(record: RunRecord) -> Grid:
             "error m\nby estimate", True, "largest of all operations that succeeded: horizontal / vertical"
         ),
         Column("error m\nby truth", True, "the same, by where the vehicle really was"),
+        *served,
     )
     return Grid("Vehicles", columns, rows)
 

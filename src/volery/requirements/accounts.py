@@ -49,6 +49,7 @@ from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, V
 from volery.trace.events import (
     NONE,
     Activation,
+    BatteryService,
     Call,
     Charge,
     Collision,
@@ -129,6 +130,7 @@ class Accounts:
             Milestone: self._milestone,
             Failure: self._failure,
             Collision: self._collision,
+            BatteryService: self._served,
             Verdict: self._verdict,
             Text: self._text,
             Unserved: self._unserved_want,
@@ -230,6 +232,11 @@ class Accounts:
     def _collision(self, event: Collision) -> None:
         self._collisions[event.vehicle] += 1
         self._failure(Failure(event.at, event.vehicle, str(event)))
+
+    def _served(self, event: BatteryService) -> None:
+        if event.vehicle in self._vehicles:
+            self._vehicles[event.vehicle].served(event)
+        self._other(event)
 
     def _verdict(self, event: Verdict) -> None:
         self._verdicts[event.requirement] = event

@@ -28,7 +28,17 @@ from volery.requirements.record import (
     VehicleRecord,
 )
 from volery.trace.attachments import ChainSetup, ComponentSetup, ProcessorSetup, VehicleSetup
-from volery.trace.events import NONE, Activation, Call, Charge, Message, Operation, Transmission, VehicleState
+from volery.trace.events import (
+    NONE,
+    Activation,
+    BatteryService,
+    Call,
+    Charge,
+    Message,
+    Operation,
+    Transmission,
+    VehicleState,
+)
 
 _BITS = 10
 
@@ -257,7 +267,14 @@ class VehicleLedger:
     joules: float = 0.0
     metered: bool = False
     least_battery: float = nan
+    swaps: int = 0
+    charging: Ns = 0
     operations: list[Operation] = field(default_factory=list)
+
+    def served(self, event: BatteryService) -> None:
+        """Add a service of a place."""
+        self.swaps += event.kind == "swap"
+        self.charging += event.duration
 
     def state(self, event: VehicleState) -> None:
         """Add a state; states must be in the order of time."""
@@ -301,6 +318,8 @@ class VehicleLedger:
             "distance": self.distance if observed else None,
             "airborne_time": to_seconds(self.airborne) if observed else None,
             "energy": self.joules if observed and self.metered else None,
+            "battery_swaps": float(self.swaps),
+            "charging_time": to_seconds(self.charging),
             "failures": float(len(failed)),
         }
 
@@ -317,6 +336,8 @@ class VehicleLedger:
             energy_j=self.joules if self.metered else None,
             battery=None if last is None else known(last.battery),
             landed=None if last is None else _stands(last),
+            battery_swaps=self.swaps,
+            charging_s=to_seconds(self.charging),
             error_by_estimate_m=OffsetRecord(
                 horizontal=largest([one.estimate_horizontal for one in done]),
                 vertical=largest([one.estimate_vertical for one in done]),

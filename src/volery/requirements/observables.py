@@ -43,6 +43,7 @@ from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, V
 from volery.trace.events import (
     NONE,
     Activation,
+    BatteryService,
     Call,
     Charge,
     Collision,
@@ -323,6 +324,20 @@ def _worst(names: tuple[str, ...], error: Callable[[Operation], float]) -> Make:
     return make
 
 
+def _swaps(vehicle: str, setup: RunSetup) -> Observer:
+    return _count(BatteryService, lambda event: event.vehicle == vehicle and event.kind == "swap")
+
+
+def _charging(vehicle: str, setup: RunSetup) -> Observer:
+    charged = [0]
+
+    def take(event: BatteryService) -> None:
+        if event.vehicle == vehicle:
+            charged[0] += event.duration
+
+    return Observer((BatteryService,), take, lambda at: to_seconds(charged[0]))
+
+
 def _collisions(vehicle: str, setup: RunSetup) -> Observer:
     return _count(Collision, lambda event: event.vehicle == vehicle)
 
@@ -540,6 +555,8 @@ TABLE: tuple[tuple[str, str, str, str, Make], ...] = (
         "energy drawn from the battery",
         _vehicle(lambda ledger: ledger.joules if ledger.metered else nan),
     ),
+    ("vehicle", "battery_swaps", "", "batteries that places swapped", _swaps),
+    ("vehicle", "charging_time", "s", "time for which places charged its battery", _charging),
     ("vehicle", "collisions", "", "how often it hit what stands in the world", _collisions),
     ("vehicle", "failures", "", "operations that did not succeed", _failed_operations),
     ("chain", "latency", "s", "greatest age of data at the end of a chain of topics", _latency(_largest)),

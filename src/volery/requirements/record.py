@@ -181,6 +181,8 @@ class VehicleRecord(_Part):
     energy_j: float | None
     battery: float | None
     landed: bool | None
+    battery_swaps: int = 0
+    charging_s: float = 0.0
     error_by_estimate_m: OffsetRecord
     error_by_truth_m: OffsetRecord
     operations: list[OperationRecord]

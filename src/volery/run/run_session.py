@@ -21,6 +21,7 @@ from volery.run.assembly.component_builder import Builder, BuiltComponents, with
 from volery.run.assembly.computers import Platform, PowerFeed
 from volery.run.assembly.fault_effects import Affected, FleetLinks, inject, with_faulty_links
 from volery.run.assembly.model_checks import vocabulary
+from volery.run.assembly.place_services import serve_batteries, serve_loads
 from volery.run.assembly.simulated_fleet import SimulatedFleet, surroundings_of
 from volery.run.distributed import (
     DistributedRun,
@@ -280,7 +281,8 @@ class RunSession:
             self._recording.stream.tap(reporter)
         self._feed = PowerFeed(kernel, platform, self._fleet)
         self._fleet.sample()
-        self._fleet.serve_batteries(environment.places.values())
+        serve_batteries(kernel, self._fleet, environment.places.values())
+        serve_loads(kernel, self._fleet, environment.loads)
         affected = Affected(
             kernel,
             self._fleet,

@@ -31,6 +31,7 @@ from volery.trace.attachments import (
 from volery.trace.events import (
     NONE,
     Activation,
+    BatteryService,
     Call,
     Charge,
     Collision,
@@ -324,6 +325,7 @@ def _story(journey: list[tuple[Ns, float, float, float]]) -> Iterator[Event]:
     yield LinkState(500 * MS, "drone_1", "up", "")
     figures = 0.3, 0.2, 0.1, 0.1, 0.0, 0.0, 0.1
     yield ControlSample(600 * MS, "drone_1", "altitude", "P", "m", 0.0, *figures)
+    yield BatteryService(23 * S, "drone_1", "depot", "swap", 0, 0.4)
     yield Collision(21 * S, "drone_2", "depot", 3.4, 20.0, 10.0, 5.0)
     yield Failure(21 * S, "drone_2", "takeoff refused: Arm: Battery below minimum")
 

@@ -167,6 +167,21 @@ class Collision(NamedTuple):
         return f"hit {self.solid} at {self.speed:.1f} m/s, {round(self.z, 1) + 0.0:.1f} m up"  # no -0.0
 
 
+class BatteryService(NamedTuple):
+    """A place gave a vehicle another battery, or charged the one that it has.
+
+    ``kind`` is ``swap`` or ``charge``; ``duration`` is the time of charging up to ``at``, ``left`` the share
+    of the charge that was left before.
+    """
+
+    at: Ns
+    vehicle: str
+    place: str
+    kind: str
+    duration: Ns
+    left: float
+
+
 class Operation(NamedTuple):
     """A vehicle operation (take-off, goto, ...) from its call to its end, with its error at the end.
 
@@ -292,6 +307,7 @@ Event = (
     | Published
     | VehicleState
     | Collision
+    | BatteryService
     | Operation
     | Milestone
     | Text

@@ -49,7 +49,8 @@ def body_of(vehicle: Vehicle) -> BodySpec:
     body: BodySpec
     if vehicle.kind != "multirotor":
         usual = Rover()
-        body = replace(usual, battery=_battery(vehicle.battery, usual.battery))
+        mass = usual.mass + vehicle.payload_kg
+        body = replace(usual, mass=mass, battery=_battery(vehicle.battery, usual.battery))
     elif vehicle.airframe is not None:
         body = _own_multirotor(vehicle.airframe, vehicle.battery or vehicle.airframe.battery)
     else:

@@ -6,12 +6,10 @@ it inside functions, or for type checking only.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import cycle
-from math import hypot, pi, radians
-from operator import itemgetter
+from math import pi, radians
 from typing import NamedTuple
 
 from volery.base.elementary import cos, sin
@@ -19,12 +17,12 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
 from volery.base.seeds import stream
-from volery.base.time import Ns, S, to_seconds
+from volery.base.time import Ns
 from volery.kernel.api import Kernel
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Codec, Link
 from volery.links.wire_faults import FaultyLink, WireFaults, faulty_pair
-from volery.model.environment import Environment, Place, Prism
+from volery.model.environment import Environment, Prism
 from volery.model.environment import Vehicle as VehicleModel
 from volery.model.environment import Wind as WindModel
 from volery.run.assembly.bodies import body_of
@@ -34,17 +32,9 @@ from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily, fi
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
 from volery.simulation.world.environment_models import Wind
 from volery.simulation.world.scene import Scene, Solid
-from volery.simulation.world.world import Truth, World
-from volery.trace.events import Collision, Text, ignore
+from volery.simulation.world.world import World
+from volery.trace.events import Collision, ignore
 
-NOTICE = 5
-"""MAVLink severity."""
-
-SERVICE_PERIOD: Ns = 1 * S
-REACH_M = 5.0
-"""Distance from a place [m] within which its batteries and its charger are brought to a vehicle."""
-USED = 0.95
-"""Share of the charge from which on a battery is not worth swapping."""
 FOUNDATION = 100.0
 """Depth [m] to which a solid on the ground goes on below it: the ground follows the globe."""
 
@@ -222,42 +212,6 @@ class SimulatedFleet:
                 event = Collision(self._kernel.now(), name, hit.solid, hit.speed, *hit.position)
                 self._kernel.record(event)
                 self.on_collision(event)
-
-    def serve_batteries(self, places: Iterable[Place]) -> None:
-        """Swap and charge batteries at *places*, from now on: those of vehicles that stand there disarmed."""
-        serving = [one for one in places if one.battery_swap_ns is not None or one.charging_w > 0.0]
-        if serving:
-            self._kernel.every(SERVICE_PERIOD, partial(self._serve, serving, {}))
-
-    def _serve(self, places: Sequence[Place], since: dict[str, Ns]) -> None:
-        """Do the work of one period; *since* has the time from which each vehicle has been standing."""
-        now = self._kernel.now()
-        for name, autopilot in self.autopilots.items():
-            flight = self.flights[name]
-            truth = flight.truth()
-            place = None if autopilot.vehicle.armed or not truth.on_ground else _nearest(places, truth)
-            if place is None:
-                since.pop(name, None)
-                continue
-            arrived, left = since.setdefault(name, now), truth.battery_left
-            swapping = place.battery_swap_ns
-            if swapping is not None and now - arrived >= swapping and left < USED:
-                autopilot.swap_battery()
-                since[name] = now
-                text = f"battery swapped at {place.name}: {left:.0%} was left"
-                self._kernel.record(Text(now, name, NOTICE, text))
-            elif place.charging_w > 0.0 and left < 1.0:
-                share = place.charging_w * to_seconds(SERVICE_PERIOD) / (truth.volts * flight.capacity_as)
-                flight.set_charge(min(1.0, left + share))
-
-
-def _nearest(places: Sequence[Place], truth: Truth) -> Place | None:
-    """Return the place that a vehicle stands at, None if it is at none of them."""
-    east, north, _ = truth.position
-    away, place = min(
-        ((hypot(one.east_m - east, one.north_m - north), one) for one in places), key=itemgetter(0)
-    )
-    return place if away <= REACH_M else None
 
 
 def _ids(names: Sequence[str], stated: Mapping[str, int]) -> dict[str, int]:

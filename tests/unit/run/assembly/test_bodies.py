@@ -12,14 +12,16 @@ from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
 from volery.model.airframes import FRAMES as FRAMES_OF_MODELS
-from volery.model.environment import Wind
+from volery.model.airframes import Battery
+from volery.model.environment import Place, Vehicle, Wind
 from volery.model.system_loader import load
 from volery.run.assembly.bodies import body_of
 from volery.run.assembly.model_checks import vocabulary
 from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint, make_world
-from volery.simulation.world.body_specs import FRAMES, Multirotor
+from volery.simulation.world.body_specs import FRAMES, Multirotor, Rover
 
+PAD = Place("pad", 47.4, 8.5, 400.0, 12.0, -3.0, "pad")
 EXAMPLES = Path(__file__).parents[4] / "examples" / "airframes"
 MODEL = """\
 volery: 1
@@ -203,3 +205,21 @@ def test_what_a_model_states_beside_the_file_wins(folder):
     assert (airframe.mass_kg, airframe.motors.efficiency, airframe.motors.thrust_n) == (3.0, 0.7, 17.0)
     (one, _) = hovers(system_of(folder, f"environment.vehicles.quad.{stated}"))
     assert (one.vehicle, one.frame, one.mass_kg) == ("quad", "quad-x", 3.0)
+
+
+@pytest.mark.parametrize(("kind", "body"), [("multirotor", Multirotor), ("rover", Rover)])
+def test_a_body_stands_at_its_place_with_its_sensors(kind, body):
+    vehicle = Vehicle("v", kind, "ardupilot", PAD, 90.0, None, "rtk", ("airspeed",))
+    spec = body_of(vehicle)
+    assert isinstance(spec, body)
+    assert spec.at[:2] == (12.0, -3.0)
+    assert spec.heading_deg == 90.0
+    assert (spec.sensors, spec.added_sensors) == ("rtk", ("airspeed",))
+    assert spec.battery == body().battery
+
+
+def test_a_battery_in_the_model_replaces_the_usual_one():
+    vehicle = Vehicle("v", "multirotor", "ardupilot", PAD, battery=Battery(capacity_coulomb=3600.0))
+    spec = body_of(vehicle)
+    assert spec.battery.capacity_ah == pytest.approx(1.0)
+    assert spec.added_sensors == ()

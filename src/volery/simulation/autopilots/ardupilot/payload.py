@@ -122,7 +122,7 @@ def move_gripper(vehicle: Vehicle, action: int) -> bool:
     outputs.gripper = None
 
     def finish() -> None:
-        outputs.gripper = action
+        outputs.gripper = vehicle.flight.gripper = action
         vehicle.send_text(INFO, f"{said}ed")
 
     vehicle.kernel.call_at(vehicle.kernel.now() + GRIPS_WITHIN, finish)

@@ -239,6 +239,8 @@ class Flight:
         self._latest: Estimate | None = None
         self._driven: tuple[float, ...] = ()
         self._converted: tuple[Vector, Vector] = (_NOWHERE, _NOWHERE)
+        self.gripper: int | None = None
+        """What the gripper has done last: 0 released, 1 grabbed; ``None``: nothing yet."""
         self.estimate_error: Sequence[float] = ()
         """Error that the firmware's own estimator adds to the estimate, or empty: of the position [m], then
         of the velocity [m/s], each north, east, down. The inner loops fly without it."""
@@ -279,7 +281,8 @@ class Flight:
 
     def carry(self, load: float) -> None:
         """Carry a mass beside the vehicle's own [kg], at its centre, in place of what it carried before."""
-        self._world.set_input(self._body, P_MASS, self.spec.mass + load)
+        own = self.spec.mass + (self.spec.payload if isinstance(self.spec, Multirotor) else 0.0)
+        self._world.set_input(self._body, P_MASS, own + load)
 
     def last_collision(self) -> Collision | None:
         """Return how the body last hit something that stands in the world; ``None``: it has not."""

@@ -380,7 +380,11 @@ def on_gripper(vehicle: Vehicle, command: Command) -> int | None:
     enabling = "PD_GRIPPER_EN"
     if enabling in vehicle.parameters and not vehicle.parameters[enabling]:
         return None
-    return ACCEPTED if to_integer(command.param2) in GRIPPER_ACTIONS else DENIED
+    action = to_integer(command.param2)
+    if action not in GRIPPER_ACTIONS:
+        return DENIED
+    vehicle.flight.gripper = action
+    return ACCEPTED
 
 
 def ignore(_vehicle: Vehicle, _command: Command) -> None:
