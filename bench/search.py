@@ -3,7 +3,7 @@
     python bench/search.py [--seeds 10] [--evaluations 2000]
 
 Ratios are of hypervolumes up to the worst values of both fronts and a tenth more, averaged over the seeds.
-Under noise of 5 % the share of reported fronts is printed in which a variant is truly dominated by another one.
+Under noise of 5 % it prints in how many of the reported fronts a variant is truly dominated by another one.
 Needs pymoo (``pip install pymoo``).
 """
 
