@@ -22,7 +22,7 @@ from typer.main import get_command
 
 from volery.cli.command import Noun
 from volery.cli.main import application
-from volery.cost import load_catalogue
+from volery.cost import ListPrice, Supply, load_catalogue
 from volery.drawing.deployment import deployment_svg
 from volery.drawing.page import page
 from volery.drawing.shapes import functional_svg, verification_svg
@@ -115,6 +115,18 @@ def observables() -> str:
     return "\n".join(lines) + "\n"
 
 
+def hardware_lines(price: ListPrice | None, supply: Supply | None) -> list[str]:
+    """Price and supply of one part."""
+    lines = []
+    if price is not None:
+        kind = "estimated, from" if price.estimated else "by"
+        lines.append(f"- Price: {price.amount:g} {price.currency} ({price.year}), {kind} {price.source}.")
+    if supply is not None:
+        kind = "estimated, from" if supply.estimated else "by"
+        lines.append(f"- Supply: {supply.watts:g} W, {kind} {supply.source}.")
+    return lines
+
+
 def processors() -> str:
     """The catalogue of processors."""
     lines = [
@@ -137,6 +149,7 @@ def processors() -> str:
             lines.append(
                 f"- ROS calls ({client}): {law.provenance}; {law.source}. Valid: {law.validity}. {law.note}"
             )
+        lines += hardware_lines(entry.price, entry.supply)
         if entry.power is not None:
             power = entry.power
             words = f"{power.provenance}, {power.how_good()}; {power.source}. Valid: {power.validity}"
@@ -144,6 +157,9 @@ def processors() -> str:
         for language, code in entry.code.items():
             good = code.how_good().capitalize()
             lines.append(f"- Counted code ({language}): {code.source}. Valid: {code.validity}. {good}.")
+    lines.append("\n# Other hardware\n\nWhere a model states no `price`.\n")
+    for name, part in load_catalogue().hardware.items():
+        lines += [f"\n## {name}\n", *hardware_lines(part.price, part.supply)]
     return "\n".join(lines) + "\n"
 
 

@@ -9,7 +9,9 @@ are valid. A missing figure is an ``EstimateError``, never zero.
 
 from volery.cost.catalogue import (
     Catalogue,
+    ListPrice,
     ProcessorEntry,
+    Supply,
     load_catalogue,
     parse_catalogue,
     read_catalogue,
@@ -71,6 +73,7 @@ __all__ = [
     "LibraryLaw",
     "LibraryTable",
     "Line",
+    "ListPrice",
     "MemoryLaw",
     "OperationTable",
     "OperationTiming",
@@ -84,6 +87,7 @@ __all__ = [
     "StatedCost",
     "StatedPricing",
     "StepCounter",
+    "Supply",
     "Tariff",
     "WithProvenance",
     "call_feature",

@@ -31,6 +31,37 @@ class Settings(WithProvenance):
         return tuple(self.least_mhz + number * self.step_mhz for number in range(count + 1))
 
 
+class ListPrice(BaseModel):
+    """A price of one piece, in a currency of ISO 4217; ``source`` is the basis where it is ``estimated``."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    amount: float = Field(ge=0)
+    currency: str = Field(pattern="^[A-Z]{3}$")
+    year: int
+    source: str
+    estimated: bool = False
+
+
+class Supply(BaseModel):
+    """Power that a supply must give [W]: no law of what is drawn."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    watts: float = Field(gt=0)
+    source: str
+    estimated: bool = False
+
+
+class HardwareEntry(BaseModel):
+    """Price and supply of a part that is no processor."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    price: ListPrice
+    supply: Supply | None = None
+
+
 class ProcessorEntry(BaseModel):
     """One kind of processor: its cores, the frequency range of its laws, its settings, its laws.
 
@@ -46,6 +77,8 @@ class ProcessorEntry(BaseModel):
     least_mhz: float
     greatest_mhz: float
     settings: Settings | None = None
+    price: ListPrice | None = None
+    supply: Supply | None = None
     power: PowerLaw | None = None
     ros: dict[str, RosLaw] = {}
     code: dict[str, CodeLaw] = {}
@@ -108,11 +141,12 @@ class ProcessorEntry(BaseModel):
 
 
 class Catalogue(BaseModel):
-    """Processors by the name of their kind."""
+    """Processors by the name of their kind, and prices of other hardware by what it is."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     processors: dict[str, ProcessorEntry]
+    hardware: dict[str, HardwareEntry] = {}
 
     def processor(self, kind: str) -> ProcessorEntry:
         """Return the entry of a kind; raise ``EstimateError`` with the valid names if there is none."""
@@ -168,11 +202,14 @@ def load_catalogue(*more: Path) -> Catalogue:
     Raises:
         ModelError: A file cannot be read or is wrong.
     """
-    found = dict(_shipped_catalogue().processors)
+    shipped = _shipped_catalogue()
+    found, hardware = dict(shipped.processors), dict(shipped.hardware)
     for file in more:
-        for name, entry in read_catalogue(file).processors.items():
+        read = read_catalogue(file)
+        hardware |= read.hardware
+        for name, entry in read.processors.items():
             found[name] = _merge_entries(found[name], entry) if name in found else entry
-    return Catalogue(processors=found)
+    return Catalogue(processors=found, hardware=hardware)
 
 
 @cache
@@ -188,6 +225,8 @@ def _merge_entries(known: ProcessorEntry, new: ProcessorEntry) -> ProcessorEntry
             "code": {**known.code, **new.code},
             "least_mhz": min(known.least_mhz, new.least_mhz),
             "greatest_mhz": max(known.greatest_mhz, new.greatest_mhz),
+            "price": new.price or known.price,
+            "supply": new.supply or known.supply,
             "power": new.power or known.power,
             "settings": new.settings or known.settings,
             "core_model": new.core_model or known.core_model,

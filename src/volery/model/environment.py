@@ -48,6 +48,7 @@ from volery.model.fields import (
     WrongValueError,
     read_child,
 )
+from volery.model.prices import PRICE, Price
 from volery.model.reading import Reading
 from volery.model.resources import POWER
 from volery.model.text import Node, Path
@@ -451,6 +452,9 @@ class Vehicle:
         "Airframe of a multirotor, as a rule the name of its file; by default a usual quadrotor of 3 kg.",
     ] = None
     payload_kg: Annotated[float, LOAD, "Mass that it carries from the start, beside its own."] = 0.0
+    price: Annotated[
+        Price | None, PRICE, "Its price without battery and computers; that of its airframe by default."
+    ] = None
     processor: str | None = None
     where: Location | None = field(default=None, compare=False)
 

@@ -44,6 +44,7 @@ from volery.model.fields import (
     WrongValueError,
 )
 from volery.model.instances import Instance, component_of
+from volery.model.prices import PRICE, Price
 from volery.model.reading import NOTE_PREFIX, NOTE_TIMES, Observable, Provenance, Reading, split_note
 from volery.model.resources import (
     CACHES,
@@ -99,6 +100,7 @@ class Processor:
     power_states: Annotated[
         Mapping[str, PowerState], POWER_STATES, "States it can be in, and what it draws in each."
     ] = field(default_factory=dict)
+    price: Annotated[Price | None, PRICE, "Its price; by default that of the catalogue."] = None
     operating_system: str | None = None
     where: Location | None = field(default=None, compare=False)
 
@@ -157,6 +159,9 @@ class Network:
     per: Annotated[str | None, VEHICLE, "The vehicle that it belongs to: with a `count`, one for each."] = (
         None
     )
+    price: Annotated[
+        Price | None, PRICE, "Price of the radio at one end; by default that of the catalogue."
+    ] = None
     where: Location | None = field(default=None, compare=False)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -18,6 +18,7 @@ from volery.cli.options import Allocation, Model, Overrides, Scenario
 
 if TYPE_CHECKING:
     from volery.analysis.budgets import Budgets
+    from volery.analysis.hardware import Part
     from volery.analysis.simulated_times import LongestTimes
     from volery.analysis.system_analysis import Analysis, Bound, Utilisation
     from volery.base.time import Ns
@@ -54,6 +55,7 @@ def analyse(
     is not guaranteed although there is a bound, or a longest simulated time is above its bound.
     """
     from volery.analysis.budgets import budgets
+    from volery.analysis.hardware import hardware, hardware_price
     from volery.analysis.simulated_times import longest_times
     from volery.analysis.system_analysis import ASSUMPTIONS
     from volery.analysis.system_analysis import analyse as analyse_system
@@ -62,6 +64,7 @@ def analyse(
     from volery.run.assembly.model_checks import vocabulary
 
     system = load(model, vocabulary(), scenario, allocation, overrides or ())
+    parts = hardware(system)
     seen = None if run is None else _Seen(read_record(run), longest_times(run))
     found = analyse_system(system)
     limits = budgets(system, found.processors)
@@ -73,9 +76,18 @@ def analyse(
         *_latencies(found, seen),
         *_reasons(found),
         *_budgets(limits),
+        *_hardware(parts),
         Text("Assumed for every bound: " + "; ".join(ASSUMPTIONS) + ".", style="dim"),
     )
-    output.give({**asdict(found), "budgets": asdict(limits), "assumptions": list(ASSUMPTIONS)})
+    output.give(
+        {
+            **asdict(found),
+            "budgets": asdict(limits),
+            "hardware": [asdict(one) for one in parts],
+            "hardware_price": hardware_price(parts),
+            "assumptions": list(ASSUMPTIONS),
+        }
+    )
     broken = list(_broken(found, seen))
     for one in broken:
         output.complain(f"volery: {one}")
@@ -163,6 +175,20 @@ def _budgets(found: Budgets) -> Iterator[RenderableType]:
         power = NONE if drone.watts is None else f"{drone.watts:.0f} W"
         battery.add_row(drone.vehicle, power, lasts, f"{drone.reserve:.0%}", verdict)
     yield from (one for one in (memory, energy, battery) if _filled(one))
+
+
+def _hardware(parts: Sequence[Part]) -> Iterator[RenderableType]:
+    from volery.analysis.hardware import hardware_price
+
+    table = make_table("hardware", "what", number_column("price"), number_column("of the year"), "")
+    for one in parts:
+        year = NONE if one.year is None else str(one.year)
+        estimated = "estimated" if one.estimated else ""
+        table.add_row(one.name, one.what, f"{one.amount:.0f} {one.currency}", year, estimated)
+    for currency, amount in hardware_price(parts).items():
+        table.add_row("all of it", "", f"{amount:.0f} {currency}", "", "")
+    if parts:
+        yield table
 
 
 def _filled(table: Table) -> bool:
