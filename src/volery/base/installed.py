@@ -74,7 +74,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "ros": ("rosbags", "lz4"),
     "report": ("jinja2",),
     "control": ("matplotlib", "pyulog"),
-    "explore": ("scipy", "optuna", "SALib", "pandas", "pyarrow"),
+    "explore": ("scipy", "optuna", "SALib", "pandas", "pyarrow", "matplotlib"),
     "dask": ("distributed",),
     "ray": ("ray",),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, Protocol
@@ -93,6 +94,11 @@ class Row:
     def completed(self) -> bool:
         """Whether the run came to its regular end; the observables of any other are not comparable."""
         return self.status == COMPLETED
+
+    @property
+    def cause(self) -> tuple[str, str]:
+        """Status and reason without its numbers: equal for runs that failed alike."""
+        return self.status, re.sub(r"-?\d+(\.\d+)?", "#", self.reason)
 
     @property
     def ok(self) -> bool:

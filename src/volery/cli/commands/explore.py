@@ -86,6 +86,7 @@ def explore(
     require_extra("simulation", "campaigns")
     from volery.cli.run_display import status_line
     from volery.explore.campaign import Campaign, prepare
+    from volery.explore.page import write_page
     from volery.explore.specification import parameter_from_option, read_specification, specification_of
 
     if show is not None:
@@ -123,6 +124,7 @@ def explore(
                 output.complain(f"volery: interrupted after {finished} of {asked} runs; {goes_on}")
                 return FAILED
             campaign.export()
+            write_page(campaign)
     return _show_summary(output, campaign.folder)
 
 
@@ -171,23 +173,21 @@ def _show_summary(output: Output, folder: Path) -> int:
     output.show(table)
     if len(variants) > SHOWN_VARIANTS:
         output.show(f"and {len(variants) - SHOWN_VARIANTS} more variants: see {found['table']}")
-    for (status, reason), (count, run) in list(reasons.items())[:SHOWN_REASONS]:
-        output.note(f"{count} {status}: {reason}; `volery explore --out {folder} --show {run}`")
-    found["reasons"] = [
-        {"status": status, "reason": reason, "runs": count, "first": run}
-        for (status, reason), (count, run) in reasons.items()
-    ]
+    for one in reasons[:SHOWN_REASONS]:
+        again = f"`volery explore --out {folder} --show {one['first']}`"
+        output.note(f"{one['runs']} {one['status']}, such as: {one['reason']}; {again}")
     output.give(found)
-    output.note(f"table: {found['table']}")
+    output.note(f"report: {found['report']}\ntable: {found['table']}")
     return OK if set(found["statuses"]) <= {"completed", "discarded"} else FAILED
 
 
 def _summary(campaign: Campaign) -> dict[str, Any]:
     """Return what the rows come to: counts by variant, and reasons of runs without a regular end."""
     from volery.explore.campaign import TABLE_FILE
+    from volery.explore.page import PAGE_FILE
 
     variants: dict[str, dict[str, Any]] = {}
-    reasons: dict[tuple[str, str], list[int]] = {}
+    reasons: dict[tuple[str, str], dict[str, Any]] = {}
     for row in campaign.rows():
         one = variants.setdefault(
             row.point.variant,
@@ -199,12 +199,13 @@ def _summary(campaign: Campaign) -> dict[str, Any]:
             one["judged"][name] = one["judged"].get(name, 0) + (met is not None)
             one["met"][name] = one["met"].get(name, 0) + bool(met)
         if not row.completed:
-            count = reasons.setdefault((row.status, row.reason), [0, row.run])
-            count[0] += 1
+            like = {"status": row.status, "reason": row.reason, "runs": 0, "first": row.run}
+            reasons.setdefault(row.cause, like)["runs"] += 1
     return {
         "folder": str(campaign.folder),
         "table": str(campaign.folder / TABLE_FILE),
+        "report": str(campaign.folder / PAGE_FILE),
         "statuses": dict(campaign.statuses()),
         "variants": list(variants.values()),
-        "reasons": reasons,
+        "reasons": sorted(reasons.values(), key=lambda one: -one["runs"]),
     }
