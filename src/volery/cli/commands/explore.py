@@ -86,7 +86,7 @@ def explore(
     require_extra("simulation", "campaigns")
     from volery.cli.run_display import status_line
     from volery.explore.campaign import Campaign, prepare
-    from volery.explore.page import write_page
+    from volery.explore.campaign_page import write_page
     from volery.explore.specification import parameter_from_option, read_specification, specification_of
 
     if show is not None:
@@ -184,7 +184,7 @@ def _show_summary(output: Output, folder: Path) -> int:
 def _summary(campaign: Campaign) -> dict[str, Any]:
     """Return what the rows come to: counts by variant, and reasons of runs without a regular end."""
     from volery.explore.campaign import TABLE_FILE
-    from volery.explore.page import PAGE_FILE
+    from volery.explore.campaign_page import PAGE_FILE
 
     variants: dict[str, dict[str, Any]] = {}
     reasons: dict[tuple[str, str], dict[str, Any]] = {}

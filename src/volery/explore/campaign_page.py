@@ -16,7 +16,7 @@ from markupsafe import Markup
 from volery.base.errors import UsageError
 from volery.base.files import write_text
 from volery.explore.campaign import Campaign
-from volery.explore.figures import (
+from volery.explore.campaign_figures import (
     Axis,
     Estimate,
     Flags,
@@ -28,6 +28,7 @@ from volery.explore.figures import (
     tornado_chart,
 )
 from volery.explore.points import COMPLETED, DISCARDED, Row, Value
+from volery.explore.search import front_of
 from volery.explore.statistics import Interval, mean, probability
 from volery.report.grids import Cell, CellStatus, Column, Grid, figure
 from volery.report.html_report import REPORT_FILE, Fact, environment
@@ -426,8 +427,6 @@ def _most_varied(table: _Table, most: int = 3) -> list[str]:
 
 def _front(table: _Table, found: Findings) -> Flags:
     """Return which runs belong to variants whose means no other variant's dominate."""
-    from volery.explore.search import front_of  # noqa: PLC0415  # it imports the optimiser
-
     if len(found.objectives) < 2:
         return np.zeros(len(table.numbers), dtype=bool)
     signs = [-1.0 if name in found.maximised else 1.0 for name in found.objectives]
