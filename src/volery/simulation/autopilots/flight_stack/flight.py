@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -235,7 +236,7 @@ class Flight:
         self._airframe = Airframe(
             self.frame, self.flying, self.rotors, self.capacity_as, sensor_suite(self.spec.sensors)
         )
-        self._row = memoryview(world.arrays.rows[body])
+        self._row = cast("memoryview[float]", memoryview(cast("Any", world.arrays.rows[body])))
         self._latest: Estimate | None = None
         self._driven: tuple[float, ...] = ()
         self._converted: tuple[Vector, Vector] = (_NOWHERE, _NOWHERE)
