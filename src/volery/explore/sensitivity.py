@@ -91,8 +91,8 @@ def sensitivity(
         level: Confidence of the intervals (bootstrap).
 
     Raises:
-        sensitivity(campaign.evaluate, {"environment.wind.speed": Range(0, 8, "m/s"), ...}, "drone.energy")
-            quantity that does not vary.
+        UsageError: No such method, a wrong size, fewer than two parameters or groups without a failed run, or
+            a quantity that does not vary.
     """
     require_extra("explore", "a sensitivity analysis")
     if method not in (MORRIS, SOBOL):
