@@ -24,7 +24,7 @@ from volery.base.installed import MissingExtraError, require_extra
 from volery.base.time import S
 from volery.explore.campaign_store import CampaignStore
 from volery.explore.executors import EngineLostError, open_executor
-from volery.explore.points import SELECTED, Point, Row, Value
+from volery.explore.points import Point, Row, Value
 from volery.explore.run_process import (
     Setting,
     Task,
@@ -44,6 +44,10 @@ EXPORTED: Final = 50_000
 """Rows of one part of the table that is written."""
 AHEAD: Final = 2
 """Runs that are handed to an engine for each that it makes at a time, so that no worker waits."""
+CHECKED: Final = 100
+"""Values of each parameter that are read before the first run."""
+WRONG_ALWAYS: Final = {one.code for one in (rules.BAD_CHANGE, rules.WRONG_VALUE, rules.WRONG_QUANTITY)}
+"""What is wrong with a value whatever the others are; all else is found by the runs that it is wrong in."""
 LATEST_S: Final = 1.0
 """Wall seconds between two reports of progress."""
 
@@ -446,15 +450,15 @@ def prepare(
 
 
 def _check_paths(model: str | Path | ModelBuilder, specification: Specification) -> None:
-    """Raise what is wrong with the paths and names of a space: it would be wrong in every run."""
+    """Raise what is wrong with the paths, names and texts of a space: it would be wrong in every run."""
     source = model if isinstance(model, ModelBuilder) else str(model)
     for path, parameter in specification.space.items():
         values = parameter.values if isinstance(parameter, Choices) else [parameter.at(0.5)]
-        for value in values if path in SELECTED else values[:1]:
+        for value in values[:CHECKED]:
             try:
                 read_variant(source, {path: value})
             except ModelError as error:
                 errors = error.errors if isinstance(error, CollectedModelError) else [error]
-                wrong = [one for one in errors if one.code == rules.BAD_CHANGE.code]
+                wrong = [one for one in errors if one.code in WRONG_ALWAYS]
                 if wrong:
                     raise wrong[0] from None

@@ -135,3 +135,9 @@ def test_an_engine_of_this_machine_has_its_processors():
     executor, workers = open_executor(workers=3)
     executor.shutdown()
     assert workers == 3
+
+
+def test_a_value_that_is_wrong_in_every_run_is_refused_before_the_first(explore, tmp_path):
+    with pytest.raises(ModelError, match=r"environment\.wind\.speed: 'fast' is not a number with a unit"):
+        explore(space={"environment.wind.speed": ["2 m/s", "fast"]})
+    assert not (tmp_path / "out").exists()
