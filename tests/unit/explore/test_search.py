@@ -2,8 +2,16 @@ import numpy as np
 import pytest
 
 from volery.base.errors import UsageError
-from volery.explore.points import FAILED, Row
-from volery.explore.search import Objective, front_of, hypervolume, read_objective, search
+from volery.explore.points import FAILED, Point, Row
+from volery.explore.search import (
+    Objective,
+    analysis_discards,
+    front_of,
+    hardware_cost,
+    hypervolume,
+    read_objective,
+    search,
+)
 from volery.explore.space import Choices, Range
 
 UNIT = {f"x{number}": Range(0.0, 1.0) for number in range(6)}
@@ -173,3 +181,21 @@ def test_hypervolumes():
     assert hypervolume(points, [1.0] * 3) == pytest.approx(counted, abs=0.02)
     with pytest.raises(UsageError, match="3 at most"):
         hypervolume([[0.0] * 4], [1.0] * 4)
+
+
+def test_analysis_discards_what_overloads_a_computer_and_nothing_that_is_open():
+    discards = analysis_discards("examples/starter")
+    period = "components.Patrol.active"
+    took = {"components.Patrol.activation": {"time": "30 ms", "best": "20 ms", "worst": "90 ms"}}
+    assert discards({period: {"period": "4 ms"}, **took}) == "onboard has more to execute than it can"
+    assert not discards(
+        {period: {"period": "10 ms"}, **took}
+    )  # only its longest time overloads the four cores
+    assert not discards({"platform.processors.onboard.frequency": "9 parsec"})  # its run says what is wrong
+    assert not discards({})
+
+
+def test_the_price_of_the_hardware_is_an_objective():
+    row = Row(0, Point())
+    assert hardware_cost("examples/starter", "USD").value(row) > 0.0
+    assert np.isnan(hardware_cost("examples/starter", "XAU").value(row))
