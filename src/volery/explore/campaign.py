@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import groupby
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
@@ -35,6 +36,7 @@ from volery.explore.run_process import (
 )
 from volery.explore.space import Choices, Parameter, default_space
 from volery.explore.specification import Specification, read_specification, specification_of
+from volery.explore.statistics import Interval, Until
 from volery.model import rules
 from volery.model.builder import ModelBuilder
 from volery.model.text import CollectedModelError
@@ -232,6 +234,32 @@ class Campaign:
         finally:
             self._store.close()  # others may write now
             self._store = CampaignStore(self.folder)
+
+    def run_until(self, until: Until) -> dict[str, Interval]:
+        """Run each variant until an interval is narrow enough, or until its seeds are used up.
+
+        Example::
+
+            prepare("model.yaml", "runs/sure", seeds=1000).run_until(read_until("landing within 5 %"))
+
+        Args:
+            until: What is to be known how well, by ``statistics.read_until``.
+
+        Returns:
+            The interval of each variant, by ``Point.variant``.
+
+        Raises:
+            UsageError: As of ``evaluate``, or no run judges such a requirement.
+        """
+        found: dict[str, Interval] = {}
+        for variant, grouped in groupby(self.specification.run_points(), lambda one: one.variant):
+            points = list(grouped)
+
+            def interval_after(runs: int, points: list[Point] = points) -> Interval:
+                return until.interval(self.evaluate(points[:runs]))
+
+            found[variant] = until.enough(interval_after, len(points))
+        return found
 
     def show(self, run: int, out: str | Path) -> Any:
         """Make a run again, with trace and report, and return its ``volery.Run``.

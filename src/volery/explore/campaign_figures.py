@@ -11,12 +11,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from io import StringIO
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from volery.base.installed import require_extra
+from volery.explore.statistics import Interval
 
 try:
     from matplotlib import rc_context
@@ -55,14 +56,6 @@ class Axis:
     name: str
     values: Values
     choices: tuple[str, ...] = ()
-
-
-class Estimate(NamedTuple):
-    """A value with the interval that it lies in."""
-
-    value: float
-    low: float
-    high: float
 
 
 def thinned(count: int, keep: Flags) -> NDArray[np.int64]:
@@ -109,7 +102,7 @@ def parallel_coordinates(axes: Sequence[Axis], met: Flags, marked: Flags) -> str
 
 
 def pareto_plot(
-    across: Axis, up: Axis, front: Flags, links: Sequence[str], bands: Mapping[int, tuple[Estimate, Estimate]]
+    across: Axis, up: Axis, front: Flags, links: Sequence[str], bands: Mapping[int, tuple[Interval, Interval]]
 ) -> str:
     """Draw two objectives against each other and mark the runs of the *front*.
 
@@ -128,8 +121,8 @@ def pareto_plot(
     for index in best:
         if index in bands:
             x, y = bands[index]
-            plot.plot([x.low, x.high], [y.value, y.value], color=_ACCENT, linewidth=0.9, alpha=0.7)
-            plot.plot([x.value, x.value], [y.low, y.high], color=_ACCENT, linewidth=0.9, alpha=0.7)
+            plot.plot([x.low, x.high], [y.estimate, y.estimate], color=_ACCENT, linewidth=0.9, alpha=0.7)
+            plot.plot([x.estimate, x.estimate], [y.low, y.high], color=_ACCENT, linewidth=0.9, alpha=0.7)
     _cloud(plot, across.values, up.values, best, links, color=_ACCENT, size=26, alpha=1.0)
     _axis(plot.set_xlabel, plot.set_xticks, across)
     _axis(plot.set_ylabel, plot.set_yticks, up)
@@ -176,18 +169,22 @@ def distribution_plot(axis: Axis, bounds: Sequence[float] = ()) -> str:
     return _svg(figure, f"distribution of {axis.name} over {len(values)} runs")
 
 
-def tornado_chart(effects: Mapping[str, Estimate], unit: str) -> str:
-    """Draw the effect of each parameter as a bar with its interval, the largest at the top."""
-    ranked = sorted(effects.items(), key=lambda item: abs(item[1].value))
+def tornado_chart(effects: Mapping[str, Interval], title: str) -> str:
+    """Draw the effect of each parameter as a bar with its interval, the largest at the top.
+
+    Args:
+        effects: Effect of each parameter by its name.
+        title: What is drawn; it is read aloud, and stands on the page already.
+    """
+    ranked = sorted(effects.items(), key=lambda item: abs(item[1].estimate))
     figure, plot = _figure(height=max(1.3, 0.34 * len(ranked) + 0.8))
     for place, (_, effect) in enumerate(ranked):
-        plot.barh(place, effect.value, height=0.62, color=_ACCENT, alpha=0.55)
+        plot.barh(place, effect.estimate, height=0.62, color=_ACCENT, alpha=0.55)
         plot.plot([effect.low, effect.high], [place, place], color=_INK, linewidth=1.2)
     plot.axvline(0.0, color=_SOFT, linewidth=0.8)
     plot.set_yticks(range(len(ranked)), [name for name, _ in ranked])
-    plot.set_xlabel(unit)
     return _svg(
-        figure, f"{unit}: " + ", ".join(f"{name} {effect.value:.3g}" for name, effect in reversed(ranked))
+        figure, f"{title}: " + ", ".join(f"{name} {effect.estimate:.3g}" for name, effect in reversed(ranked))
     )
 
 

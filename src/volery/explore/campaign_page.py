@@ -18,7 +18,6 @@ from volery.base.files import write_text
 from volery.explore.campaign import Campaign
 from volery.explore.campaign_figures import (
     Axis,
-    Estimate,
     Flags,
     Values,
     distribution_plot,
@@ -27,8 +26,9 @@ from volery.explore.campaign_figures import (
     thinned,
     tornado_chart,
 )
-from volery.explore.points import COMPLETED, DISCARDED, Row, Value
-from volery.explore.search import front_of
+from volery.explore.points import COMPLETED, DISCARDED, Point, Row, Value
+from volery.explore.search import Front, Objective, front_of
+from volery.explore.sensitivity import MORRIS, FaultCampaign, Influences
 from volery.explore.statistics import Interval, mean, probability
 from volery.report.grids import Cell, CellStatus, Column, Grid, figure
 from volery.report.html_report import REPORT_FILE, Fact, environment
@@ -38,6 +38,8 @@ MOST_VARIANTS = 40
 """Variants in the table of variants, the best first."""
 MOST_REASONS = 20
 MOST_DISTRIBUTIONS = 8
+MOST_CHOICES = 12
+"""Names beside one axis."""
 MOST_AXES = 9
 """Axes of the parallel coordinates: more are not read."""
 
@@ -47,17 +49,89 @@ class Findings:
     """What the methods found about a campaign, for its page. Every part may be missing.
 
     Attributes:
-        objectives: Observables that are minimised.
-        maximised: Those of them that are maximised instead.
-        front: Run numbers of the Pareto front; by default the mean of each variant decides.
+        objectives: What was optimised.
+        front: Variants of the Pareto front; None if the page is to compare the means of the variants.
         effects: Effect of each parameter with its interval, by the title of the chart.
         grids: Further tables, such as the faults and phases of a fault campaign.
     """
 
-    objectives: Sequence[str] = ()
-    maximised: frozenset[str] = frozenset()
-    effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
+    objectives: Sequence[Objective] = ()
+    front: Sequence[Mapping[str, Value]] | None = None
+    effects: Mapping[str, Mapping[str, Interval]] = field(default_factory=dict)
     grids: Sequence[Grid] = ()
+
+
+def of_front(front: Front) -> Findings:
+    """Return what a search found."""
+    columns = (
+        Column("variant"),
+        *(Column(str(one), numeric=True) for one in front.objectives),
+        *(
+            Column(name, numeric=True)
+            for name in (front.solutions[0].requirements if front.solutions else ())
+        ),
+        Column("not distinguished from"),
+    )
+    rows = []
+    for one in (*front.solutions, *front.alike):
+        like = "" if one.like is None else _values(front.solutions[one.like].values)
+        rows.append(
+            (
+                Cell(_values(one.values)),
+                *(_interval_cell(each) for each in one.objectives),
+                *(Cell(f"{each.low:.3g} to {each.high:.3g}") for each in one.requirements.values()),
+                Cell(like, status="quiet"),
+            )
+        )
+    discarded = tuple(
+        (Cell(reason), Cell(str(count)))
+        for reason, count in sorted(front.discarded.items(), key=lambda one: -one[1])
+    )
+    share = f"Discarded by analysis: {100.0 * front.discarded_share:.3g} % of the variants"
+    grids = [
+        Grid("Pareto front", columns, tuple(rows)),
+        Grid(share, (Column("reason"), Column("variants", numeric=True)), discarded),
+    ]
+    return Findings(front.objectives, [one.values for one in front.solutions], grids=grids)
+
+
+def of_influences(influences: Influences) -> Findings:
+    """Return what a sensitivity analysis found."""
+    title = "mean size of elementary effects" if influences.method == MORRIS else "total Sobol index"
+    effect = {
+        one.parameter: one.first if influences.method == MORRIS else one.total
+        for one in influences.parameters
+    }
+    return Findings(effects={f"{title} on {influences.quantity}": effect})
+
+
+def of_faults(faults: FaultCampaign) -> Findings:
+    """Return what a fault campaign found: runs that met all requirements, of all runs, by fault and phase."""
+    rows = []
+    for (kind, subject), by_phase in faults.table().items():
+        cells = []
+        for phase in faults.phases:
+            met, _, runs = by_phase.get(phase, "").partition("/")
+            status: CellStatus = "good" if met == runs else "bad" if met == "0" else "warn"
+            cells.append(Cell(by_phase.get(phase, "–"), status=status))
+        rows.append((Cell(kind), Cell(subject), *cells))
+    columns = (Column("fault"), Column("of"), *(Column(phase, numeric=True) for phase in faults.phases))
+    grids = [Grid("Faults: runs that met all requirements", columns, tuple(rows))]
+    if faults.without_subject:
+        names = tuple((Cell(name),) for name in faults.without_subject)
+        grids.append(Grid("Kinds of faults that nothing in this model can have", (Column("fault"),), names))
+    return Findings(grids=grids)
+
+
+def _values(values: Mapping[str, Value]) -> str:
+    return ", ".join(f"{path} = {value}" for path, value in values.items())
+
+
+def _interval_cell(one: Interval) -> Cell:
+    if not one.runs:
+        return Cell("–", status="quiet")
+    known = 1e-9 * abs(one.estimate) < one.half_width < np.inf  # not the rounding of equal values
+    return Cell(figure(one.estimate) + (f" ± {figure(float(f'{one.half_width:.2g}'))}" if known else ""))
 
 
 class _Column:
@@ -138,7 +212,7 @@ class _Table(NamedTuple):
         return flags
 
 
-def _collect(rows: Iterable[Row]) -> _Table:
+def _collect(rows: Iterable[Row], measured: Sequence[Objective]) -> _Table:
     numbers, statuses, variants = array("q"), [], array("q")
     parameters: dict[str, _Choices] = {}
     verdicts: dict[str, _Column] = {}
@@ -161,6 +235,8 @@ def _collect(rows: Iterable[Row]) -> _Table:
             verdicts.setdefault(name, _Column()).put(index, np.nan if met is None else float(met))
         for name, seen in row.observables.items():
             observables.setdefault(name, _Column()).put(index, seen if row.completed else np.nan)
+        for objective in measured:
+            observables.setdefault(objective.name, _Column()).put(index, objective.value(row))
         if not row.completed:
             causes[row.cause] += 1
             examples.setdefault(row.cause, (row.run, row.reason))
@@ -200,15 +276,16 @@ def write_page(campaign: Campaign, findings: Findings | None = None) -> Path:
 
 
 def _render(campaign: Campaign, found: Findings) -> str:
-    table = _collect(campaign.rows())
+    table = _collect(campaign.rows(), [one for one in found.objectives if one.measure is not None])
     if not len(table.numbers):
         raise UsageError(f"{campaign.folder}: no run is finished yet")
-    unknown = [name for name in found.objectives if name not in table.observables]
+    objectives = [one.name for one in found.objectives]
+    unknown = [name for name in objectives if name not in table.observables]
     if unknown:
         raise UsageError(
             f"no run observed {unknown[0]!r}; there is {', '.join(table.observables) or 'nothing'}"
         )
-    shown = found.objectives or _most_varied(table)
+    shown = objectives or _most_varied(table)
     front = _front(table, found)
     asked, finished = campaign.count()
     links = _links(campaign.folder, table)
@@ -221,7 +298,7 @@ def _render(campaign: Campaign, found: Findings) -> str:
         ),
         _Section("Variants", _variants_note(table), grid=_variants(table, shown)),
         _parallel(table, shown, front),
-        _pareto(table, found, front, links),
+        _pareto(table, objectives, front, links),
         *(
             _Section(
                 title,
@@ -389,18 +466,10 @@ def _variants(table: _Table, shown: Sequence[str]) -> Grid:
                 Cell(str(runs[variant])),
                 Cell(f"{good[variant]}", status="good" if good[variant] == runs[variant] else "warn"),
                 Cell(f"{judged.low:.3g} to {judged.high:.3g}"),
-                *(_mean_cell(table.observables[name][inside & completed]) for name in shown),
+                *(_interval_cell(mean(table.observables[name][inside & completed])) for name in shown),
             )
         )
     return Grid("Variants", columns, tuple(rows))
-
-
-def _mean_cell(values: Values) -> Cell:
-    one = mean(values)
-    if not one.runs:
-        return Cell("–", status="quiet")
-    known = 1e-9 * abs(one.estimate) < one.half_width < np.inf  # not the rounding of equal values
-    return Cell(figure(one.estimate) + (f" ± {figure(float(f'{one.half_width:.2g}'))}" if known else ""))
 
 
 def _means(table: _Table, name: str) -> Values:
@@ -426,22 +495,29 @@ def _most_varied(table: _Table, most: int = 3) -> list[str]:
 
 
 def _front(table: _Table, found: Findings) -> Flags:
-    """Return which runs belong to variants whose means no other variant's dominate."""
-    if len(found.objectives) < 2:
-        return np.zeros(len(table.numbers), dtype=bool)
-    signs = [-1.0 if name in found.maximised else 1.0 for name in found.objectives]
-    scores = np.column_stack(
-        [sign * _means(table, name) for sign, name in zip(signs, found.objectives, strict=True)]
-    )
-    met = np.bincount(table.variants, weights=table.met, minlength=len(scores))
-    runs = np.bincount(table.variants, minlength=len(scores))
-    usable = np.flatnonzero(np.isfinite(scores).all(axis=1) & (met == runs))
-    best = {int(usable[place]) for place in front_of(scores[usable])} if len(usable) else set()
+    """Return which runs belong to the front: as it was found, else to variants with means none dominates."""
+    if found.front is not None:
+        wanted = {Point(values).variant for values in found.front}
+        best = {index for index, values in enumerate(table.variant_values) if Point(values).variant in wanted}
+    elif len(found.objectives) < 2:
+        best = set()
+    else:
+        signs = [-1.0 if one.maximise else 1.0 for one in found.objectives]
+        means = [sign * _means(table, one.name) for sign, one in zip(signs, found.objectives, strict=True)]
+        scores = np.column_stack(means)
+        met = np.bincount(table.variants, weights=table.met, minlength=len(scores))
+        runs = np.bincount(table.variants, minlength=len(scores))
+        usable = np.flatnonzero(np.isfinite(scores).all(axis=1) & (met == runs))
+        best = {int(usable[place]) for place in front_of(scores[usable])} if len(usable) else set()
     return np.array([variant in best for variant in table.variants], dtype=bool)
 
 
 def _parallel(table: _Table, shown: Sequence[str], front: Flags) -> _Section:
-    varied = [axis for axis in table.parameters.values() if len(np.unique(axis.values)) > 1]
+    varied = [
+        axis
+        for axis in table.parameters.values()
+        if len(np.unique(axis.values)) > 1 and len(axis.choices) <= MOST_CHOICES
+    ]
     axes = [*varied, *(Axis(name, table.observables[name]) for name in shown)][:MOST_AXES]
     if len(axes) < 2:
         return _Section("")
@@ -450,9 +526,9 @@ def _parallel(table: _Table, shown: Sequence[str], front: Flags) -> _Section:
     return _Section("All runs", note, [picture], wide=True)
 
 
-def _pareto(table: _Table, found: Findings, front: Flags, links: Sequence[str]) -> _Section:
+def _pareto(table: _Table, objectives: Sequence[str], front: Flags, links: Sequence[str]) -> _Section:
     pictures = []
-    for across, up in combinations(found.objectives, 2):
+    for across, up in combinations(objectives, 2):
         bands = _bands(table, front, across, up)
         axes = (Axis(across, table.observables[across]), Axis(up, table.observables[up]))
         pictures.append(_svg(pareto_plot(*axes, front, links, bands)))
@@ -460,7 +536,7 @@ def _pareto(table: _Table, found: Findings, front: Flags, links: Sequence[str]) 
     return _Section("Objectives", note, pictures)
 
 
-def _bands(table: _Table, front: Flags, *names: str) -> dict[int, tuple[Estimate, Estimate]]:
+def _bands(table: _Table, front: Flags, *names: str) -> dict[int, tuple[Interval, Interval]]:
     """Return the intervals of two objectives at the first run of each variant of the front."""
     places = np.array(table.variants)
     bands = {}
@@ -468,7 +544,7 @@ def _bands(table: _Table, front: Flags, *names: str) -> dict[int, tuple[Estimate
         inside = np.flatnonzero(places == variant)
         x, y = (mean(table.observables[name][inside]) for name in names)
         if np.isfinite([x.low, x.high, y.low, y.high]).all():
-            bands[int(inside[0])] = (Estimate(x.estimate, x.low, x.high), Estimate(y.estimate, y.low, y.high))
+            bands[int(inside[0])] = (x, y)
     return bands
 
 

@@ -9,11 +9,15 @@ import pytest
 import volery
 from rigs.small_campaigns import COUNT, model  # noqa: F401  # a fixture
 from volery.base.errors import UsageError
-from volery.explore.campaign_figures import MOST_LINES, Estimate
+from volery.explore.campaign_figures import MOST_LINES
 from volery.explore.campaign_page import Findings, write_page
 from volery.explore.campaign_store import CampaignStore
 from volery.explore.points import CRASHED, FAILED, Point, Row
+from volery.explore.search import Objective
+from volery.explore.statistics import Interval
 from volery.report.grids import Cell, Column, Grid
+
+OBJECTIVES = (Objective("energy"), Objective("time"))
 
 
 def text_of(page):
@@ -52,7 +56,7 @@ def rows_of(*variants, seeds=10):
 
 def test_the_front_has_variants_that_meet_the_requirements_and_are_not_dominated(page):
     rows = rows_of((1, 10, 50, True), (2, 20, 30, True), (3, 25, 40, True), (4, 1, 1, False))
-    drawn = page(rows, Findings(("energy", "time")))
+    drawn = page(rows, Findings(OBJECTIVES))
     assert re.search(r'aria-label="time against energy; 20 runs are not dominated"', drawn)
     assert "30 of 40 0.75" in text_of(drawn)
     assert "wind" in text_of(drawn)
@@ -82,29 +86,31 @@ def test_effects_and_further_tables_are_shown(page):
     faults = Grid(
         "Faults", (Column("fault"), Column("take-off")), ((Cell("gps"), Cell("met", status="good")),)
     )
-    effects = {"total index of time": {"wind": Estimate(0.5, 0.4, 0.6), "loss": Estimate(0.1, 0.0, 0.2)}}
+    effects = {
+        "total index of time": {"wind": Interval(0.5, 0.4, 0.6, 9), "loss": Interval(0.1, 0.0, 0.2, 9)}
+    }
     drawn = page(rows_of((1, 10, 50, True)), Findings(effects=effects, grids=[faults]))
     assert 'aria-label="total index of time: wind 0.5, loss 0.1"' in drawn
     assert "gps met" in text_of(drawn)
 
 
 def test_many_runs_draw_a_part_of_them(page):
-    drawn = page(rows_of((1, 10, 50, True), (2, 20, 30, True), seeds=2000), Findings(("energy", "time")))
+    drawn = page(rows_of((1, 10, 50, True), (2, 20, 30, True), seeds=2000), Findings(OBJECTIVES))
     assert f"the {MOST_LINES} runs that are drawn" in text_of(drawn)
     assert len(drawn) < 3_000_000
 
 
 def test_the_same_rows_give_the_same_bytes_and_no_outside_address(page):
     rows = rows_of((1, 10, 50, True), (2, 20, 30, True))
-    drawn = page(rows, Findings(("energy", "time")))
-    assert drawn == page(rows, Findings(("energy", "time")))
+    drawn = page(rows, Findings(OBJECTIVES))
+    assert drawn == page(rows, Findings(OBJECTIVES))
     addresses = set(re.findall(r'(?:href|src|url)="?(https?:[^" ]*)', drawn))
     assert not addresses
 
 
 def test_an_objective_that_no_run_observed_is_named(page):
     with pytest.raises(UsageError, match="no run observed 'price'; there is energy, time"):
-        page(rows_of((1, 10, 50, True)), Findings(("price", "time")))
+        page(rows_of((1, 10, 50, True)), Findings((Objective("price"), Objective("time"))))
 
 
 def test_a_campaign_without_a_finished_run_has_no_page(page):

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from volery.base import units
 from volery.base.errors import UsageError
 from volery.base.installed import require_extra
 from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output, make_table, number_column
 
 if TYPE_CHECKING:
+    from volery.base.time import Ns
     from volery.explore.campaign import Campaign, CampaignProgress
+    from volery.explore.campaign_page import Findings
     from volery.explore.points import Row
+    from volery.explore.search import Objective
 
 commands = Commands()
 
@@ -63,6 +67,34 @@ def explore(
             metavar="FILE", help="YAML file with `explore:`; by default explore.yaml beside the model."
         ),
     ] = None,
+    until: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TEXT",
+            help="Run seeds of each variant, at most --seeds, until an interval is narrow: "
+            "`delivery_time.p95 within 5 %`.",
+        ),
+    ] = None,
+    minimise: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="Search: an observable, or hardware_price; up to three, with --maximise."
+        ),
+    ] = None,
+    maximise: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Search: an observable.")] = None,
+    evaluations: Annotated[int, typer.Option(help="Search: variants that are run.")] = 100,
+    influence: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Which parameters influence this observable, and how much."),
+    ] = None,
+    method: Annotated[str, typer.Option(metavar="morris|sobol", help="Method of --influence.")] = "morris",
+    faults: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PHASE=TIME",
+            help="Try every kind of fault on everything at this time of the run; may be repeated.",
+        ),
+    ] = None,
     on: Annotated[
         str,
         typer.Option(metavar="ENGINE", help="processes, dask://HOST:PORT or ray://HOST:PORT."),
@@ -91,6 +123,8 @@ def explore(
 
     if show is not None:
         return _show(output, out, show)
+    objectives = [(name, False) for name in minimise or ()] + [(name, True) for name in maximise or ()]
+    study = _Study(until, objectives, evaluations, influence, method, faults or [])
     with status_line(output) as line:
 
         def tell(progress: CampaignProgress) -> None:
@@ -117,15 +151,105 @@ def explore(
             campaign = prepare(model, out, space, specification=made, on=on, workers=workers, show=tell)
         with campaign:
             try:
-                campaign.run(campaign.specification.run_points())
+                findings = _study(campaign, study)
             except KeyboardInterrupt:
                 asked, finished = campaign.count()
                 goes_on = f"`volery explore --out {out}` goes on"
                 output.complain(f"volery: interrupted after {finished} of {asked} runs; {goes_on}")
                 return FAILED
             campaign.export()
-            write_page(campaign)
+            write_page(campaign, findings)
     return _show_summary(output, campaign.folder)
+
+
+class _Study(NamedTuple):
+    """What is asked of a campaign beside its runs; at most one of it."""
+
+    until: str | None
+    objectives: list[tuple[str, bool]]
+    evaluations: int
+    influence: str | None
+    method: str
+    faults: list[str]
+
+    def check(self) -> None:
+        """Raise ``UsageError`` if more than one thing is asked."""
+        asked = {
+            "--until": self.until,
+            "--minimise or --maximise": self.objectives,
+            "--influence": self.influence,
+            "--faults": self.faults,
+        }
+        stated = [option for option, value in asked.items() if value]
+        if len(stated) > 1:
+            raise UsageError(f"{' and '.join(stated)}: one of them at a time")
+
+
+def _study(campaign: Campaign, study: _Study) -> Findings:
+    """Run what a campaign is to run, and return what was found."""
+    from volery.explore.campaign_page import Findings, of_faults, of_front, of_influences
+    from volery.explore.run_process import read_variant
+    from volery.explore.search import analysis_discards, search
+    from volery.explore.sensitivity import fault_campaign, sensitivity
+    from volery.explore.statistics import read_until
+
+    study.check()
+    space, seed = campaign.specification.space, campaign.specification.seed
+    if study.until:
+        campaign.run_until(read_until(study.until))
+    elif study.objectives:
+        system = read_variant(campaign.setting.model, {})
+        front = search(
+            campaign.evaluate,
+            space,
+            [_objective(campaign, name, maximise) for name, maximise in study.objectives],
+            evaluations=study.evaluations,
+            seed=seed,
+            constraints=[one.name for one in system.requirements],
+            repetitions=campaign.specification.seeds,
+            discard=analysis_discards(campaign.setting.model),
+        )
+        return of_front(front)
+    elif study.influence:
+        found = sensitivity(campaign.evaluate, space, study.influence, method=study.method, seed=seed)
+        return of_influences(found)
+    elif study.faults:
+        phases = dict(_phase(text) for text in study.faults)
+        system = read_variant(campaign.setting.model, {})
+        repetitions = campaign.specification.seeds
+        return of_faults(
+            fault_campaign(campaign.evaluate, system, phases, repetitions=repetitions, seed=seed)
+        )
+    else:
+        campaign.run(campaign.specification.run_points())
+    return Findings()
+
+
+def _objective(campaign: Campaign, name: str, maximise: bool) -> Objective:
+    """Return the objective of a name; the price of the hardware is one that no run observes."""
+    from volery.analysis.hardware import hardware, hardware_price
+    from volery.explore.run_process import read_variant
+    from volery.explore.search import Objective, hardware_cost
+
+    model = campaign.setting.model
+    if name != "hardware_price":
+        return Objective(name, maximise)
+    currencies = list(hardware_price(hardware(read_variant(model, {}))))
+    if len(currencies) != 1 or maximise:
+        there = ", ".join(currencies) or "no price"
+        raise UsageError(f"hardware_price is minimised in one currency; this model has {there}")
+    return hardware_cost(model, currencies[0])
+
+
+def _phase(text: str) -> tuple[str, Ns]:
+    """Return the name and the time of a phase that is written as ``take-off=5 s``."""
+    name, found, at = text.partition("=")
+    if not found or not name.strip():
+        raise UsageError(f"--faults {text!r}: write a name and a time, such as `take-off=5 s`")
+    try:
+        return name.strip(), units.read_ns(at.strip())
+    except units.QuantityError as error:
+        raise UsageError(f"--faults {text!r}: {error}") from None
 
 
 def _progress_text(progress: CampaignProgress) -> str:

@@ -150,7 +150,7 @@ def on_return(vehicle: Vehicle, _command: Command) -> int:
 def commanded_point(vehicle: Vehicle, command: Command) -> Vector | None:
     """Return the point of a command, with the vehicle's own values where it gives none; None if invalid.
 
-    Only NaN stands for none: 0 and 0 are a place, as for the original (navigator_main.cpp, 1.14 to 1.17).
+    Only NaN stands for none: 0 and 0 are a place, as for the original (navigator_main.cpp).
     """
     latitude, longitude, amsl = vehicle.estimate.geodetic
     if isfinite(command.x) and isfinite(command.y):
