@@ -85,9 +85,8 @@ def cost(
     program = compile_program(files, law, flag or ())
     invocation = Invocation(entry, tuple(before or ()), tuple(argument or ()), tuple(link or ()))
     found = estimate_program(program, invocation)
-    seconds = found.seconds(mhz)
     try:  # what the busy core draws above idle
-        joules: float | None = known.processor(law.name).power_law().core_w(mhz) * seconds
+        joules: float | None = known.processor(law.name).power_law().core_w(mhz) * found.seconds(mhz)
     except EstimateError:
         joules = None
     within = f", within {law.error:.0%}" if law.error else ""
@@ -98,23 +97,7 @@ def cost(
     if listing:
         for source in files:
             output.show(_listing(source, found.places))
-    output.give(
-        {
-            "processor": law.name,
-            "frequency_mhz": mhz,
-            "time_s": seconds,
-            "cycles": found.cycles,
-            "memory_s": found.memory_ns * 1e-9,
-            "instructions": found.instructions,
-            "energy_j": joules,
-            "provenance": law.provenance,
-            "error": law.error,
-            "measured_over_estimate": [found.band.low, found.band.high],
-            "lines": [{"source": one.source, "share": one.share} for one in found.places[:50]],
-            "library_calls": found.library_calls,
-            "left_out": list(found.left_out),
-        }
-    )
+    output.give(_as_data(law, mhz, found, joules))
     return OK
 
 
@@ -129,6 +112,24 @@ def _core_law(known: Catalogue, on: str) -> tuple[CoreLaw, float]:
         raise UsageError(f"--on {on}: give a frequency such as {kind}@{law.greatest_mhz:g}MHz") from None
     law.check_frequency(mhz)
     return law, mhz
+
+
+def _as_data(law: CoreLaw, mhz: float, found: ProgramEstimate, joules: float | None) -> dict[str, object]:
+    return {
+        "processor": law.name,
+        "frequency_mhz": mhz,
+        "time_s": found.seconds(mhz),
+        "cycles": found.cycles,
+        "memory_s": found.memory_ns * 1e-9,
+        "instructions": found.instructions,
+        "energy_j": joules,
+        "provenance": law.provenance,
+        "error": law.error,
+        "measured_over_estimate": [found.band.low, found.band.high],
+        "lines": [{"source": one.source, "share": one.share} for one in found.places[:50]],
+        "library_calls": found.library_calls,
+        "left_out": list(found.left_out),
+    }
 
 
 def _estimate_table(law: CoreLaw, mhz: float, found: ProgramEstimate, joules: float | None) -> Table:

@@ -236,19 +236,21 @@ def _calibration_sentences(found: Calibration) -> tuple[str, str, str]:
 
 
 def _write_reference(file: Path, table: OperationTable) -> None:
-    head = "Cost of CPython's operations in nanoseconds: by `volery cost calibrate python --reference`."
-    _write_yaml(file, table.model_dump(exclude_defaults=True), head)
-
-
-def _write_yaml(file: Path, content: Mapping[str, object], head: str) -> None:
     from ruamel.yaml import YAML
 
     yaml = YAML()
     yaml.width = 110
     text = io.StringIO()
-    yaml.dump(content, text)
+    text.write(
+        "# Cost of CPython's operations in nanoseconds: by `volery cost calibrate python --reference`.\n"
+    )
+    yaml.dump(table.model_dump(exclude_defaults=True), text)
+    _write_text(file, text.getvalue())
+
+
+def _write_text(file: Path, text: str) -> None:
     try:
-        file.write_text(f"# {head}\n{text.getvalue()}", encoding="utf-8")
+        file.write_text(text, encoding="utf-8")
     except OSError as error:
         raise UsageError(f"{file} cannot be written: {error.strerror}") from error
 
@@ -272,10 +274,7 @@ def libraries(
         table = measure_table(
             machine.description, DEFAULT_ROUNDS, lambda name, number: update(number, TIMED_CALLS, name)
         )
-    try:
-        file.write_text(table.as_text(), encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{file} cannot be written: {error.strerror}") from error
+    _write_text(file, table.as_text())
     output.note(
         f"{file}: {len(table.calls)} functions; in programs numpy takes {table.in_context:.2f} times as long"
     )

@@ -108,112 +108,81 @@ def _submodules(
     bound: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]
 ) -> dict[str, dict[str, Any]]:
     """Return the content of each submodule."""
-    duration = {"Duration": ros_time.Duration, "Infinite": ros_time.Infinite}
-    node = {
-        "Node": bound["Node"],
-        "HIDDEN_NODE_PREFIX": "_",
-        "NodeNameNonExistentError": NodeNameNonExistentError,
-    }
-    publisher, subscription = {"Publisher": entities.Publisher}, {"Subscription": entities.Subscription}
     logging = {"LoggingSeverity": LoggingSeverity, **logging_functions(bound["Logger"])}
-    groups = {
-        kind.__name__: kind
-        for kind in (
-            executors.CallbackGroup,
-            executors.MutuallyExclusiveCallbackGroup,
-            executors.ReentrantCallbackGroup,
-        )
+    managed = {**lifecycle.LIFECYCLE, "LifecycleNode": bound["LifecycleNode"], "Node": bound["LifecycleNode"]}
+    of_run: dict[str, dict[str, Any]] = {
+        "clock": _chosen(bound, "Clock", "ROSClock"),
+        "executors": _chosen(bound, "Executor", "MultiThreadedExecutor", "SingleThreadedExecutor"),
+        "impl.rcutils_logger": {"RcutilsLogger": bound["Logger"]},
+        "lifecycle": managed,
+        "lifecycle.node": managed,
+        "logging": logging,
+        "node": _chosen(bound, "Node"),
+        "utilities": _chosen(functions, "get_default_context", "ok", "shutdown", "try_shutdown"),
     }
-    parameter = {"Parameter": node_parameters.Parameter, **parameter_client.PARAMETER_TEXTS}
-    clock_type = {"ClockType": ros_time.ClockType}
-    managed = {
-        **lifecycle.LIFECYCLE,
-        "LifecycleNode": bound["LifecycleNode"],
-        "Node": bound["LifecycleNode"],
-    }
+    shared = _submodules_of_all_runs()
+    return {part: {**shared.get(part, {}), **of_run.get(part, {})} for part in {**shared, **of_run}}
+
+
+def _chosen(content: Mapping[str, Any], *names: str) -> dict[str, Any]:
+    return {name: content[name] for name in names}
+
+
+def _named(*members: Any) -> dict[str, Any]:
+    return {one.__name__: one for one in members}
+
+
+def _submodules_of_all_runs() -> dict[str, dict[str, Any]]:
+    """Return what refers to no run, of each submodule."""
+    clock_type = _named(ros_time.ClockType)
+    duration = {**_named(ros_time.Duration), "Infinite": ros_time.Infinite}
+    groups = _named(
+        executors.CallbackGroup, executors.MutuallyExclusiveCallbackGroup, executors.ReentrantCallbackGroup
+    )
+    parameter = {**_named(node_parameters.Parameter), **parameter_client.PARAMETER_TEXTS}
+    ends = (ConditionReachedException, ExternalShutdownException, ShutdownException, TimeoutException)
+    handlers = (install_signal_handlers, uninstall_signal_handlers, get_current_signal_handlers_options)
+    middleware = (get_available_rmw_implementations, get_rmw_implementation_identifier)
     return {
         "action": action.ACTION,
         "action.client": action.CLIENT,
         "action.graph": action.GRAPH,
         "action.server": action.SERVER,
         "callback_groups": groups,
-        "client": {"Client": entities.Client},
-        "clock": {
-            **ros_time.JUMPS,
-            **clock_type,
-            **duration,
-            "Clock": bound["Clock"],
-            "ROSClock": bound["ROSClock"],
-        },
+        "client": _named(entities.Client),
+        "clock": {**ros_time.JUMPS, **clock_type, **duration},
         "clock_type": clock_type,
         "constants": {"S_TO_NS": S},
-        "context": {"Context": Context},
+        "context": _named(Context),
         "duration": duration,
         "event_handler": events.EVENTS,
         "exceptions": {**EXCEPTIONS, **names.NAME_EXCEPTIONS},
-        "executors": {
-            "ConditionReachedException": ConditionReachedException,
-            "Executor": bound["Executor"],
-            "ExternalShutdownException": ExternalShutdownException,
-            "MultiThreadedExecutor": bound["MultiThreadedExecutor"],
-            "ShutdownException": ShutdownException,
-            "SingleThreadedExecutor": bound["SingleThreadedExecutor"],
-            "TimeoutException": TimeoutException,
-            "await_or_execute": executors.await_or_execute,
-        },
-        "guard_condition": {"GuardCondition": entities.GuardCondition},
-        "impl.logging_severity": {"LoggingSeverity": LoggingSeverity},
-        "impl.rcutils_logger": {"RcutilsLogger": bound["Logger"]},
-        "lifecycle": managed,
+        "executors": _named(*ends, executors.await_or_execute),
+        "guard_condition": _named(entities.GuardCondition),
+        "impl.logging_severity": _named(LoggingSeverity),
         "lifecycle.managed_entity": lifecycle.LIFECYCLE,
-        "lifecycle.node": managed,
-        "lifecycle.publisher": {"LifecyclePublisher": lifecycle.LifecyclePublisher},
-        "logging": logging,
-        "node": {**node, **parameter, **groups},
+        "lifecycle.publisher": _named(lifecycle.LifecyclePublisher),
+        "node": {**_named(NodeNameNonExistentError), "HIDDEN_NODE_PREFIX": "_", **parameter, **groups},
         "parameter": parameter,
         "parameter_client": parameter_client.PARAMETER_CLIENT,
         "parameter_event_handler": parameter_client.PARAMETER_EVENTS,
-        "publisher": publisher,
+        "publisher": _named(entities.Publisher),
         "qos": {**QOS, **duration},
         "qos_event": events.EVENTS,
         "qos_overriding_options": qos_overrides.OVERRIDES,
-        "serialization": {one.__name__: one for one in (serialize_message, deserialize_message)},
-        "service": {"Service": entities.Service},
-        "service_introspection": {"ServiceIntrospectionState": ServiceIntrospectionState},
-        "signals": {
-            "SignalHandlerOptions": SignalHandlerOptions,
-            **{
-                one.__name__: one
-                for one in (
-                    install_signal_handlers,
-                    uninstall_signal_handlers,
-                    get_current_signal_handlers_options,
-                )
-            },
-        },
-        "subscription": subscription,
-        "task": {"Future": executors.Future, "Task": executors.Task},
-        "time": {"Time": ros_time.Time, **duration, **clock_type},
-        "timer": {"Rate": ros_time.Rate, "Timer": entities.Timer},
+        "serialization": _named(serialize_message, deserialize_message),
+        "service": _named(entities.Service),
+        "service_introspection": _named(ServiceIntrospectionState),
+        "signals": _named(SignalHandlerOptions, *handlers),
+        "subscription": _named(entities.Subscription),
+        "task": _named(executors.Future, executors.Task),
+        "time": {**_named(ros_time.Time), **duration, **clock_type},
+        "timer": _named(ros_time.Rate, entities.Timer),
         "topic_endpoint_info": endpoint_info.ENDPOINT_INFO,
-        "type_hash": {"TypeHash": endpoint_info.TypeHash},
-        "type_support": {
-            one.__name__: one
-            for one in (check_for_type_support, check_is_valid_msg_type, check_is_valid_srv_type)
-        },
-        "utilities": {
-            **{name: functions[name] for name in ("get_default_context", "ok", "shutdown", "try_shutdown")},
-            **{
-                one.__name__: one
-                for one in (
-                    get_available_rmw_implementations,
-                    get_rmw_implementation_identifier,
-                    remove_ros_args,
-                    timeout_sec_to_nsec,
-                )
-            },
-        },
-        "wait_for_message": {"wait_for_message": wait_for_message},
+        "type_hash": _named(endpoint_info.TypeHash),
+        "type_support": _named(check_for_type_support, check_is_valid_msg_type, check_is_valid_srv_type),
+        "utilities": _named(*middleware, remove_ros_args, timeout_sec_to_nsec),
+        "wait_for_message": _named(wait_for_message),
         **names.NAMES,
     }
 
