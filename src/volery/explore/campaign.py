@@ -192,9 +192,12 @@ class Campaign:
             columns = self._store.columns(last, EXPORTED)
             for name, kind in kinds.items():
                 columns[name] = [None if one is None else kind(one) for one in columns[name]]
+            if writer is not None and not len(columns["run"]):
+                break
             booleans = {name: pa.bool_() for name in columns if name.startswith("met.")}
             types = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.string()}
-            stated = booleans | {name: types[kind] for name, kind in kinds.items()}
+            texts = dict.fromkeys(("status", "reason", "host"), pa.string())
+            stated = booleans | texts | {name: types[kind] for name, kind in kinds.items()}
             table = pa.table({name: pa.array(one, stated.get(name)) for name, one in columns.items()})
             writer = writer or ParquetWriter(part, table.schema)
             writer.write_table(table)

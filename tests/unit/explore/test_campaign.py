@@ -126,6 +126,15 @@ def test_a_model_that_was_built_in_python_is_carried(tmp_path, model):  # noqa: 
         volery.Campaign(tmp_path / "out").evaluate([Point({}, 1)])
 
 
+@pytest.mark.parametrize("part", [4, 5, 100])
+def test_a_table_is_exported_in_parts(explore, monkeypatch, part):
+    import pandas
+
+    campaign = explore(seeds=4)
+    monkeypatch.setattr(campaign_module, "EXPORTED", part)
+    assert pandas.read_parquet(campaign.export())["run"].tolist() == list(range(8))
+
+
 def test_an_unknown_run_is_refused(explore):
     with pytest.raises(UsageError, match="no run 99; its runs are 0 to 1"):
         explore().row(99)
