@@ -46,7 +46,8 @@ class Stub(Executor):
     def __init__(self, address: str, workers: int) -> None:
         self.workers = workers or 2
 
-    def submit(self, function: Any, /, task: Any, **options: Any) -> Future[Any]:
+    def submit(self, function: Any, /, *arguments: Any, **options: Any) -> Future[Any]:
+        (task,) = arguments
         future: Future[Any] = Future()
         values = np.random.default_rng(task.point.seed).random(OBSERVABLES)
         observables = {f"subject.quantity_{place}": float(one) for place, one in enumerate(values)}

@@ -10,13 +10,15 @@ Needs pymoo (``pip install pymoo``).
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from pymoo.algorithms.moo.nsga2 import NSGA2
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 
-from volery.explore.points import Row
+from volery.explore.points import Point, Row
 from volery.explore.search import front_of, hypervolume, search
 from volery.explore.space import Range
 
@@ -24,7 +26,7 @@ PROBLEMS = ("zdt1", "zdt2", "zdt3", "zdt4", "zdt6", "dtlz2")
 NOISE = 0.05
 
 
-def our_search(problem, seed, evaluations, noise=0.0):
+def our_search(problem: Any, seed: int, evaluations: int, noise: float = 0.0) -> Any:
     """Return the true objectives of the front that the search reports."""
     space = {
         f"x{n}": Range(float(low), float(high))
@@ -32,10 +34,10 @@ def our_search(problem, seed, evaluations, noise=0.0):
     }
     names = [f"f{n}" for n in range(problem.n_obj)]
 
-    def truth(variants):
+    def truth(variants: Sequence[Any]) -> Any:
         return problem.evaluate(np.array([[one[name] for name in space] for one in variants]))
 
-    def evaluate(points):
+    def evaluate(points: Sequence[Point]) -> list[Row]:
         rows = []
         for point, exact in zip(points, truth([one.values for one in points]), strict=True):
             random = np.random.default_rng([point.seed, *point.variant.encode()])
@@ -50,7 +52,7 @@ def our_search(problem, seed, evaluations, noise=0.0):
     return truth([one.values for one in front.solutions])
 
 
-def main():
+def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--seeds", type=int, default=10)
     options.add_argument("--evaluations", type=int, default=2000)

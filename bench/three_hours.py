@@ -27,7 +27,7 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
 from volery.links.mavlink_messages import message_type
-from volery.model.environment import Battery
+from volery.model.airframes import Battery
 from volery.run.assembly.simulated_fleet import SimulatedFleet, fleet_of
 from volery.run.assembly.simulated_vehicles import SimulatedVehicle, parse_simulated
 from volery.run.assembly.vehicle_nodes import PrivateGraph, open_simulated_driver, reached_over_links
