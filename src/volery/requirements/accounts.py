@@ -14,7 +14,6 @@ from math import fsum, isnan
 from typing import Any, NamedTuple
 
 from volery.base.time import Ns, S, to_seconds
-from volery.model.reading import NOTE_PREFIX
 from volery.requirements.added_observables import AddedInRun, load_added
 from volery.requirements.ledgers import (
     ChainLedger,
@@ -343,7 +342,7 @@ class Accounts:
             yield name, chain.latencies.seconds("latency")
         noted = self._noted()
         for kind, quantities in noted.items():
-            yield f"{NOTE_PREFIX}.{kind}", quantities
+            yield f"note.{kind}", quantities  # as `model.reading.NOTE_PREFIX`, which needs the extra `model`
         parcels = noted.get(DELIVERY_KIND, {})
         delivery = {
             name: parcels.get(words, None if "." in words else 0.0) for name, words in DELIVERY.items()
