@@ -91,7 +91,7 @@ class StubEngine(Executor):
             return future
         seconds = task.point.seed % 1000 / 10.0
         observables = {"drone_1.energy": 1000.0 + seconds, "drone_1.distance": seconds}
-        verdicts = {"in_time": seconds < 90.0}
+        verdicts = {"in_time": seconds < 90.0, "counted": True}
         future.set_result(
             Row(
                 task.run,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from array import array
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -29,7 +30,7 @@ from volery.explore.campaign_figures import (
 from volery.explore.points import COMPLETED, DISCARDED, Point, Row, Value
 from volery.explore.search import Front, Objective, front_of
 from volery.explore.sensitivity import MORRIS, FaultCampaign, Influences
-from volery.explore.statistics import Interval, mean, probability
+from volery.explore.statistics import Interval, Until, mean, probability
 from volery.report.grids import Cell, CellStatus, Column, Grid, figure
 from volery.report.html_report import REPORT_FILE, Fact, environment
 
@@ -102,7 +103,26 @@ def of_influences(influences: Influences) -> Findings:
         one.parameter: one.first if influences.method == MORRIS else one.total
         for one in influences.parameters
     }
-    return Findings(effects={f"{title} on {influences.quantity}": effect})
+    name = f"{title} on {influences.quantity}"
+    columns = (Column("parameter"), Column("estimate", numeric=True), Column("95 % interval", numeric=True))
+    rows = tuple(
+        (Cell(path), Cell(figure(one.estimate)), Cell(f"{figure(one.low)} to {figure(one.high)}"))
+        for path, one in effect.items()
+    )
+    return Findings(effects={name: effect}, grids=[Grid(name, columns, rows)])
+
+
+def of_intervals(until: Until, intervals: Mapping[str, Interval]) -> Findings:
+    """Return what a stopping rule came to, by ``Point.variant``."""
+    columns = (Column("variant"), Column("how sure"))
+    rows = [
+        (
+            Cell(_values(json.loads(variant)) or "the model"),
+            Cell(one.sentence(f"{until.name}.{until.statistic}")),
+        )
+        for variant, one in intervals.items()
+    ]
+    return Findings(grids=[Grid(f"Until {until}", columns, tuple(rows))])
 
 
 def of_faults(faults: FaultCampaign) -> Findings:

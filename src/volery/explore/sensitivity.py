@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from volery.base.errors import UsageError
+from volery.base.errors import UsageError, did_you_mean
 from volery.base.installed import require_extra
 from volery.base.time import Ns, S
 from volery.explore.points import Evaluate, Point, Row, Value
@@ -116,7 +116,11 @@ def sensitivity(
         )
         for row in shares
     ]
-    values = np.array([measured.value(one) for one in evaluate(points)], dtype=float)
+    rows = evaluate(points)
+    values = np.array([measured.value(one) for one in rows], dtype=float)
+    names = dict.fromkeys(name for one in rows if one.completed for name in one.observables)
+    if names and measured.measure is None and measured.name not in names:
+        raise UsageError(f"no run observed {measured.name!r}{did_you_mean(measured.name, list(names))}")
     group = len(space) + (1 if method == MORRIS else 2)
     good = np.repeat(np.isfinite(values.reshape(-1, group)).all(axis=1), group)
     groups, lost = int(good.sum()) // group, int((~good).sum()) // group

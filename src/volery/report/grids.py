@@ -64,6 +64,14 @@ class Grid:
     def __bool__(self) -> bool:
         return bool(self.rows)
 
+    def plain(self) -> dict[str, object]:
+        """Return the table as plain data: its title, and a mapping from column to text for each row."""
+        names = [column.title for column in self.columns]
+        return {
+            "title": self.title,
+            "rows": [dict(zip(names, (cell.text for cell in row), strict=True)) for row in self.rows],
+        }
+
 
 def number(value: float | None, digits: int = 1, unit: str = "") -> str:
     """Format a number with a fixed number of digits; a dash for None."""

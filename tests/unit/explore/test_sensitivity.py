@@ -57,7 +57,7 @@ def test_morris_finds_what_matters_and_a_failed_run_costs_its_trajectory_only():
         ({"size": 1}, "2 and more"),
         ({"space": {"a": Range(0, 1)}}, "two parameters"),
         ({"space": {**SPACE, "d": Choices([1, 2, 3])}}, "no order"),
-        ({"quantity": "z"}, "failed run"),
+        ({"quantity": "z"}, "no run observed 'z'"),
     ],
 )
 def test_wrong_analyses_are_refused(options, said):

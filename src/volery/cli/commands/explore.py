@@ -111,9 +111,9 @@ def explore(
 ) -> int:
     """Run a model over seeds and variants, and record a row for each run.
 
-    A campaign that was interrupted, or whose computer failed, is resumed by the same command, or by
-    `volery explore --out DIR`. Exit status: 0 if every run came to its regular end, 2 for bad input,
-    1 otherwise.
+    A campaign that was interrupted, or whose computer failed, is resumed by the same command; one without a
+    search, an analysis or faults also by `volery explore --out DIR`. Exit status: 0 if every run came to its
+    regular end, 2 for bad input, 1 otherwise.
     """
     require_extra("simulation", "campaigns")
     from volery.cli.run_display import status_line
@@ -125,6 +125,7 @@ def explore(
         return _show(output, out, show)
     objectives = [(name, False) for name in minimise or ()] + [(name, True) for name in maximise or ()]
     study = _Study(until, objectives, evaluations, influence, method, faults or [])
+    study.check()
     with status_line(output) as line:
 
         def tell(progress: CampaignProgress) -> None:
@@ -154,16 +155,17 @@ def explore(
                 findings = _study(campaign, study)
             except KeyboardInterrupt:
                 asked, finished = campaign.count()
-                goes_on = f"`volery explore --out {out}` goes on"
-                output.complain(f"volery: interrupted after {finished} of {asked} runs; {goes_on}")
+                output.complain(
+                    f"volery: interrupted after {finished} of {asked} runs; the same command goes on"
+                )
                 return FAILED
             campaign.export()
             write_page(campaign, findings)
-    return _show_summary(output, campaign.folder)
+    return _show_summary(output, campaign.folder, findings)
 
 
 class _Study(NamedTuple):
-    """What is asked of a campaign beside its runs; at most one of it."""
+    """The method of a campaign: a stopping rule, a search, an analysis or faults; at most one of them."""
 
     until: str | None
     objectives: list[tuple[str, bool]]
@@ -173,31 +175,37 @@ class _Study(NamedTuple):
     faults: list[str]
 
     def check(self) -> None:
-        """Raise ``UsageError`` if more than one thing is asked."""
-        asked = {
+        """Read what is written as text. Raises ``UsageError`` for a wrong text or for several methods."""
+        from volery.explore.statistics import read_until
+
+        methods = {
             "--until": self.until,
             "--minimise or --maximise": self.objectives,
             "--influence": self.influence,
             "--faults": self.faults,
         }
-        stated = [option for option, value in asked.items() if value]
+        stated = [option for option, value in methods.items() if value]
         if len(stated) > 1:
-            raise UsageError(f"{' and '.join(stated)}: one of them at a time")
+            raise UsageError(f"{' and '.join(stated)}: a campaign has one of them at a time")
+        if self.until:
+            read_until(self.until)
+        for phase in self.faults:
+            _phase(phase)
 
 
 def _study(campaign: Campaign, study: _Study) -> Findings:
     """Run what a campaign is to run, and return what was found."""
-    from volery.explore.campaign_page import Findings, of_faults, of_front, of_influences
+    from volery.explore.campaign_page import Findings, of_faults, of_front, of_influences, of_intervals
     from volery.explore.run_process import read_variant
     from volery.explore.search import analysis_discards, search
     from volery.explore.sensitivity import fault_campaign, sensitivity
     from volery.explore.statistics import read_until
 
-    study.check()
     space, seed = campaign.specification.space, campaign.specification.seed
     if study.until:
-        campaign.run_until(read_until(study.until))
-    elif study.objectives:
+        until = read_until(study.until)
+        return of_intervals(until, campaign.run_until(until))
+    if study.objectives:
         system = read_variant(campaign.setting.model, {})
         front = search(
             campaign.evaluate,
@@ -210,18 +218,17 @@ def _study(campaign: Campaign, study: _Study) -> Findings:
             discard=analysis_discards(campaign.setting.model),
         )
         return of_front(front)
-    elif study.influence:
+    if study.influence:
         found = sensitivity(campaign.evaluate, space, study.influence, method=study.method, seed=seed)
         return of_influences(found)
-    elif study.faults:
+    if study.faults:
         phases = dict(_phase(text) for text in study.faults)
         system = read_variant(campaign.setting.model, {})
         repetitions = campaign.specification.seeds
         return of_faults(
             fault_campaign(campaign.evaluate, system, phases, repetitions=repetitions, seed=seed)
         )
-    else:
-        campaign.run(campaign.specification.run_points())
+    campaign.run(campaign.specification.run_points())
     return Findings()
 
 
@@ -280,9 +287,10 @@ def _values(row: Row) -> str:
     return "".join(f"{path} = {value}, " for path, value in row.point.values.items())
 
 
-def _show_summary(output: Output, folder: Path) -> int:
-    """Show what a campaign came to. Return the exit status."""
+def _show_summary(output: Output, folder: Path, findings: Findings) -> int:
+    """Show what a campaign came to, and what its method found. Return the exit status."""
     from volery.explore.campaign import Campaign
+    from volery.report.terminal import GridTable
 
     with Campaign(folder) as campaign:
         found = _summary(campaign)
@@ -300,6 +308,10 @@ def _show_summary(output: Output, folder: Path) -> int:
     for one in reasons[:SHOWN_REASONS]:
         again = f"`volery explore --out {folder} --show {one['first']}`"
         output.note(f"{one['runs']} {one['status']}, such as: {one['reason']}; {again}")
+    for grid in findings.grids:
+        if grid:
+            output.show(GridTable(grid))
+    found["findings"] = [grid.plain() for grid in findings.grids if grid]
     output.give(found)
     output.note(f"report: {found['report']}\ntable: {found['table']}")
     return OK if set(found["statuses"]) <= {"completed", "discarded"} else FAILED
