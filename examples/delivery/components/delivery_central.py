@@ -41,6 +41,8 @@ LEAST_CHARGE = 0.3
 
 SILENT_POLLS = 3
 """After so many questions without an answer a vehicle counts as failed."""
+START_POLLS = 60
+"""The same of a vehicle that has never answered: its node may still be starting."""
 
 
 @dataclass
@@ -174,7 +176,7 @@ class DeliveryCentral:
             vehicle.status = vehicle.port.status()
         except VoleryError as error:
             vehicle.silent += 1
-            if vehicle.silent >= SILENT_POLLS:
+            if vehicle.silent >= (SILENT_POLLS if vehicle.base else START_POLLS):
                 self._fail(vehicle, f"does not answer: {error}")
             return
         vehicle.silent = 0

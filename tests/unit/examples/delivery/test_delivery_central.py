@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from math import inf
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -32,7 +33,7 @@ class Controller:
         self.takes = faults.get("takes", 20.0)
         self.fails_at = faults.get("fails_at")
         self.battery = faults.get("battery", 1.0)
-        self.answers = faults.get("answers", True)
+        self.answers_from = faults.get("answers_from", 0.0)
         self.knows_itself_at = faults.get("knows_itself_at", 0.0)
         self.job, self.goal, self.until, self.jobs = "", None, 0.0, []
 
@@ -54,7 +55,7 @@ class Controller:
     fly = drive
 
     def status(self):
-        if not self.answers:
+        if self.now < self.answers_from:
             raise LinkSilent("no answer")
         busy = bool(self.job) and self.now < self.until
         if self.goal is not None and not busy and not self.failed:
@@ -193,7 +194,9 @@ def test_a_vehicle_that_does_not_know_yet_where_it_is_is_waited_for(service):
     [
         ({"drone_a": {"fails_at": 10.0}}, THE_WAY),  # before it has the parcel: the other drone comes
         ({"drone_a": {"battery": 0.2}}, THE_WAY),
-        ({"drone_a": {"answers": False}}, THE_WAY),
+        ({"drone_a": {"answers_from": inf}}, THE_WAY),
+        # nodes that start slowly: it waits for them
+        ({name: {"answers_from": 8.0} for name in ("rover_a", "rover_b", "drone_a", "drone_b")}, THE_WAY),
         ({"rover_a": {"fails_at": 3.0}}, THE_WAY),  # while it loads
         (
             {

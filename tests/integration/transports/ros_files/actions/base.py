@@ -12,9 +12,9 @@ def drive(goal):
         if server.is_preempt_requested():
             server.set_preempted(text="stopped on the way")
             return
+        rospy.sleep(0.1)  # actionlib's client drops feedback that comes before its send_goal has returned
         feedback.base_position.pose.position.x += 1.0
         server.publish_feedback(feedback)
-        rospy.sleep(0.1)
     server.set_succeeded(text="arrived")
 
 
