@@ -33,7 +33,7 @@ from volery.base.errors import ModelError, UsageError
 from volery.base.installed import require_extra
 from volery.explore.points import Evaluate, Point, Row, Value
 from volery.explore.run_process import read_variant
-from volery.explore.space import Choices, Space
+from volery.explore.space import Choices, Parameter, Space
 from volery.explore.specification import run_seed
 from volery.explore.statistics import LEVEL, Array, Interval, mean, met
 from volery.model.builder import ModelBuilder
@@ -322,9 +322,7 @@ class _Search:
         while len(self._evaluated) < evaluations and idle < MOST_IDLE:
             before = len(self._known)
             trials = [study.ask(asked) for _ in range(POPULATION)]
-            variants = [
-                {path: one.at(_share(one, t.params[path])) for path, one in space.items()} for t in trials
-            ]
+            variants = [{path: _drawn(one, t.params[path]) for path, one in space.items()} for t in trials]
             found = self.run(variants, evaluations - len(self._evaluated))
             for trial, one in zip(trials, found, strict=True):
                 _tell(study, trial, one, self._constraints)
@@ -389,9 +387,9 @@ def _distributions(space: Space) -> dict[str, Any]:
     }
 
 
-def _share(parameter: Any, drawn: float) -> float:
-    """Return the share of the space of what Optuna has drawn: the number of a choice, else the share."""
-    return (drawn + 0.5) / len(parameter.values) if isinstance(parameter, Choices) else drawn
+def _drawn(parameter: Parameter, drawn: Any) -> Value:
+    """Return the value of what Optuna has drawn: the number of a choice, else a share of the space."""
+    return parameter.values[drawn] if isinstance(parameter, Choices) else parameter.at(drawn)
 
 
 def _tell(study: Any, trial: Any, found: _Variant | None, constraints: Sequence[str]) -> None:

@@ -6,15 +6,17 @@ and every method of search and sensitivity serves every kind of parameter.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
-from math import inf
+from itertools import accumulate, pairwise, product
+from math import erfc, inf, sqrt
 from statistics import NormalDist
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from volery.base.elementary import exp, log
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.installed import require_extra
 from volery.explore.points import PATHS, Value
@@ -36,16 +38,34 @@ class Choices:
 
     Attributes:
         values: The values; their order carries no meaning.
+        weights: How frequent each is in a sample, relative to the others; all alike if it is empty.
+
+    Raises:
+        UsageError: There are fewer or more weights than values, one is negative, or all are 0.
     """
 
     values: Sequence[Value]
+    weights: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        """Check the weights."""
+        if not self.weights:
+            return
+        if len(self.weights) != len(self.values):
+            raise UsageError(f"{len(self.values)} values have {len(self.weights)} weights; give one for each")
+        if not all(0.0 <= one < inf for one in self.weights) or not any(self.weights):
+            raise UsageError("weights are numbers from 0 on, and one at least is more than 0")
 
     def at(self, share: float) -> Value:
         """Return the value at a share of the space, 0..1."""
-        return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
+        if not self.weights:
+            return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
+        ends = list(accumulate(self.weights))
+        place = bisect_right(ends, share * ends[-1])
+        return self.values[min(place, bisect_left(ends, ends[-1]))]
 
     def grid(self) -> Sequence[Value]:
-        """Return the values of a grid."""
+        """Return the values of a grid: all, whatever their weights."""
         return self.values
 
 
@@ -100,41 +120,143 @@ class Range:
         return self.low + share * (self.high - self.low)
 
 
-@dataclass(frozen=True)
-class Normal:
-    """A parameter with a normal distribution, truncated where bounds are given.
+class Law(NamedTuple):
+    """A kind of distribution.
 
     Attributes:
-        mean: Mean before the truncation.
-        sd: Standard deviation before the truncation.
-        unit: Unit of all numbers.
-        least: Least value.
-        most: Greatest value.
+        needed: Names of the numbers that it needs.
+        usual: Further numbers with their usual values.
+        bare: Those of them that have no unit.
+        positive: Those that must be more than 0.
+        quantile: Returns the quantile at a share, 0..1, from the share and all numbers.
     """
 
-    mean: float
-    sd: float
+    needed: tuple[str, ...]
+    usual: Mapping[str, float]
+    bare: tuple[str, ...]
+    positive: tuple[str, ...]
+    quantile: Callable[[float, Mapping[str, float]], float]
+
+
+def _normal(share: float, mean: float, sd: float, least: float, most: float) -> float:
+    """Return a quantile of a normal distribution that is truncated."""
+    if least > mean:  # the upper tail has no digits left below 1: use the lower one
+        return 2.0 * mean - _normal(1.0 - share, mean, sd, 2.0 * mean - most, 2.0 * mean - least)
+    low, high = (0.5 * erfc((mean - one) / (sd * sqrt(2.0))) for one in (least, most))
+    if not high:
+        return most  # so far out that all of it is at the bound
+    inner = low + share * (high - low)
+    if not low:
+        inner = max(inner, _TAIL * high)
+    if high == 1.0:
+        inner = min(inner, 1.0 - _TAIL)
+    return min(max(NormalDist(mean, sd).inv_cdf(inner), least), most)
+
+
+def _lognormal(share: float, of: Mapping[str, float]) -> float:
+    """Return a quantile of a distribution whose logarithm is normal, truncated."""
+    bounds = (
+        log(one) if 0.0 < one < inf else inf if one > 0.0 else -inf for one in (of["least"], of["most"])
+    )
+    return exp(_normal(share, log(of["median"]), of["sigma"], *bounds))
+
+
+def _triangular(share: float, of: Mapping[str, float]) -> float:
+    low, mode, high = of["least"], of["mode"], of["most"]
+    width, left = high - low, mode - low
+    if share * width < left:
+        return low + sqrt(share * width * left)
+    return high - sqrt((1.0 - share) * width * (high - mode))
+
+
+def _beta(share: float, of: Mapping[str, float]) -> float:
+    require_extra("explore", "a beta distribution")
+    from scipy.special import betaincinv  # noqa: PLC0415  # optional
+
+    return of["least"] + (of["most"] - of["least"]) * float(betaincinv(of["a"], of["b"], share))
+
+
+_TAIL = 1e-9
+"""Share of a normal distribution that is left out on a side without a bound: its quantile is infinite."""
+
+_UNBOUNDED = {"least": -inf, "most": inf}
+LAWS: Final = {
+    "normal": Law(
+        ("mean", "sd"),
+        _UNBOUNDED,
+        (),
+        ("sd",),
+        lambda share, of: _normal(share, of["mean"], of["sd"], of["least"], of["most"]),
+    ),
+    "lognormal": Law(("median", "sigma"), _UNBOUNDED, ("sigma",), ("median", "sigma"), _lognormal),
+    "triangular": Law(("least", "mode", "most"), {}, (), (), _triangular),
+    "beta": Law(("a", "b", "least", "most"), {}, ("a", "b"), ("a", "b"), _beta),
+}
+"""Distributions by their names."""
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """A parameter with a distribution.
+
+    Example::
+
+        Distribution("normal", {"mean": 2.0, "sd": 0.5, "least": 1.0}, "ms")
+
+    Attributes:
+        law: ``normal`` with ``mean`` and ``sd``, truncated where ``least`` and ``most`` say so;
+            ``lognormal`` with ``median`` and ``sigma``, the standard deviation of the logarithm, truncated
+            likewise; ``triangular`` with ``least``, ``mode`` and ``most``; ``beta`` with ``a`` and ``b``
+            between ``least`` and ``most``.
+        numbers: Numbers of the law by their names.
+        unit: Unit of all of them but ``sigma``, ``a`` and ``b``.
+
+    Raises:
+        UsageError: There is no such law, or no distribution has these numbers.
+    """
+
+    law: str
+    numbers: Mapping[str, float]
     unit: str = ""
-    least: float = -inf
-    most: float = inf
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if self.law not in LAWS:
+            raise UsageError(
+                f"no distribution {self.law!r}{did_you_mean(self.law, LAWS)}; there is {choices(LAWS)}"
+            )
+        law = LAWS[self.law]
+        wrong = [name for name in self.numbers if name not in (*law.needed, *law.usual)]
+        missing = [name for name in law.needed if name not in self.numbers]
+        if wrong or missing:
+            what = f"has no number {wrong[0]!r}" if wrong else f"needs `{missing[0]}`"
+            named = ", ".join((*law.needed, *(f"{name} (optional)" for name in law.usual)))
+            raise UsageError(f"a {self.law} distribution {what}; its numbers are {named}")
+        known = self._known
+        for name in law.positive:
+            if not known[name] > 0.0:
+                raise UsageError(f"`{name}` of a {self.law} distribution must be more than 0")
+        in_order = [name for name in ("least", "mode", "most") if name in known]
+        for one, other in pairwise(in_order):
+            if known[one] > known[other] or (known["least"] >= known["most"]):
+                raise UsageError(f"`{one}` of a {self.law} distribution must be less than `{other}`")
+        if self.law == "lognormal" and known["most"] <= 0.0:
+            raise UsageError("`most` of a lognormal distribution must be more than 0, as all its values are")
+
+    @property
+    def _known(self) -> Mapping[str, float]:
+        return {**LAWS[self.law].usual, **self.numbers}
 
     def at(self, share: float) -> Value:
         """Return the quantile at a share, 0..1."""
-        spread = NormalDist(self.mean, self.sd)
-        low, high = spread.cdf(self.least), spread.cdf(self.most)
-        inner = min(max(low + share * (high - low), _TAIL), 1.0 - _TAIL)
-        return _stated(min(max(spread.inv_cdf(inner), self.least), self.most), self.unit)
+        return _stated(LAWS[self.law].quantile(share, self._known), self.unit)
 
     def grid(self) -> Sequence[Value]:
         """Raise ``UsageError``: a distribution is sampled."""
         raise UsageError(f"a distribution has no grid; choose another plan: {choices(METHODS[1:])}")
 
 
-_TAIL = 1e-9
-"""Share of a normal distribution that is left out on both sides: its quantiles at 0 and 1 are infinite."""
-
-
-Parameter = Choices | Range | Normal
+Parameter = Choices | Range | Distribution
 
 Space = Mapping[str, Parameter]
 """Parameters by the paths that they set, joined by commas if they are several, or by ``scenario`` and

@@ -6,7 +6,7 @@ that a campaign's folder keeps it in the same form.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Annotated, Any
@@ -14,12 +14,12 @@ from typing import Annotated, Any
 import numpy as np
 
 from volery.base import units
-from volery.base.errors import Location, ModelError, UsageError
+from volery.base.errors import Location, ModelError, UsageError, choices, did_you_mean
 from volery.base.files import read_text
 from volery.base.time import Ns, S
 from volery.base.units import QuantityError
 from volery.explore.points import Point
-from volery.explore.space import GRID, METHODS, Choices, Normal, Parameter, Plan, Range
+from volery.explore.space import GRID, LAWS, METHODS, Choices, Distribution, Parameter, Plan, Range
 from volery.model.assembly import change_from_option, model_file, read_tree
 from volery.model.builder import ModelBuilder, plain_node
 from volery.model.fields import (
@@ -51,12 +51,26 @@ class _Parameter(Syntax):
         """See ``Syntax``."""
         try:
             return read_parameter(node)
+        except _WrongPartError as error:
+            reading.problems.add((*path, *error.path), str(error))
+            raise WrongValueError("") from None
         except UsageError as error:
             raise WrongValueError(str(error)) from None
 
     def schema(self, definitions: Schema) -> Schema:
         """See ``Syntax``."""
-        return {"x-quantity": "a list of values, `a .. b`, {from, to, steps, log} or {normal: {mean, sd}}"}
+        return {"x-quantity": f"a list of values, `a .. b`, {{from, to, steps, log}} or {_DISTRIBUTIONS}"}
+
+
+_DISTRIBUTIONS = f"a distribution ({', '.join(LAWS)}, discrete)"
+
+
+class _WrongPartError(UsageError):
+    """Something below a parameter is wrong, at *path*."""
+
+    def __init__(self, path: Path, message: str) -> None:
+        super().__init__(message)
+        self.path = path
 
 
 def read_parameter(node: Node) -> Parameter:
@@ -74,28 +88,25 @@ def read_parameter(node: Node) -> Parameter:
 
 
 _RANGE_KEYS = ("from", "to", "steps", "log", "integer")
-_NORMAL_KEYS = ("mean", "sd", "least", "most")
 
 
 def _written_parameter(node: Node) -> Parameter:
     stated: dict[str, Any] = {key: one.value for key, one in node.items.items()}
-    if set(stated) == {"normal"} and isinstance(stated["normal"], dict):
-        inner = {key: one.value for key, one in node.items["normal"].items.items()}
-        _check_keys(inner, _NORMAL_KEYS, ("mean", "sd"))
-        numbers, unit = _numbers(inner)
-        if numbers["sd"] <= 0.0:
-            raise UsageError("the standard deviation `sd` must be more than 0")
-        return Normal(
-            numbers["mean"],
-            numbers["sd"],
-            unit,
-            numbers.get("least", -np.inf),
-            numbers.get("most", np.inf),
+    if len(stated) == 1 and "from" not in stated and "to" not in stated:
+        ((kind, inner),) = node.items.items()
+        return _discrete(inner) if kind == "discrete" else _distribution(kind, inner)
+    wrong = [key for key in stated if key not in _RANGE_KEYS]
+    missing = [key for key in ("from", "to") if key not in stated]
+    if wrong or missing:
+        what = f"unknown key {wrong[0]!r}" if wrong else f"the key {missing[0]!r} is missing"
+        raise _WrongPartError(
+            (*wrong[:1],),
+            f"{what}: a parameter is a list of values, `a .. b`, {{from, to, steps, log, integer}} or "
+            f"{_DISTRIBUTIONS}",
         )
-    _check_keys(stated, _RANGE_KEYS, ("from", "to"))
-    for key, kind in (("steps", int), ("log", bool), ("integer", bool)):
-        if not isinstance(stated.get(key, kind()), kind):
-            raise UsageError(f"`{key}` is {stated[key]!r}")
+    for key, type_ in (("steps", int), ("log", bool), ("integer", bool)):
+        if not isinstance(stated.get(key, type_()), type_):
+            raise _WrongPartError((key,), f"`{key}` is {stated[key]!r}")
     return _range(
         stated["from"],
         stated["to"],
@@ -105,21 +116,55 @@ def _written_parameter(node: Node) -> Parameter:
     )
 
 
-def _check_keys(stated: Mapping[str, Any], known: Sequence[str], needed: Sequence[str]) -> None:
-    wrong = [key for key in stated if key not in known]
-    missing = [key for key in needed if key not in stated]
-    if wrong or missing:
-        what = f"unknown key {wrong[0]!r}" if wrong else f"the key {missing[0]!r} is missing"
-        raise UsageError(
-            f"{what}: a parameter is a list of values, `a .. b`, "
-            "{from, to, steps, log, integer} or {normal: {mean, sd, least, most}}"
+def _distribution(name: str, node: Node) -> Distribution:
+    law = LAWS.get(name)
+    if law is None:
+        names = (*LAWS, "discrete")
+        raise _WrongPartError(
+            (name,), f"no distribution {name!r}{did_you_mean(name, names)}; there is {choices(names)}"
         )
+    stated = {key: one.value for key, one in node.items.items()}
+    if not stated:
+        raise _WrongPartError((name,), f"a {name} distribution needs {', '.join(law.needed)}")
+    try:
+        bare = {key: _number(value) for key, value in stated.items() if key in law.bare}
+        numbers, unit = _numbers({key: value for key, value in stated.items() if key not in law.bare})
+        for key, (_, found) in bare.items():
+            if found:
+                raise _WrongPartError(
+                    (name, key), f"`{key}` of a {name} distribution has no unit, not {found!r}"
+                )
+        return Distribution(name, numbers | {key: number for key, (number, _) in bare.items()}, unit)
+    except _WrongPartError:
+        raise
+    except UsageError as error:
+        named = [key for key in stated if f"{key!r}" in str(error) or f"`{key}`" in str(error)]
+        raise _WrongPartError((name, *named[:1]), str(error)) from None
+
+
+def _discrete(node: Node) -> Choices:
+    lists = {key: one.value for key, one in node.items.items()}
+    wrong = [key for key in lists if key not in ("values", "weights")]
+    if wrong or not all(isinstance(lists.get(key), list) and lists[key] for key in ("values", "weights")):
+        raise _WrongPartError(
+            ("discrete", *wrong[:1]), "a discrete distribution is {values: [600 MHz, 1 GHz], weights: [3, 1]}"
+        )
+    weights = []
+    for place, one in enumerate(node.items["weights"].plain()):
+        number, unit = _number(one)
+        if unit:
+            raise _WrongPartError(("discrete", "weights", place), f"a weight has no unit: {one!r}")
+        weights.append(number)
+    try:
+        return Choices(list(node.items["values"].plain()), weights)
+    except UsageError as error:
+        raise _WrongPartError(("discrete", "weights"), str(error)) from None
 
 
 def _numbers(stated: Mapping[str, Any]) -> tuple[dict[str, float], str]:
     """Return numbers with the same unit, and the unit."""
     found = {key: _number(value) for key, value in stated.items()}
-    used = list(dict.fromkeys(unit for _, unit in found.values()))
+    used = list(dict.fromkeys(unit for _, unit in found.values())) or [""]
     if len(used) > 1:
         raise UsageError(f"the numbers have the units {' and '.join(map(repr, used))}; use one for all")
     return {key: number for key, (number, _) in found.items()}, used[0]
@@ -153,13 +198,21 @@ def _range(low: Any, high: Any, *, steps: int = 0, log: bool = False, integer: b
 def parameter_text(parameter: Parameter) -> Any:
     """Return a parameter as it is written in YAML, as plain data."""
     if isinstance(parameter, Choices):
-        return list(parameter.values)
-    if isinstance(parameter, Normal):
-        bounds = {"least": parameter.least, "most": parameter.most}
-        numbers = {"mean": parameter.mean, "sd": parameter.sd}
-        numbers |= {key: number for key, number in bounds.items() if np.isfinite(number)}
-        unit = f" {parameter.unit}" if parameter.unit else ""
-        return {"normal": {key: f"{number!r}{unit}" if unit else number for key, number in numbers.items()}}
+        values = list(parameter.values)
+        return (
+            {"discrete": {"values": values, "weights": list(parameter.weights)}}
+            if parameter.weights
+            else values
+        )
+    if isinstance(parameter, Distribution):
+        bare = LAWS[parameter.law].bare
+        return {
+            parameter.law: {
+                key: number if key in bare or not parameter.unit else f"{number!r} {parameter.unit}"
+                for key, number in parameter.numbers.items()
+                if np.isfinite(number)
+            }
+        }
     ends = Range(parameter.low, parameter.high, parameter.unit)
     flags = {"steps": parameter.steps, "log": parameter.log, "integer": parameter.integer}
     return {"from": ends.value(ends.low), "to": ends.value(ends.high)} | {

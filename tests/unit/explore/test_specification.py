@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from volery.base.errors import ModelError, UsageError
-from volery.explore.space import Choices, Normal, Range
+from volery.explore.space import Choices, Distribution, Range
 from volery.explore.specification import (
     parameter_from_option,
     read_specification,
@@ -28,6 +28,10 @@ space:
   platform.processors.onboard.frequency: 600 MHz .. 1500 MHz
   environment.wind.speed: {from: 0 m/s, to: 8 m/s, steps: 5}
   components.Patrol.activation.time: {normal: {mean: 2 ms, sd: 0.5 ms, least: 1 ms}}
+  a.lognormal: {lognormal: {median: 2 ms, sigma: 0.3, most: 9 ms}}
+  a.triangular: {triangular: {least: 1 kg, mode: 2 kg, most: 4 kg}}
+  a.beta: {beta: {a: 2, b: 5, least: 0 m/s, most: 12 m/s}}
+  a.discrete: {discrete: {values: [600 MHz, 1 GHz], weights: [3, 1]}}
   run.duration: 10 min
 """
 
@@ -40,7 +44,11 @@ def test_everything_that_can_be_stated_is_read_and_written_again():
         Choices(["fast", "slow"]),
         Range(600, 1500, "MHz"),
         Range(0, 8, "m/s", steps=5),
-        Normal(2, 0.5, "ms", 1),
+        Distribution("normal", {"mean": 2, "sd": 0.5, "least": 1}, "ms"),
+        Distribution("lognormal", {"median": 2, "most": 9, "sigma": 0.3}, "ms"),
+        Distribution("triangular", {"least": 1, "mode": 2, "most": 4}, "kg"),
+        Distribution("beta", {"least": 0, "most": 12, "a": 2, "b": 5}, "m/s"),
+        Choices(["600 MHz", "1 GHz"], [3, 1]),
         Choices(["10 min"]),
     ]
     assert read_specification(found.plain()) == found
@@ -59,6 +67,24 @@ def test_everything_that_can_be_stated_is_read_and_written_again():
         ("space:\n  a: {from: 1 m, too: 2 m}", 2, "unknown key 'too'"),
         ("space:\n  a: {from: 0, to: 2, log: true}", 2, "begins above 0"),
         ("space:\n  a: {normal: {mean: 1, sd: 0}}", 2, "more than 0"),
+        ("space:\n  a:\n    normal:\n      mean: 1 m\n      sdd: 2 m", 5, "no number 'sdd'"),
+        ("space:\n  a:\n    normal:\n      mean: 1 m\n      sd: -1 m", 5, "more than 0"),
+        ("space:\n  a: {gamma: {a: 1}}", 2, "no distribution 'gamma'; there is"),
+        ("space:\n  a: {trianglar: {a: 1}}", 2, "did you mean 'triangular'"),
+        ("space:\n  a:\n    beta: {a: 1, b: 2}", 3, "needs `least`"),
+        (
+            "space:\n  a:\n    beta:\n      a: 1 m\n      b: 2\n      least: 0\n      most: 1",
+            4,
+            "has no unit",
+        ),
+        ("space:\n  a: {lognormal: 3}", 2, "needs median, sigma"),
+        (
+            "space:\n  a:\n    discrete:\n      values: [1, 2]\n      weights: [1]",
+            5,
+            "2 values have 1 weights",
+        ),
+        ("space:\n  a:\n    discrete:\n      values: [1]\n      weights:\n        - 1 m", 6, "no unit"),
+        ("space:\n  a: {discrete: {values: [1]}}", 2, "a discrete distribution is"),
         ("limit: 3", 1, "such as"),
     ],
 )
@@ -87,6 +113,12 @@ def test_the_section_is_in_the_model_or_beside_it(tmp_path):
         ("a.b=[x, y]", "a.b", Choices(["x", "y"])),
         ("a, b=0 m .. 2 m", "a, b", Range(0, 2, "m")),
         ("a={from: 1, to: 9, log: true}", "a", Range(1, 9, log=True)),
+        (
+            "a={triangular: {least: 1 m, mode: 2 m, most: 4 m}}",
+            "a",
+            Distribution("triangular", {"least": 1, "mode": 2, "most": 4}, "m"),
+        ),
+        ("a={discrete: {values: [1, 2], weights: [3, 1]}}", "a", Choices([1, 2], [3, 1])),
     ],
 )
 def test_an_option_states_a_parameter(option, path, parameter):
@@ -98,6 +130,8 @@ def test_an_option_without_values_is_refused():
         parameter_from_option("a.b")
     with pytest.raises(UsageError, match=r"--set a=1 \.\. 1"):
         parameter_from_option("a=1 .. 1")
+    with pytest.raises(UsageError, match=r"--set a=.*needs `sd`"):
+        parameter_from_option("a={normal: {mean: 1}}")
 
 
 def test_seeds_are_those_of_the_campaign_and_common_to_variants():
