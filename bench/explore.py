@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from volery.explore.campaign import prepare
+from volery.explore.campaign import CampaignRequest, prepare
 from volery.explore.campaign_store import CampaignStore
 from volery.explore.executors import executors
 from volery.explore.points import Point, Row
@@ -85,7 +85,7 @@ def memory_mb(pid: int) -> tuple[float, float]:
 def campaign_costs(folder: Path, runs: int, workers: int) -> tuple[float, float, tuple[float, float]]:
     """Run a campaign of the starter. Return processor seconds, wall seconds, and memory of a worker."""
     before, began = process_time(), perf_counter()
-    with prepare(STARTER, folder, workers=workers, seeds=runs) as campaign:
+    with prepare(CampaignRequest.of(STARTER, folder, workers=workers, seeds=runs)) as campaign:
         campaign.run(campaign.specification.run_points())
         wall = perf_counter() - began
         below = list(descendants(os.getpid()))

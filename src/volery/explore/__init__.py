@@ -14,10 +14,10 @@ class _Callable(ModuleType):
     """A package that may be called as the function of its name."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        """See ``volery.explore.campaign.explore``."""
-        from volery.explore.campaign import explore  # noqa: PLC0415  # the package must be light to import
+        """Run the campaign of ``campaign.CampaignRequest.of(...)``: see there, and ``campaign.explore``."""
+        from volery.explore.campaign import CampaignRequest, explore  # noqa: PLC0415  # light to import
 
-        return explore(*arguments, **options)
+        return explore(CampaignRequest.of(*arguments, **options))
 
 
 sys.modules[__name__].__class__ = _Callable

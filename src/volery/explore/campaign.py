@@ -243,7 +243,8 @@ class Campaign:
 
         Example::
 
-            prepare("model.yaml", "runs/sure", seeds=1000).run_until(read_until("landing within 5 %"))
+            request = CampaignRequest.of("model.yaml", "runs/sure", seeds=1000)
+            prepare(request).run_until(read_until("landing within 5 %"))
 
         Args:
             until: What is to be known how well, by ``statistics.read_until``.
@@ -375,18 +376,64 @@ class _ProgressClock:
         self._show(CampaignProgress(self._finished, self._asked, dict(self._statuses), left))
 
 
-def explore(
-    model: str | Path | ModelBuilder,
-    out: str | Path,
-    space: Mapping[str, Parameter | Sequence[Value]] | None = None,
-    *,
-    specification: Specification | None = None,
-    on: str = "processes",
-    workers: int = 0,
-    show: ShowProgress | None = None,
-    **stated: Any,
-) -> Campaign:
+@dataclass(frozen=True)
+class CampaignRequest:
+    """What ``explore`` and ``prepare`` are asked for.
+
+    Attributes:
+        model: A file, a folder with a ``model.yaml``, or a ``ModelBuilder``.
+        out: Folder of the campaign.
+        specification: What is run. One without parameters varies the model's own ``design_parameters``.
+        on: The engine: ``processes`` on this machine, ``dask://HOST:PORT`` or ``ray://HOST:PORT``.
+        workers: Runs at a time; 0 for as many as the engine has processors.
+        show: Receives the progress about once a second.
+    """
+
+    model: str | Path | ModelBuilder
+    out: str | Path
+    specification: Specification
+    on: str = "processes"
+    workers: int = 0
+    show: ShowProgress | None = None
+
+    @classmethod
+    def of(
+        cls,
+        model: str | Path | ModelBuilder,
+        out: str | Path,
+        space: Mapping[str, Parameter | Sequence[Value]] | None = None,
+        specification: Specification | None = None,
+        **stated: Any,
+    ) -> Self:
+        """Return a request for a specification with changes.
+
+        Args:
+            model: The model.
+            out: Folder of the campaign.
+            space: Parameters, or lists of values, by the paths that they set and by ``scenario`` and
+                ``allocation``. They are added to those of the specification.
+            specification: By default what the model says under ``explore``, or ``explore.yaml`` beside it.
+            stated: Further attributes, and fields of ``Specification``: ``seeds=20``.
+
+        Raises:
+            ModelError: What the model says is wrong.
+            UsageError: There is no such attribute or field.
+        """
+        own = {name: stated.pop(name) for name in ("on", "workers", "show") if name in stated}
+        unknown = [name for name in stated if name not in Specification.__dataclass_fields__]
+        if unknown:
+            raise UsageError(f"explore() has no argument {unknown[0]!r}")
+        made = specification or specification_of(model)
+        added = {
+            path: one if isinstance(one, Parameter) else Choices(one) for path, one in (space or {}).items()
+        }
+        return cls(model, out, replace(made, space={**made.space, **added}, **stated), **own)
+
+
+def explore(request: CampaignRequest) -> Campaign:
     """Run a campaign, or resume the one in its folder, and return it.
+
+    ``volery.explore`` makes the request from its arguments, which are those of ``CampaignRequest.of``.
 
     Example::
 
@@ -398,27 +445,12 @@ def explore(
         )
         print(campaign.table())
 
-    Args:
-        model: A file, a folder with a ``model.yaml``, or a ``ModelBuilder``.
-        out: Folder of the campaign.
-        space: Parameters, or lists of values, by the paths that they set and by ``scenario`` and
-            ``allocation``. They are added to those of the specification.
-        specification: What is run; by default what the model says under ``explore``, or the file
-            ``explore.yaml`` beside it. A specification without parameters varies the model's own
-            ``design_parameters``.
-        on: The engine: ``processes`` on this machine, ``dask://HOST:PORT`` or ``ray://HOST:PORT``.
-        workers: Runs at a time; 0 for as many as the engine has processors.
-        show: Receives the progress about once a second.
-        stated: Fields of ``Specification`` that replace those of *specification*: ``seeds=20``.
-
     Raises:
         ModelError: The model or its specification is wrong, or has no such path; nothing has started.
         UsageError: An option is wrong, or the folder holds another campaign.
         EngineLostError: The engine was lost. Calling again resumes the campaign.
     """
-    campaign = prepare(
-        model, out, space, specification=specification, on=on, workers=workers, show=show, **stated
-    )
+    campaign = prepare(request)
     campaign.run(campaign.specification.run_points())
     campaign.leave_engine()
     with suppress(MissingExtraError):
@@ -426,26 +458,11 @@ def explore(
     return campaign
 
 
-def prepare(
-    model: str | Path | ModelBuilder,
-    out: str | Path,
-    space: Mapping[str, Parameter | Sequence[Value]] | None = None,
-    *,
-    specification: Specification | None = None,
-    on: str = "processes",
-    workers: int = 0,
-    show: ShowProgress | None = None,
-    **stated: Any,
-) -> Campaign:
-    """Return the campaign that ``explore`` would run, not begun. Arguments and errors as of ``explore``."""
-    made = specification_of(model) if specification is None else specification
+def prepare(request: CampaignRequest) -> Campaign:
+    """Return the campaign that ``explore`` would run, not begun. Errors as of ``explore``."""
+    model, made = request.model, request.specification
     system = read_variant(model if isinstance(model, ModelBuilder) else str(model), {})
-    added = {path: one if isinstance(one, Parameter) else Choices(one) for path, one in (space or {}).items()}
-    varied = {**made.space, **added} or default_space(system)
-    unknown = [name for name in stated if name not in Specification.__dataclass_fields__]
-    if unknown:
-        raise UsageError(f"explore() has no argument {unknown[0]!r}")
-    made = replace(made, space=varied, **stated)
+    made = replace(made, space=made.space or default_space(system))
     made = read_specification(made.plain())  # what Python states is checked as what YAML states
     _check_paths(model, made)
     path = None if isinstance(model, ModelBuilder) else str(Path(model).resolve())
@@ -455,7 +472,7 @@ def prepare(
         "version": installed_version(),
         "explore": made.plain(),
     }
-    folder = Path(out)
+    folder = Path(request.out)
     store = CampaignStore(folder, write=True)
     try:
         known = store.specification()
@@ -477,7 +494,7 @@ def prepare(
     finally:
         store.close()
     built = model if isinstance(model, ModelBuilder) else None
-    return Campaign(folder, model=built, on=on, workers=workers, show=show)
+    return Campaign(folder, model=built, on=request.on, workers=request.workers, show=request.show)
 
 
 def _check_paths(model: str | Path | ModelBuilder, specification: Specification) -> None:

@@ -166,7 +166,7 @@ def search(  # noqa: PLR0913  # each is an option
 
     Example::
 
-        with prepare("model.yaml", "runs/search") as campaign:
+        with prepare(CampaignRequest.of("model.yaml", "runs/search")) as campaign:
             front = search(
                 campaign.evaluate,
                 {"allocation": Choices(["one", "two"]), "environment.wind.speed": Range(0, 8, "m/s")},

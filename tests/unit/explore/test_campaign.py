@@ -8,7 +8,7 @@ import volery
 from rigs.small_campaigns import COUNT, model, same_rows  # noqa: F401  # a fixture
 from volery.base.errors import ModelError, UsageError
 from volery.explore import campaign as campaign_module
-from volery.explore.campaign import prepare
+from volery.explore.campaign import CampaignRequest, prepare
 from volery.explore.executors import EngineLostError, open_executor
 from volery.explore.points import Point
 from volery.model.builder import ModelBuilder
@@ -118,7 +118,7 @@ def test_a_model_that_was_built_in_python_is_carried(tmp_path, model):  # noqa: 
     built.add("application", "counter", is_="Counter")
     built.add("platform.processors", "pc", is_="rpi4-cortex-a72", frequency="1500 MHz")
     built.add("allocations", "only", counter="pc")
-    with prepare(built, tmp_path / "out", on="stub", seeds=3) as campaign:
+    with prepare(CampaignRequest.of(built, tmp_path / "out", on="stub", seeds=3)) as campaign:
         campaign.run(campaign.specification.run_points())
         assert campaign.count() == (3, 3)
         assert campaign.setting.model is built

@@ -9,6 +9,7 @@ import pytest
 import volery
 from rigs.small_campaigns import COUNT, model  # noqa: F401  # a fixture
 from volery.base.errors import UsageError
+from volery.explore.campaign import CampaignRequest, prepare
 from volery.explore.campaign_figures import MOST_LINES
 from volery.explore.campaign_page import Findings, write_page
 from volery.explore.campaign_store import CampaignStore
@@ -30,7 +31,8 @@ def page(model, tmp_path):  # noqa: F811
     """Write rows into a campaign and return its page."""
 
     def write(rows, findings=None):
-        campaign = volery.explore.campaign.prepare(model, tmp_path / "out", {COUNT: [3, 4]}, on="stub")
+        request = CampaignRequest.of(model, tmp_path / "out", {COUNT: [3, 4]}, on="stub")
+        campaign = prepare(request)
         store = CampaignStore(campaign.folder, write=True)
         store.ask(row.point for row in rows)
         store.record(rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -117,8 +118,9 @@ def explore(
     """
     require_extra("simulation", "campaigns")
     from volery.cli.run_display import status_line
-    from volery.explore.campaign import Campaign, prepare
+    from volery.explore.campaign import Campaign, CampaignRequest, prepare
     from volery.explore.campaign_page import write_page
+    from volery.explore.space import Choices
     from volery.explore.specification import parameter_from_option, read_specification, specification_of
 
     if show is not None:
@@ -135,8 +137,8 @@ def explore(
             campaign = Campaign(out, on=on, workers=workers, show=tell)
         else:
             space: dict[str, Any] = dict(parameter_from_option(one) for one in varied or ())
-            space |= {"allocation": allocation} if allocation else {}
-            space |= {"scenario": scenario} if scenario else {}
+            space |= {"allocation": Choices(allocation)} if allocation else {}
+            space |= {"scenario": Choices(scenario)} if scenario else {}
             stated = {
                 "seeds": seeds,
                 "seed": seed,
@@ -149,7 +151,8 @@ def explore(
             made = specification_of(model, spec)
             changed = {name: value for name, value in stated.items() if value is not None}
             made = read_specification({**made.plain(), **changed})
-            campaign = prepare(model, out, space, specification=made, on=on, workers=workers, show=tell)
+            made = replace(made, space={**made.space, **space})
+            campaign = prepare(CampaignRequest(model, out, made, on, workers, tell))
         with campaign:
             try:
                 findings = _study(campaign, study)
