@@ -25,6 +25,7 @@ from volery.base.installed import MissingExtraError, require_extra
 from volery.base.time import S
 from volery.explore.campaign_store import CampaignStore
 from volery.explore.executors import EngineLostError, open_executor
+from volery.explore.parquet_table import write_parquet
 from volery.explore.points import Point, Row, Value
 from volery.explore.run_process import (
     Setting,
@@ -42,8 +43,6 @@ from volery.model.builder import ModelBuilder
 from volery.model.text import CollectedModelError
 
 TABLE_FILE: Final = "rows.parquet"
-EXPORTED: Final = 50_000
-"""Rows of one part of the table that is written."""
 AHEAD: Final = 2
 """Runs that are handed to an engine for each that it makes at a time, so that no worker waits."""
 CHECKED: Final = 100
@@ -176,36 +175,13 @@ class Campaign:
         ``reason``, the verdicts by requirement with ``met.`` before it, the observables by their names,
         ``sim_s``, and what differs from machine to machine: ``wall_s``, ``cpu_s``, ``host``, ``attempt``.
         """
-        return to_frame(self._store.columns(), "run")
+        return to_frame(self._store.columns(self._store.kinds()), "run")
 
     def export(self) -> Path:
         """Write the table as Parquet into the folder, in parts that need little memory; return the file."""
         require_extra("explore", "a table in Parquet")
-        import pyarrow as pa  # noqa: PLC0415  # optional
-        from pyarrow.parquet import ParquetWriter  # noqa: PLC0415
-
         path = self.folder / TABLE_FILE
-        part = path.with_name(f".{path.name}.part")
-        kinds = {f"set.{name}": kind for name, kind in self._store.kinds().items()}
-        last, writer = -1, None
-        while True:
-            columns = self._store.columns(last, EXPORTED)
-            for name, kind in kinds.items():
-                columns[name] = [None if one is None else kind(one) for one in columns[name]]
-            if writer is not None and not len(columns["run"]):
-                break
-            booleans = {name: pa.bool_() for name in columns if name.startswith("met.")}
-            types = {bool: pa.bool_(), int: pa.int64(), float: pa.float64(), str: pa.string()}
-            texts = dict.fromkeys(("status", "reason", "host"), pa.string())
-            stated = booleans | texts | {name: types[kind] for name, kind in kinds.items()}
-            table = pa.table({name: pa.array(one, stated.get(name)) for name, one in columns.items()})
-            writer = writer or ParquetWriter(part, table.schema)
-            writer.write_table(table)
-            if len(table) < EXPORTED:
-                break
-            last = int(columns["run"][-1])
-        writer.close()
-        part.replace(path)
+        write_parquet(self._store, path)
         return path
 
     # -- running

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from io import StringIO
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,11 @@ from numpy.typing import NDArray
 from volery.base.installed import require_extra
 from volery.explore.statistics import Interval
 
-try:
-    from matplotlib import rc_context
+if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
-    from matplotlib.ticker import MaxNLocator
-except ModuleNotFoundError:
-    require_extra("explore", "figures of campaigns")
-    raise
+
+require_extra("explore", "figures of campaigns")  # but matplotlib, 40 MB, is imported when it draws
 
 Values = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -102,7 +98,11 @@ def parallel_coordinates(axes: Sequence[Axis], met: Flags, marked: Flags) -> str
 
 
 def pareto_plot(
-    across: Axis, up: Axis, front: Flags, links: Sequence[str], bands: Mapping[int, tuple[Interval, Interval]]
+    across: Axis,
+    up: Axis,
+    front: Flags,
+    links: Mapping[int, str],
+    bands: Mapping[int, tuple[Interval, Interval]],
 ) -> str:
     """Draw two objectives against each other and mark the runs of the *front*.
 
@@ -110,7 +110,7 @@ def pareto_plot(
         across: Objective to the right.
         up: Objective upwards.
         front: Which runs are not dominated.
-        links: Where a click on each run leads; "" for nowhere.
+        links: Where a click on each run that is drawn leads, by index; "" for nowhere.
         bands: Intervals of both objectives of runs of the front, by index.
     """
     figure, plot = _figure()
@@ -132,6 +132,8 @@ def pareto_plot(
 
 def distribution_plot(axis: Axis, bounds: Sequence[float] = ()) -> str:
     """Draw how often each value occurs, with median and 95 % quantile, and the *bounds* of requirements."""
+    from matplotlib.ticker import MaxNLocator  # noqa: PLC0415  # see above
+
     figure, plot = _figure(height=0.8 * HEIGHT)
     values = axis.values[np.isfinite(axis.values)]
     if axis.choices:
@@ -189,6 +191,9 @@ def tornado_chart(effects: Mapping[str, Interval], title: str) -> str:
 
 
 def _figure(width: float = WIDTH, height: float = HEIGHT) -> tuple[Figure, Axes]:
+    from matplotlib.backends.backend_svg import FigureCanvasSVG  # noqa: PLC0415  # see above
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasSVG(figure)
     plot = figure.add_subplot()
@@ -207,7 +212,7 @@ def _cloud(
     x: Values,
     y: Values,
     indices: Sequence[Any],
-    links: Sequence[str],
+    links: Mapping[int, str],
     *,
     color: str,
     size: int,
@@ -258,6 +263,8 @@ def _quantile(share: int, value: float) -> str:
 
 def _svg(figure: Figure, description: str) -> str:
     """Return the figure as an element of a page, in the colours of the page's style."""
+    from matplotlib import rc_context  # noqa: PLC0415  # see above
+
     text = StringIO()
     # text stays text, so that it is found and read aloud; the salt makes names of elements the same each time
     with rc_context({"svg.fonttype": "none", "svg.hashsalt": description}):

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
+from sys import intern
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -166,9 +167,9 @@ class _Column:
         self._values.append(value)
 
     def all(self, count: int) -> Values:
-        """Return the values of *count* runs."""
+        """Return the values of *count* runs, not copied; nothing can be set any more."""
         self._values.extend([np.nan] * (count - len(self._values)))
-        return np.array(self._values)
+        return np.frombuffer(self._values)
 
 
 class _Choices:
@@ -213,7 +214,7 @@ class _Table(NamedTuple):
     parameters: dict[str, Axis]
     verdicts: dict[str, Values]
     observables: dict[str, Values]
-    variants: list[int]
+    variants: np.ndarray[Any, np.dtype[np.int64]]
     variant_values: list[Mapping[str, Value]]
     causes: Counter[tuple[str, str]]
     examples: dict[tuple[str, str], tuple[int, str]]
@@ -244,7 +245,7 @@ def _collect(rows: Iterable[Row], measured: Sequence[Objective]) -> _Table:
     cpu = 0.0
     for index, row in enumerate(rows):
         numbers.append(row.run)
-        statuses.append(row.status)
+        statuses.append(intern(row.status))
         variant = known.setdefault(row.point.variant, len(known))
         if variant == len(values):
             values.append(row.point.values)
@@ -268,7 +269,7 @@ def _collect(rows: Iterable[Row], measured: Sequence[Objective]) -> _Table:
         {name: one.axis(name, count) for name, one in parameters.items()},
         {name: one.all(count) for name, one in verdicts.items()},
         {name: one.all(count) for name, one in observables.items()},
-        list(variants),
+        np.array(variants, dtype=np.int64),
         values,
         causes,
         examples,
@@ -308,8 +309,8 @@ def _render(campaign: Campaign, found: Findings) -> str:
     shown = objectives or _most_varied(table)
     front = _front(table, found)
     asked, finished = campaign.count()
-    links = _links(campaign.folder, table)
     drawn = thinned(len(table.numbers), front)
+    links = _links(campaign.folder, table, drawn)
     sections = [
         _Section(
             "Requirements",
@@ -462,7 +463,7 @@ def _variants(table: _Table, shown: Sequence[str]) -> Grid:
     count = len(table.variant_values)
     if count < 2:
         return Grid("Variants", (), ())
-    places = np.array(table.variants)
+    places = table.variants
     met, completed = table.met, table.completed
     runs = np.bincount(places, minlength=count)
     good = np.bincount(places, weights=met, minlength=count).astype(int)
@@ -494,7 +495,7 @@ def _variants(table: _Table, shown: Sequence[str]) -> Grid:
 
 def _means(table: _Table, name: str) -> Values:
     """Return the mean of an observable by variant; NaN where no run completed."""
-    places, values = np.array(table.variants), table.observables[name]
+    places, values = table.variants, table.observables[name]
     known = np.isfinite(values)
     count = len(table.variant_values)
     sums = np.bincount(places[known], weights=values[known], minlength=count)
@@ -529,7 +530,7 @@ def _front(table: _Table, found: Findings) -> Flags:
         runs = np.bincount(table.variants, minlength=len(scores))
         usable = np.flatnonzero(np.isfinite(scores).all(axis=1) & (met == runs))
         best = {int(usable[place]) for place in front_of(scores[usable])} if len(usable) else set()
-    return np.array([variant in best for variant in table.variants], dtype=bool)
+    return np.isin(table.variants, list(best))
 
 
 def _parallel(table: _Table, shown: Sequence[str], front: Flags) -> _Section:
@@ -546,7 +547,7 @@ def _parallel(table: _Table, shown: Sequence[str], front: Flags) -> _Section:
     return _Section("All runs", note, [picture], wide=True)
 
 
-def _pareto(table: _Table, objectives: Sequence[str], front: Flags, links: Sequence[str]) -> _Section:
+def _pareto(table: _Table, objectives: Sequence[str], front: Flags, links: Mapping[int, str]) -> _Section:
     pictures = []
     for across, up in combinations(objectives, 2):
         bands = _bands(table, front, across, up)
@@ -558,7 +559,7 @@ def _pareto(table: _Table, objectives: Sequence[str], front: Flags, links: Seque
 
 def _bands(table: _Table, front: Flags, *names: str) -> dict[int, tuple[Interval, Interval]]:
     """Return the intervals of two objectives at the first run of each variant of the front."""
-    places = np.array(table.variants)
+    places = table.variants
     bands = {}
     for variant in np.unique(places[front]):
         inside = np.flatnonzero(places == variant)
@@ -590,16 +591,17 @@ def _reasons(table: _Table) -> Grid:
     return Grid("Runs without a regular end", columns, tuple(rows))
 
 
-def _links(folder: Path, table: _Table) -> list[str]:
-    """Return where each run is shown: its own report if it was made again, else its row on the page."""
+def _links(folder: Path, table: _Table, drawn: Iterable[int]) -> dict[int, str]:
+    """Return where each run leads that is drawn: to its report if it was made again, else to its row."""
     made = {path.parent.name for path in folder.glob(f"run-*/{REPORT_FILE}")}
-    return [
-        f"run-{number}/{REPORT_FILE}" if f"run-{number}" in made else f"#run-{number}"
-        for number in table.numbers
-    ]
+    links = {}
+    for index in drawn:
+        name = f"run-{table.numbers[index]}"
+        links[index] = f"{name}/{REPORT_FILE}" if name in made else f"#{name}"
+    return links
 
 
-def _run(table: _Table, index: int, shown: Sequence[str], links: Sequence[str]) -> dict[str, Any]:
+def _run(table: _Table, index: int, shown: Sequence[str], links: Mapping[int, str]) -> dict[str, Any]:
     status = table.statuses[index]
     values = table.variant_values[table.variants[index]]
     return {

@@ -277,19 +277,19 @@ class CampaignStore:
                 found.setdefault(path, set()).add(type(value))
         return {path: _common(kinds) for path, kinds in found.items()}
 
-    def columns(self, after: int = -1, most: int = -1) -> dict[str, Any]:
+    def columns(self, paths: Iterable[str], after: int = -1, most: int = -1) -> dict[str, Any]:
         """Return finished rows as columns by name: numpy arrays of numbers, lists of texts.
 
         The values of points have their path as name, with ``set.`` before it, verdicts ``met.`` before the
         name of the requirement; observables have their own names.
 
         Args:
+            paths: Values of points that get a column, such as all ``kinds``.
             after: Only runs with a greater number.
             most: Number of rows at most; -1 for all.
         """
         where = "FROM runs WHERE status NOT NULL AND run > ?"
-        (rows,) = self._query(f"SELECT COUNT(*) {where}", (after,)).fetchone()
-        rows = rows if most < 0 else min(rows, most)
+        (rows,) = self._query(f"SELECT COUNT(*) FROM (SELECT 1 {where} LIMIT ?)", (after, most)).fetchone()
         observables = list(self._read_names("observables"))
         requirements = list(self._read_names("requirements"))
         numbers = np.full((len(observables), rows), nan)
@@ -310,14 +310,14 @@ class CampaignStore:
             times[:, place] = row[8:11]
             observed = np.frombuffer(row[11])
             numbers[: len(observed), place] = observed
-        kinds, values = self.kinds(), {}
+        values = {}
         for one in dict.fromkeys(variants):
             (text,) = self._query("SELECT point FROM variants WHERE id = ?", (one,)).fetchone()
             values[one] = json.loads(text)
         return {
             "run": whole[0],
             "seed": whole[1],
-            **{f"set.{path}": [values[one].get(path) for one in variants] for path in kinds},
+            **{f"set.{path}": [values[one].get(path) for one in variants] for path in paths},
             "status": texts[0],
             "reason": texts[1],
             **{

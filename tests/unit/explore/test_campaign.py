@@ -8,6 +8,7 @@ import volery
 from rigs.small_campaigns import COUNT, model, same_rows  # noqa: F401  # a fixture
 from volery.base.errors import ModelError, UsageError
 from volery.explore import campaign as campaign_module
+from volery.explore import parquet_table
 from volery.explore.campaign import CampaignRequest, prepare
 from volery.explore.executors import EngineLostError, open_executor
 from volery.explore.points import Point
@@ -131,7 +132,7 @@ def test_a_table_is_exported_in_parts(explore, monkeypatch, part):
     import pandas
 
     campaign = explore(seeds=4)
-    monkeypatch.setattr(campaign_module, "EXPORTED", part)
+    monkeypatch.setattr(parquet_table, "PART", part)
     assert pandas.read_parquet(campaign.export())["run"].tolist() == list(range(8))
 
 

@@ -67,10 +67,10 @@ def test_columns_do_not_depend_on_the_order_in_which_rows_arrived(tmp_path):
         store.ask(POINTS)
         for run in order:
             store.record([row(run)])
-        columns = store.columns()
+        columns = store.columns(store.kinds())
         made.append({key: list(map(str, column)) for key, column in columns.items()})
         assert [*columns][-5:] == ["sim_s", "wall_s", "cpu_s", "host", "attempt"]
-        parts = [store.columns(-1, 2), store.columns(1, 2)]
+        parts = [store.columns(store.kinds(), *part) for part in ((-1, 2), (1, 2))]
         assert [*parts[0]["e"], *parts[1]["e"]] == [1.5, 2.5, 3.5]
         store.close()
     assert list(made[0].items()) == list(made[1].items())
