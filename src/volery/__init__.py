@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from volery.run.connect import connect as connect
     from volery.run.connect import connect_fleet as connect_fleet
     from volery.run.fly import fly as fly
+    from volery.run.process_session import ProcessRunSession as ProcessRunSession
     from volery.run.result import Options as Options
     from volery.run.result import Run as Run
     from volery.run.run_session import RunSession as RunSession

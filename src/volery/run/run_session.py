@@ -70,6 +70,12 @@ def check_fidelity(fidelity: str) -> None:
         raise UsageError(f"no fidelity {fidelity!r}; there is {choices((*FIDELITIES, *LATER))}")
 
 
+def check_step(duration: Ns) -> None:
+    """Raise ``UsageError`` if virtual time cannot pass for *duration*."""
+    if not isinstance(duration, int) or duration <= 0:
+        raise UsageError(f"a step of {duration} ns; give a whole number above 0")
+
+
 def read_system(
     model: System | ModelBuilder | str | Path,
     scenario: str | None = None,
@@ -178,8 +184,7 @@ class RunSession:
         Raises:
             UsageError: *duration* is not a whole number above 0, or another thread began the run.
         """
-        if not isinstance(duration, int) or duration <= 0:
-            raise UsageError(f"a step of {duration} ns; give a whole number above 0")
+        check_step(duration)
         if self._result is not None:
             return False
         self._check_thread()
@@ -225,9 +230,13 @@ class RunSession:
             self._check_thread()
         self._goes_on.set()
         if self._result is None:
-            self._begin()
-            self._ending.begin("interrupted", reason)
+            self._begin_end(reason)
         return self.run()
+
+    def _begin_end(self, reason: str) -> None:
+        """Let the run end in order as its time passes."""
+        self._begin()
+        self._ending.begin("interrupted", reason)
 
     def _slice(self) -> Ns:
         """Return how much time passes between two looks at ``pause``: a tenth of a second on the wall."""

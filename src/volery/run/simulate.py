@@ -8,13 +8,11 @@ from functools import partial
 from pathlib import Path
 
 from volery.base.garbage import seldom_collected
-from volery.components.cpp.build import build_framework
 from volery.model.builder import ModelBuilder
 from volery.model.system import System
-from volery.run.assembly.cpp import compile_all, has_cpp
 from volery.run.result import DEFAULT_OPTIONS, Options, Run
-from volery.run.run_session import PATIENCE_S, GraphSession, RunSession, check_fidelity, read_system
-from volery.run.supervision import Supervision, recover_run, run_supervised
+from volery.run.run_session import GraphSession, RunSession, check_fidelity, read_system
+from volery.run.supervision import recover_run, run_supervised, supervision_of
 
 
 @seldom_collected()
@@ -46,9 +44,7 @@ def simulate(
     """
     check_fidelity(options.fidelity)
     system = read_system(model, scenario, allocation, overrides)
-    if has_cpp(system) and not options.graph:
-        return _supervised(system, options)
-    return _simulated(system, options)
+    return _simulated(system, options) if options.graph else _supervised(system, options)
 
 
 def _simulated(system: System, options: Options) -> Run:
@@ -61,17 +57,14 @@ def _simulated(system: System, options: Options) -> Run:
 
 
 def _supervised(system: System, options: Options) -> Run:
-    """Run in a child process, which a C++ component may crash."""
-    traced = options.traces is not None
-    ready = compile_all(system, system.instances, options.fidelity, options.tell, traced=traced)
-    if not ready:
+    """Run in a child process if there are C++ components, which may crash it."""
+    supervision = supervision_of(system, options)
+    if supervision is None:
         return _simulated(system, options)
-    libraries = {name: one.compiled.library for name, one in ready.items()}
-    supervision = Supervision(build_framework(), libraries, PATIENCE_S)
     return run_supervised(
         lambda show, tell: _simulated(system, replace(options, show=show, tell=tell)),
         options.show,
         options.tell,
         supervision,
-        partial(recover_run, system, options.folder, options.seed, options.fidelity),
+        partial(recover_run, system, options, 0),
     )

@@ -13,7 +13,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -22,13 +22,17 @@ from types import FrameType
 
 from volery.base.errors import UsageError, VoleryError
 from volery.base.process import ending_signals, on_ending_signals
+from volery.base.time import Ns
+from volery.components.cpp.build import build_framework
 from volery.components.cpp.framework import Crash, framework_runtime, read_crash
 from volery.kernel.virtual import VirtualKernel
 from volery.model.system import System
 from volery.requirements.verdicts import Observers
 from volery.run.assembly.computers import Platform
+from volery.run.assembly.cpp import compile_all, has_cpp
 from volery.run.recording import Recording
-from volery.run.result import Progress, Run, Show, Tell
+from volery.run.result import Options, Progress, Run, Show, Tell
+from volery.run.run_session import PATIENCE_S
 from volery.run.trace_setup import attachments_of, setup_of
 from volery.trace.events import Event, Failure, Verdict
 from volery.trace.mcap_writer import TRACE_FILE
@@ -50,6 +54,20 @@ class Supervision:
     framework: Path
     libraries: dict[str, Path]
     patience_s: float
+
+    def begin(self, crash_pipe: int) -> None:
+        """Watch the components in this process; a crash is reported to *crash_pipe*, for ``read_crash``."""
+        framework_runtime(self.framework).supervise(crash_pipe, self.patience_s)
+
+
+def supervision_of(system: System, options: Options) -> Supervision | None:
+    """Compile the C++ components of a model, and return what watches them; None if there are none."""
+    if not has_cpp(system):
+        return None
+    traced = options.traces is not None
+    ready = compile_all(system, system.instances, options.fidelity, options.tell, traced=traced)
+    libraries = {name: one.compiled.library for name, one in ready.items()}
+    return Supervision(build_framework(), libraries, PATIENCE_S) if ready else None
 
 
 def run_supervised(
@@ -80,7 +98,7 @@ def run_supervised(
             os.close(crash_pipe)
             result = _listen(ours, show, tell)
             child.join()
-        return result or _recover(child, read_crash(report, supervision.libraries), recover)
+        return result or recover_by(recover, child.exitcode or 0, read_crash(report, supervision.libraries))
     finally:
         if child.pid is not None:
             child.kill()  # still running only after an exception above
@@ -107,12 +125,24 @@ def _listen(ours: Connection, show: Show | None, tell: Tell | None) -> Run | Non
             return run
 
 
-def _recover(child: BaseProcess, crash: Crash | None, recover: RecoverRun) -> Run:
+def recover_by(recover: RecoverRun, status: int, crash: Crash | None, when: str = "") -> Run:
+    """Return the run of a process that died.
+
+    Args:
+        recover: Makes the run.
+        status: Exit status of the process.
+        crash: What it has reported of a crash.
+        when: For the message, if it is known: when it died.
+    """
     if crash is not None:
-        return recover(crash.error(), crash.component)
-    code = child.exitcode or 0
-    how = signal.Signals(-code).name if code < 0 else f"exit status {code}"
-    return recover(VoleryError(f"the process that ran the components was ended: {how}"), "run")
+        return recover(replace(crash, what=f"{crash.what}{when}").error(), crash.component)
+    how = f"the process that ran the components was ended{when}: {how_ended(status)}"
+    return recover(VoleryError(how), "run")
+
+
+def how_ended(status: int) -> str:
+    """Return how a process ended in words, from its exit status: below 0 it is that of a signal."""
+    return signal.Signals(-status).name if status < 0 else f"exit status {status}"
 
 
 @contextmanager
@@ -152,7 +182,7 @@ def _child_main(
     stopping = ending_signals()
     for number in stopping:
         signal.signal(number, signal.default_int_handler)
-    framework_runtime(supervision.framework).supervise(crash_pipe, supervision.patience_s)
+    supervision.begin(crash_pipe)
 
     def show(progress: Progress) -> None:
         to.send(("show", progress))
@@ -173,9 +203,7 @@ CUT_FILE = "trace-cut.mcap"
 """Name of the truncated trace while the trace is written again."""
 
 
-def recover_run(
-    system: System, out: Path | None, seed: int, fidelity: str, error: VoleryError, blamed: str
-) -> Run:
+def recover_run(system: System, options: Options, reached: Ns, error: VoleryError, blamed: str) -> Run:
     """Return a failed ``Run`` from what its process has recorded.
 
     The trace is written again up to its truncation, followed by the failure, the verdicts and the usual
@@ -183,22 +211,21 @@ def recover_run(
 
     Args:
         system: The model.
-        out: Run folder; None if nothing was kept.
-        seed: Seed of the run.
-        fidelity: Fidelity of the run.
+        options: Options of the run.
+        reached: Virtual time that the run is known to have reached, ns; the trace may be cut before it.
         error: What ended the process.
         blamed: Component that failed, or ``run``.
     """
-    cut = _set_aside(out) if out is not None else None
-    platform = Platform(system, VirtualKernel(), seed, fidelity)
+    cut = _set_aside(options.folder) if options.folder is not None else None
+    platform = Platform(system, VirtualKernel(), options.seed, options.fidelity)
     platform.look_up_prices()
-    setup = setup_of(system, platform, seed, fidelity)
-    recording = Recording(setup, out, attachments_of(system))
+    setup = setup_of(system, platform, options.seed, options.fidelity)
+    recording = Recording(setup, options.folder, attachments_of(system), traced=options.traced)
     observers = Observers(system.requirements, setup)
     recording.stream.tap(observers)
     for event in _events(cut):
         recording.stream(event)
-    ended = recording.accounts.last
+    ended = max(reached, recording.accounts.last)
     what = str(error).removeprefix(f"{blamed}: ")
     recording.stream(Failure(ended, blamed, what))
     record = recording.finish("failed", str(error), ended, observers.verdicts(ended))

@@ -6,11 +6,13 @@ import os
 
 import pytest
 
+from volery import Options, ProcessRunSession
 from volery.base.errors import ComponentError, ModelError, UsageError
 from volery.base.time import S
 from volery.components.cpp import compiler
-from volery.run import simulate
+from volery.run import supervision
 from volery.trace.events import Failure, Text
+from volery.trace.reader import read
 
 pytestmark = pytest.mark.integration
 
@@ -60,7 +62,7 @@ WAYS = {
 
 @pytest.mark.parametrize("how", WAYS)
 def test_a_crash_names_the_component_and_leaves_a_complete_trace(run_model, monkeypatch, how):
-    monkeypatch.setattr(simulate, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(supervision, "PATIENCE_S", 1.0)
     outcome = run_model(MODEL.format(how=how), "crash.cpp", other=OTHER)
     assert isinstance(outcome.run.error, ComponentError)
     assert outcome.run.error.component == "crash"
@@ -73,6 +75,19 @@ def test_a_crash_names_the_component_and_leaves_a_complete_trace(run_model, monk
     texts = [one.text for one in outcome.of(Text)]
     assert texts[:3] == ["at 0", "at 1", "at 2"]
     assert (outcome.run.folder / "report.html").exists()
+
+
+def test_a_crash_is_an_error_of_a_session_in_a_process_of_its_own(run_model, tmp_path):
+    outcome = run_model(MODEL.format(how="abort"), "crash.cpp", other=OTHER)
+    with ProcessRunSession(tmp_path, Options("times", out=tmp_path / "session")) as session:
+        run = session.run()
+    assert isinstance(run.error, ComponentError)
+    assert run.error.component == "crash"
+    assert f"{WAYS['abort']} after 0:00:0" in str(run.error)
+    assert run.record.outcome.status == outcome.run.record.outcome.status == "failed"
+    assert [one.at for one in read(tmp_path / "session" / "trace.mcap").events if isinstance(one, Text)] == [
+        one.at for one in outcome.of(Text)
+    ]
 
 
 def test_a_program_that_fails_starts_again(run_model):
