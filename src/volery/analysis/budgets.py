@@ -86,11 +86,11 @@ def budgets(system: System, utilisations: Sequence[Utilisation]) -> Budgets:
         for one in system.processors
     )  # fmt: skip
     return Budgets(
-        tuple(_memory(system)), energy, tuple(_endurance(system, one, energy) for one in system.vehicles)
+        tuple(memory(system)), energy, tuple(_endurance(system, one, energy) for one in system.vehicles)
     )
 
 
-def _memory(system: System) -> Iterator[Memory]:
+def memory(system: System) -> Iterator[Memory]:
     """Yield the memory of each process, and of each computer whose memory is stated.
 
     The instances of a memory space share its process; every other instance is deployed as one.

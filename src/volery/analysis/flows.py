@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from volery.analysis.vehicle_cycles import cycle_of
 from volery.base.errors import EstimateError
 from volery.base.time import US, Ns, S
 from volery.cost import Price, ProcessorPrices, StatedCost, StatedPricing, Tariff, load_catalogue
 from volery.model.components import ACTIVATION, Figure
+from volery.model.environment import Vehicle
 from volery.model.instances import Instance, Target, TargetKind
 from volery.model.system import System
 from volery.requirements.response_bounds import Demand
@@ -22,6 +24,7 @@ from volery.run.assembly.computers import (
     LOAD_PERIOD,
     LOAD_PRIORITY,
     LOAD_VARIATION,
+    VEHICLE_NODE_LANGUAGE,
     commanded_by,
     is_node,
     load_name,
@@ -40,6 +43,7 @@ class Flow:
     ``thread`` is the same for callbacks of one executor. ``cost`` includes context switches; ``background``
     is what library threads of its process execute for it. ``pieces`` is the number of times that one
     activation may request the processor. ``topic`` is that of a callback, ``deadline`` relative to a release.
+    ``waits`` is how long an activation may wait for answers, as the model assumes.
     """
 
     name: str
@@ -56,10 +60,19 @@ class Flow:
     pieces: int = 1
     topic: str = ""
     of: str = ""
+    waits: Ns = 0
+
+    @property
+    def share(self) -> float:
+        """The share of one core that it takes in the long term."""
+        return (self.cost + self.background) / self.period
 
     def demand(self) -> Demand:
-        """Return its demand; its background counts as its own."""
-        cost = self.cost + self.background
+        """Return its demand; its background counts as its own, and so does waiting.
+
+        What waits is taken as what executes (suspension-oblivious analysis: Liu, *Real-Time Systems*, 2000).
+        """
+        cost = self.cost + self.background + self.waits
         made = Demand.periodic(self.name, self.priority, cost, self.period, self.jitter)
         return replace(made, least_priority=self.least_priority)
 
@@ -196,11 +209,12 @@ class FlowReader:
             known += mine
             unknown += problems
             streams += [made for one in mine for made in self._published(instance, one, responses)]
-        unknown += self._called_from_elsewhere()
+        for one in self._called_from_elsewhere():
+            (known if isinstance(one, Flow) else unknown).append(one)  # type: ignore[arg-type]
         for vehicle in self.system.vehicles:
             if vehicle.processor is not None:
-                why = "the message rates of the node that serves a vehicle are not in the model"
-                unknown.append(Unknown(vehicle.name, vehicle.processor, VEHICLE_NODE_PRIORITY, why))
+                made = self._vehicle_node(vehicle, vehicle.processor)
+                (known if isinstance(made, Flow) else unknown).append(made)  # type: ignore[arg-type]
         known += self._background_loads()
         return Flows(tuple(known), tuple(unknown), tuple(streams))
 
@@ -243,15 +257,20 @@ class FlowReader:
         serial = component.language in EXECUTOR_LANGUAGES
         thread = instance.name if serial else ""
         try:
-            if activity is not None and activity.period_ns is not None:
+            period = _least_distance(instance)
+            if activity is not None and period is not None:
                 cost = self._cost(instance, "")
                 found.append(
                     Flow(instance.name, instance.name, processor, thread or instance.name, priority,
-                         cost.least_priority, cost.time, activity.period_ns, cost.background,
-                         activity.jitter_ns, activity.deadline_ns, cost.pieces)
+                         cost.least_priority, cost.time, period, cost.background,
+                         activity.jitter_ns, activity.deadline_ns, cost.pieces,
+                         waits=component.assume.waits_ns or 0)
                 )  # fmt: skip
             elif activity is not None and not component.subscribes:
-                refuse("it is active without a period: state `active: {period: ...}`")
+                refuse(
+                    "it is active without a period: state `active: {period: ...}`, or what is assumed of its "
+                    "releases, `assume: {period: ...}`"
+                )
             for name in component.subscribes:
                 found += self._callbacks(instance, name, streams, delays)
         except _NotStatedError as error:
@@ -293,7 +312,8 @@ class FlowReader:
             thread = instance.name if instance.component.language in EXECUTOR_LANGUAGES else label
             jitter = stream.jitter + delay
             yield Flow(label, instance.name, processor, thread, priority, cost.least_priority, cost.time,
-                       stream.period, cost.background, jitter, deadline, cost.pieces, topic)  # fmt: skip
+                       stream.period, cost.background, jitter, deadline, cost.pieces, topic,
+                       waits=instance.component.assume.waits_ns or 0)  # fmt: skip
 
     def _published(
         self, instance: Instance, flow: Flow, responses: Mapping[str, Ns | None]
@@ -323,14 +343,10 @@ class FlowReader:
         known = self._stated.get(instance.name)
         if known is None:
             component = instance.component
-
-            def costs(figures: Sequence[Figure]) -> list[StatedCost]:
-                return [StatedCost(one.processor, one.frequency_hz, one.longest_ns) for one in figures]
-
             known = self._stated[instance.name] = self.prices[instance.processor or ""].stated(
                 instance.name,
-                {name: costs(figures) for name, figures in component.operations.items()},
-                costs(component.activation),
+                {name: _stated_costs(figures) for name, figures in component.operations.items()},
+                _stated_costs(component.activation),
             )
         return known
 
@@ -340,11 +356,15 @@ class FlowReader:
         Raises:
             _NotStatedError: Something is missing.
         """
-        if commanded_by(instance):
-            raise _NotStatedError("it commands a vehicle: what its driver executes is not in the model")
+        assume = instance.component.assume
+        if commanded_by(instance) and (not assume.beside or assume.waits_ns is None):
+            raise _NotStatedError(
+                "it commands a vehicle: what its driver executes, and how long it waits for answers, is not "
+                f"in the model: add `assume: {{beside: ..., waits: ...}}` to {instance.component.name}"
+            )
         priority = instance.activity.priority if instance.activity else 0
         try:
-            own = self._pricing(instance).activation(instance.name).time
+            own = self._pricing(instance).activation(instance.name).time + self._beside(instance)
             cost = _Cost(own, 0, 1, priority).plus(self._called(instance, ACTIVATION))
             for price in self._published_prices(instance, trigger):
                 cost = cost.plus(_Cost(price.caller, price.background, 0, priority))
@@ -352,6 +372,14 @@ class FlowReader:
             raise _NotStatedError(str(error).removeprefix(f"{instance.name}: ")) from error
         switch = self._processors[instance.processor or ""].context_switch_ns
         return replace(cost, time=cost.time + 2 * switch * cost.pieces)
+
+    def _beside(self, instance: Instance) -> Ns:
+        """Return what an activation executes beside its stated time, as assumed."""
+        figures = instance.component.assume.beside
+        if not figures:
+            return 0
+        prices, stated = self.prices[instance.processor or ""], _stated_costs(figures)
+        return prices.stated(instance.name, {}, stated).activation(instance.name).time
 
     def _called(self, instance: Instance, caller: str) -> _Cost:
         """Return the cost of the calls that an activation or an operation makes."""
@@ -378,11 +406,15 @@ class FlowReader:
 
     def _call(self, caller: Instance, target: Target, operation: str) -> _Cost:
         callee = self._instances[target.name]
+        if callee.processor is None or (
+            callee.processor != caller.processor and caller.component.assume.waits_ns is not None
+        ):  # computing in the environment takes no time
+            return _Cost(0, 0, 1, 1 << 62)
         if callee.processor != caller.processor:
-            where = callee.processor or "the environment"
             raise _NotStatedError(
-                f"it waits for {callee.name}.{operation} on {where}: "
-                "no bound for tasks that suspend themselves"
+                f"it waits for {callee.name}.{operation} on {callee.processor}: no bound for tasks that "
+                "suspend themselves; if the longest wait is known, state `assume: {waits: ...}` of "
+                f"{caller.component.name}"
             )
         others = [one.name for one in self._callers[callee.name] if one is not caller]
         if others:
@@ -390,6 +422,9 @@ class FlowReader:
                 f"{callee.name} serves one caller at a time, and {', '.join(others)} may call it, too: "
                 "no bound for that blocking"
             )
+        return self._operation(callee, operation)
+
+    def _operation(self, callee: Instance, operation: str) -> _Cost:
         own = self._pricing(callee).operation(callee.name, operation).time
         priority = callee.activity.priority if callee.activity else 1 << 62  # passive: its caller's
         return self._called(callee, operation).plus(_Cost(own, 0, 2, priority))
@@ -400,8 +435,7 @@ class FlowReader:
     def _amount(self, instance: Instance, call: str) -> float:
         """Return the greatest x of a ROS call: microseconds asleep, all subscriptions of a publisher."""
         if call == "sleep":
-            period = instance.activity.period_ns if instance.activity else None
-            return (period or S) / US
+            return (_least_distance(instance) or S) / US
         names = (self.topic(instance, one) for one in instance.component.publishes)
         return float(max((len(self.subscribers(one)) for one in names), default=1))
 
@@ -432,7 +466,7 @@ class FlowReader:
                     if callee.processor == processor:
                         yield callee
 
-    def _called_from_elsewhere(self) -> Iterator[Unknown]:
+    def _called_from_elsewhere(self) -> Iterator[Flow | Unknown]:
         for name, callers in self._callers.items():
             callee = self._instances[name]
             for caller in callers:
@@ -442,13 +476,63 @@ class FlowReader:
                 if calls and not any(map(any, (one.values() for one in calls.values()))):
                     continue
                 by = callee.activity or caller.activity  # a passive one has its caller's priority
-                yield Unknown(
-                    callee.name,
-                    callee.processor,
-                    by.priority if by else 0,
-                    f"{caller.name} calls it from {caller.processor or 'the environment'} at a rate that is "
-                    "not in the model",
-                )
+                priority = by.priority if by else 0
+                try:
+                    yield self._served(callee, caller, priority)
+                except (_NotStatedError, EstimateError) as error:
+                    yield Unknown(callee.name, callee.processor, priority, str(error))
+
+    def _served(self, callee: Instance, caller: Instance, priority: int) -> Flow:
+        """Return what *callee* executes for the activations of *caller* on another computer.
+
+        A pause lies between the calls of two activations, however long they take.
+
+        Raises:
+            _NotStatedError: The model does not limit how often.
+        """
+        where = caller.processor or "the environment"
+        pause, calls = caller.component.assume.pause_ns, caller.component.calls.get(ACTIVATION)
+        if pause is None or calls is None:
+            missing = "assume: {pause: ...}" if calls is not None else "calls: {activation: {...}}"
+            raise _NotStatedError(
+                f"{caller.name} calls it from {where} at a rate that is not in the model: state "
+                f"`{missing}` of {caller.component.name}"
+            )
+        cost = _Cost(0, 0, 0, priority)
+        for call, count in calls.items():
+            port, _, operation = call.partition(".")
+            targets = caller.connections[port].targets if port in caller.connections else ()
+            if count and any(one.name == callee.name for one in targets):
+                cost = cost.plus(self._operation(callee, operation).times(count))
+        switch = self._processors[callee.processor or ""].context_switch_ns
+        name = f"{callee.name} for {caller.name}"
+        return Flow(name, callee.name, callee.processor or "", name, priority,
+                    min(priority, cost.least_priority), cost.time + 2 * switch * cost.pieces, pause,
+                    cost.background, pieces=cost.pieces)  # fmt: skip
+
+    def _vehicle_node(self, vehicle: Vehicle, processor: str) -> Flow | Unknown:
+        """Return the loop of the node that serves a vehicle, with all that it executes for commands."""
+        cycle = cycle_of(vehicle.autopilot, vehicle.names)
+        if cycle is None:
+            why = f"{vehicle.autopilot} is a node itself: its message rates are not known"
+            return Unknown(vehicle.name, processor, VEHICLE_NODE_PRIORITY, why)
+        commanders = sum(vehicle.name in commanded_by(one) for one in self.system.instances)
+        above = f"/{vehicle.name}/"
+        readers = commanders + sum(
+            len(found) for topic, found in self._subscribed.items() if topic.startswith(above)
+        )
+        tariff = self.prices[processor].ros_calls(VEHICLE_NODE_LANGUAGE)
+        sleep, publish = tariff("sleep", cycle.period / US), tariff("publish", float(readers))
+        taken = [tariff("receive"), max(tariff("spin_once", 1.0), tariff("spin_once", 0.0)), tariff("serve")]
+        requests = cycle.requests * commanders
+        cost = cycle.messages * publish.caller + requests * sum(one.caller for one in taken) + sleep.caller
+        background = cycle.messages * publish.background + sleep.background
+        background += requests * sum(one.background for one in taken)
+        switch = 2 * self._processors[processor].context_switch_ns
+        pieces = cycle.messages + 3 * requests + 1
+        return Flow(vehicle.name, vehicle.name, processor, vehicle.name, VEHICLE_NODE_PRIORITY,
+                    VEHICLE_NODE_PRIORITY, cost + switch * pieces, cycle.period, background,
+                    pieces=pieces)  # fmt: skip
 
     def _background_loads(self) -> Iterator[Flow]:
         for one in self.system.processors:
@@ -458,6 +542,16 @@ class FlowReader:
                 for core in range(one.cores):
                     name = load_name(one.name) + (f" {core}" if one.cores > 1 else "")
                     yield Flow(name, name, one.name, name, LOAD_PRIORITY, LOAD_PRIORITY, cost, LOAD_PERIOD)
+
+
+def _stated_costs(figures: Sequence[Figure]) -> list[StatedCost]:
+    return [StatedCost(one.processor, one.frequency_hz, one.longest_ns) for one in figures]
+
+
+def _least_distance(instance: Instance) -> Ns | None:
+    """Return the least time between two releases of its own flow of control, None if nothing limits it."""
+    assume, stated = instance.component.assume, instance.activity.period_ns if instance.activity else None
+    return stated or max(assume.period_ns or 0, assume.pause_ns or 0) or None
 
 
 def _targets(instance: Instance) -> Iterator[Target]:

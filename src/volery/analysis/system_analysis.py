@@ -22,9 +22,8 @@ from volery.analysis.busy_windows import (
     callback_bound,
     edf_bounds,
     fifo_bound,
-    rate,
 )
-from volery.analysis.flows import Flow, FlowReader, Flows, Stream
+from volery.analysis.flows import Flow, FlowReader, Flows, Stream, Unknown
 from volery.base.time import Ns, S
 from volery.model.instances import Instance, TargetKind
 from volery.model.system import Chain, Network, Processor, System
@@ -39,7 +38,9 @@ ALWAYS_BUSY = Demand.periodic("always busy", 0, WINDOW, WINDOW)
 ASSUMPTIONS = (
     "execution times are the worst that are stated; the start-up of nodes is over",
     "releases come no faster than the stated periods and jitters allow",
-    "a flow executes until it ends its activation: it waits for no lock, message or clock in between",
+    "a flow executes until it ends its activation: it waits for no lock, message or clock in between, and "
+    "for answers no longer than is assumed; the flight of a vehicle is no response time of a computer",
+    "the node that serves a vehicle publishes each of its topics once a cycle at most",
     "no component is faulty, and the processors run at the stated frequency",
 )
 """Hold for every bound."""
@@ -138,7 +139,7 @@ class _Holistic:
 
     def _utilisation(self, processor: Processor, flows: Flows) -> Utilisation:
         known, unknown = flows.on(processor.name)
-        share = sum(rate(one.demand()) for one in known) + sum(one.least_share for one in unknown)
+        share = sum(one.share for one in known) + sum(one.least_share for one in unknown)
         missing = tuple(f"{one.instance}: {one.why}" for one in unknown)
         return Utilisation(processor.name, share / processor.cores, missing)
 
@@ -281,6 +282,8 @@ def _serialisation(network: Network, size_b: float) -> Ns:
 
 def _stated(flow: Flow, bound: Ns | None) -> Bound:
     why = "" if bound is not None else "the processor is full at its priority, or nearly"
+    if why and flow.waits:
+        why += ", with the time that it may wait for answers"
     return Bound(flow.name, bound, why, flow.deadline)
 
 
@@ -309,38 +312,56 @@ def _why_no_bound(processor: Processor, known: Sequence[Flow]) -> str:
 def _fixed_priority(processor: Processor, known: Sequence[Flow], flows: Flows) -> Iterator[Bound]:
     """Yield the bounds of the flows on *processor*; what may be delayed by something unknown has none."""
     unknown = flows.on(processor.name)[1]
-    found: dict[str, Ns | None] = {}
     parallel = processor.cores > 1
     everything = [part for one in known for part in (_divided(one) if parallel else [one])]
     threads: dict[str, list[Flow]] = {}
     for one in sorted(everything, key=lambda each: -each.priority):
         threads.setdefault(one.thread, []).append(one)
+    blamed = {thread: _delayed_by(mine, unknown) for thread, mine in threads.items()}
+    found: dict[str, Ns | None] = {}
+    # A flow that calls a less urgent component is delayed by flows whose bounds come after its own: on
+    # several cores, where these are needed, a second pass has them.
+    for _ in range(2 if parallel else 1):
+        for thread, mine in threads.items():
+            if blamed[thread]:
+                found.update(dict.fromkeys(one.name for one in mine))
+            else:
+                _bound_thread(processor, mine, everything, found)
     for thread, mine in threads.items():
-        least = min(one.least_priority for one in mine)
-        blamed = next(
-            (one for one in unknown if one.priority >= least and one.instance != mine[0].instance), None
-        )
-        urgent = [one for one in everything if one.thread != thread and one.priority >= least]
-        others: OneCore | ManyCores
-        if parallel:
-            others = _on_many_cores(processor, urgent, found)
-        else:
-            others = OneCore([one.demand() for one in urgent], ())
-        for flow in mine:
-            own, bound = flow.demand(), None
-            if flow.of:  # begins at any time within the activation that causes it
-                caused = found[flow.of]
-                own = own if caused is None else _with_jitter(flow, caused)
-            if blamed is None and (not flow.of or found[flow.of] is not None):
-                rest = [one.demand() for one in mine if one is not flow]
-                bound = callback_bound(own, rest, LeftOver(others)) if rest else bound_of(own, others)
-            found[flow.name] = bound
-            if not flow.of:
-                yield (
-                    _stated(flow, bound)
-                    if blamed is None
-                    else Bound(flow.name, None, _blamed(blamed.instance), flow.deadline)
-                )
+        for flow in (one for one in mine if not one.of):
+            if blamed[thread]:
+                yield Bound(flow.name, None, _blamed(blamed[thread]), flow.deadline)
+            else:
+                yield _stated(flow, found[flow.name])
+
+
+def _delayed_by(thread: Sequence[Flow], unknown: Sequence[Unknown]) -> str:
+    """Return the instance that can delay *thread* and of which not enough is known, or an empty text."""
+    least = min(one.least_priority for one in thread)
+    urgent = (one.instance for one in unknown if one.priority >= least)
+    return next((one for one in urgent if one != thread[0].instance), "")
+
+
+def _bound_thread(
+    processor: Processor, thread: Sequence[Flow], everything: Sequence[Flow], found: dict[str, Ns | None]
+) -> None:
+    """Add the bounds of the flows of one thread to *found*."""
+    least = min(one.least_priority for one in thread)
+    urgent = [one for one in everything if one.thread != thread[0].thread and one.priority >= least]
+    others: OneCore | ManyCores
+    if processor.cores > 1:
+        others = _on_many_cores(processor, urgent, found)
+    else:
+        others = OneCore([one.demand() for one in urgent], ())
+    for flow in thread:
+        own, bound = flow.demand(), None
+        if flow.of:  # begins at any time within the activation that causes it
+            caused = found[flow.of]
+            own = own if caused is None else _with_jitter(flow, caused)
+        if not flow.of or found[flow.of] is not None:
+            rest = [one.demand() for one in thread if one is not flow]
+            bound = callback_bound(own, rest, LeftOver(others)) if rest else bound_of(own, others)
+        found[flow.name] = bound
 
 
 def _divided(flow: Flow) -> list[Flow]:

@@ -78,7 +78,7 @@ def note_rest(unmapped: Unmapped, tree: Mapping[str, Any], mapped: Iterable[str]
     if others:
         unmapped.add("allocations but the default one", *others)
     for name, component in (tree.get("components") or {}).items():
-        for key in ("parameters", "calls", "files", "build", "queues"):
+        for key in ("parameters", "calls", "assume", "files", "build", "queues"):
             if component.get(key):
                 unmapped.add(f"`{key}` of components", name)
     for name, stated in ((tree.get("environment") or {}).get("vehicles") or {}).items():

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import product
 from math import nan
 from typing import Any, Final
@@ -26,9 +26,8 @@ from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
-from volery.analysis.budgets import budgets
 from volery.analysis.hardware import hardware, hardware_price
-from volery.analysis.system_analysis import analyse
+from volery.analysis.impossible import why_impossible
 from volery.base.errors import ModelError, UsageError
 from volery.base.installed import require_extra
 from volery.explore.points import Evaluate, Point, Row, Value
@@ -37,8 +36,6 @@ from volery.explore.space import Choices, Parameter, Space
 from volery.explore.specification import run_seed
 from volery.explore.statistics import LEVEL, Array, Interval, mean, met
 from volery.model.builder import ModelBuilder
-from volery.model.components import Figure
-from volery.model.system import System
 from volery.model.text import CollectedModelError
 
 POPULATION: Final = 20
@@ -186,7 +183,7 @@ def search(  # noqa: PLR0913  # each is an option
         repetitions: Runs of each variant during the search.
         confirmations: Further runs of each variant that is judged. 0 for what has no noise: then the
             means of ``repetitions`` runs are compared as they are.
-        discard: Says of a variant why it cannot work, without a run; as ``analysis_discards(model)``.
+        discard: Says of a variant why it cannot work, without a run; as ``analysis_discards``.
         level: Confidence that no variant of the front is dominated by another one.
 
     Raises:
@@ -407,15 +404,14 @@ def _tell(study: Any, trial: Any, found: _Variant | None, constraints: Sequence[
 # -- before a run
 
 
-def analysis_discards(model: str | ModelBuilder) -> Discard:
-    """Return what discards the variants of a model that its analysis shows not to work, for ``search``.
+def analysis_discards(model: str | ModelBuilder, fidelity: str) -> Discard:
+    """Return what discards the variants of a model that cannot work, for ``search``.
 
-    Processors are discarded whose stated activations need more than all of their cores even at their shortest
-    times and without other load, and those with less memory than is stated for their processes. What the
-    model leaves open counts nothing: it discards no variant.
+    What the model leaves open counts nothing: it discards no variant (``volery.analysis.impossible``).
 
     Args:
         model: The model; ``campaign.setting.model``.
+        fidelity: ``campaign.setting.fidelity``.
     """
 
     def why(values: Mapping[str, Value]) -> str:
@@ -423,41 +419,9 @@ def analysis_discards(model: str | ModelBuilder) -> Discard:
             system = read_variant(model, values)
         except (ModelError, CollectedModelError):
             return ""  # its run becomes a row that says what is wrong
-        used = analyse(_at_its_shortest(system)).processors
-        full = next((one for one in used if one.share > 1.0), None)
-        if full is not None:
-            return f"{full.resource} has more to execute than it can"
-        for one in budgets(system, used).memory:
-            limit = next((each.memory_b for each in system.processors if each.name == one.processor), None)
-            if one.bytes is not None and limit is not None and one.bytes > limit:
-                return f"{one.processor} has less memory than {one.process} needs"
-        return ""
+        return next(why_impossible(system, fidelity), "")
 
     return why
-
-
-def _at_its_shortest(system: System) -> System:
-    """Return a system in which every figure is its shortest time, and nothing else loads a processor."""
-
-    def shortest(figures: Iterable[Figure]) -> tuple[Figure, ...]:
-        return tuple(
-            one if one.best_ns is None else replace(one, time_ns=one.best_ns, worst_ns=one.best_ns)
-            for one in (replace(each, worst_ns=None) for each in figures)
-        )
-
-    instances = [
-        replace(
-            one,
-            component=replace(
-                one.component,
-                activation=shortest(one.component.activation),
-                operations={name: shortest(figures) for name, figures in one.component.operations.items()},
-            ),
-        )
-        for one in system.instances
-    ]
-    idle = tuple(replace(one, load=0.0) for one in system.processors)
-    return replace(system, instances=tuple(instances), processors=idle)
 
 
 def hardware_cost(model: str | ModelBuilder, currency: str) -> Objective:

@@ -280,6 +280,28 @@ def _with_deadline(node: Node, path: Path, reading: Reading) -> Node:
 ACTIVITY = Shorter(Record(Activity, prepare=_with_deadline), switch=True)
 
 
+@dataclass(frozen=True, slots=True)
+class Assumptions:
+    """What static analysis takes for granted of a component, and no run is changed by.
+
+    A flow of control without a period is released on demand: ``period_ns`` or ``pause_ns`` limit how often.
+    """
+
+    period_ns: Annotated[Ns | None, PERIOD, "Least time between two releases."] = None
+    pause_ns: Annotated[
+        Ns | None, PERIOD, "Least time from the end of an activation to the next release."
+    ] = None
+    beside: Annotated[
+        tuple[Figure, ...],
+        FIGURES,
+        "What an activation executes at most beside its stated time: the driver of a vehicle, or what its "
+        "code charges by `volery.add_time`. `best` is what it executes at least when it does its work.",
+    ] = ()
+    waits_ns: Annotated[
+        Ns | None, TIME, "Most that an activation waits for answers of vehicles and of other computers."
+    ] = None
+
+
 # -- topics and calls
 
 
@@ -541,6 +563,9 @@ class Component:
         Mapping[str, Subscription], MapOf(Record(Subscription), free=True), "Topics that it subscribes to."
     ] = field(default_factory=dict)
     memory_b: Annotated[float | None, DATA_SIZE, "Greatest memory of its process that it takes."] = None
+    assume: Annotated[
+        Assumptions, Record(Assumptions), "What static analysis takes for granted; no run is changed by it."
+    ] = Assumptions()
     where: Location | None = field(default=None, compare=False)
 
     @property

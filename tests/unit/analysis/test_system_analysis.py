@@ -136,6 +136,18 @@ def test_calls_that_no_bound_covers_are_named(system_of):
     assert "serves one caller at a time" in responses(system_of(shared))["caller"].why
 
 
+def test_stated_waits_bound_a_caller_and_its_pauses_what_is_called(system_of):
+    text = CALLS.replace(
+        "calls: {activation: {filter.run: 3}}}",
+        "calls: {activation: {filter.run: 3}}, assume: {pause: 40 ms, waits: 15 ms}}",
+    )
+    system_of(text)
+    system = load(system_of(text).folder / "model.yaml", vocabulary(), allocation="far")
+    assert milliseconds(system) == {"caller": 17, "filter for caller": 6}  # 2 + 15 ms; 3 * 2 ms
+    shares = [one.share for one in analyse(system).processors]
+    assert shares == [pytest.approx(2 / 20), pytest.approx(6 / 40 / 4)]  # waiting is no execution
+
+
 def far(system_of):
     system_of(CALLS)
     return load(system_of(CALLS).folder / "model.yaml", vocabulary(), allocation="far")

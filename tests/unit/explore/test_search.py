@@ -184,7 +184,7 @@ def test_hypervolumes():
 
 
 def test_analysis_discards_what_overloads_a_computer_and_nothing_that_is_open():
-    discards = analysis_discards("examples/starter")
+    discards = analysis_discards("examples/starter", "times")
     period = "components.Patrol.active"
     took = {"components.Patrol.activation": {"time": "30 ms", "best": "20 ms", "worst": "90 ms"}}
     assert discards({period: {"period": "4 ms"}, **took}) == "onboard has more to execute than it can"

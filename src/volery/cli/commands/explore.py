@@ -218,7 +218,7 @@ def _study(campaign: Campaign, study: _Study) -> Findings:
             seed=seed,
             constraints=[one.name for one in system.requirements],
             repetitions=campaign.specification.seeds,
-            discard=analysis_discards(campaign.setting.model),
+            discard=analysis_discards(campaign.setting.model, campaign.setting.fidelity),
         )
         return of_front(front)
     if study.influence:

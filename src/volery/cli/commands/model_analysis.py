@@ -115,7 +115,7 @@ def _responses(found: Analysis, seen: _Seen | None) -> Iterator[RenderableType]:
         for one in {each.subject: each for each in reversed(bounds)}.values():
             beside = []
             if seen:
-                name = one.subject.partition(" ")[0]  # a callback is "<instance> <topic>"
+                name = _component(one)
                 record = seen.record.components.get(name)
                 of_run = None if record is None else record.response_bound_s
                 beside = [_seconds(of_run), _time(seen.longest.responses.get(name))]
@@ -200,7 +200,7 @@ def _broken(found: Analysis, seen: _Seen | None) -> Iterator[str]:
     longest: dict[str, list[Bound]] = {}
     for bounds in found.responses.values():
         for one in bounds:
-            longest.setdefault(one.subject.partition(" ")[0], []).append(one)
+            longest.setdefault(_component(one), []).append(one)
             if one.holds is False:
                 yield f"{one.subject}: the deadline of {_time(one.deadline)} is not guaranteed: {_bound(one)}"
     if seen is None:
@@ -211,6 +211,12 @@ def _broken(found: Analysis, seen: _Seen | None) -> Iterator[str]:
             yield from _exceeded(name, max(known), seen.longest.responses.get(name))
     for one in found.chains:
         yield from _exceeded(one.subject, one.bound, seen.longest.chains.get(one.subject))
+
+
+def _component(one: Bound) -> str:
+    """Return whose activations *one* bounds: empty for calls that it serves, which are its callers'."""
+    name, _, rest = one.subject.partition(" ")  # a callback is "<instance> <topic>"
+    return "" if rest.startswith("for ") else name
 
 
 def _exceeded(subject: str, bound: Ns | None, simulated: Ns | None) -> Iterator[str]:

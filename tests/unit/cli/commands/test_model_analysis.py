@@ -34,14 +34,16 @@ def test_what_the_model_leaves_open_is_named():
     done = analyse(DELIVERY, "--json")
     assert done.exit_code == 0, done.output
     found = json.loads(done.stdout)
-    reasons = {one["why"] for bounds in found["responses"].values() for one in bounds}
-    assert any("commands a vehicle" in one for one in reasons)
-    assert all(one["bound"] is None for bounds in found["responses"].values() for one in bounds)
+    flows = {one["subject"]: one for bounds in found["responses"].values() for one in bounds}
+    assert [name for name, one in flows.items() if one["bound"] is None] == ["central"]
+    assert flows["landing_1"]["bound"] < 100e6
+    assert "at a rate that is not in the model" in flows["central"]["why"]
     assert [one["vehicle"] for one in found["budgets"]["endurance"] if one["feasible"]] == [
         "drone_1",
         "drone_2",
     ]
-    assert "commands a vehicle" in analyse(DELIVERY).stdout
+    unstated = analyse(DELIVERY, "--set", "components.RoverControl.assume={}")
+    assert "it commands a vehicle" in unstated.stdout
 
 
 def test_a_deadline_that_is_not_guaranteed_is_a_failure(tmp_path):

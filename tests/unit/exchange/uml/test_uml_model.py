@@ -229,6 +229,7 @@ components:
     activation: {time: 1 ms}
     queues: {voice: {size: 2, full: remove-first, timeout: 50 ms, retries: 1}}
     calls: {activation: {publish: 2}}
+    assume: {period: 20 ms, pause: 5 ms, beside: {time: 2 ms, best: 1 ms}, waits: 3 ms}
     publishes: {words: {type: std_msgs/String, on: activation, count: 2, size: 40 B}}
     subscribes: {orders: {type: std_msgs/String}}
     memory: 20 MB
@@ -259,6 +260,7 @@ def test_every_key_of_components_and_instances_is_the_same_after_uml():
         "Activity": set(written["active"]),
         "Figure": set(written["operations"]["say"]),
         "Queue": set(written["queues"]["voice"]),
+        "Assumptions": set(written["assume"]),
         "Publication": set(written["publishes"]["words"]),
         "Build": set(written["build"]),
         "Instance": {key for one in instances for key in one} - {"other"},
