@@ -22,7 +22,7 @@ ONE_CORE = [f"platform.processors.{one}.cores=1" for one in ONBOARD]
 LOADED = [f"platform.processors.{one}.load=10 %" for one in ONBOARD]
 PATROL = [
     "components.Patrol.calls={activation: {route.order_of: 1}}",
-    "components.Patrol.assume={period: 20 ms, beside: {time: 2 ms}, waits: 40 ms}",
+    "components.Patrol.assume={period: 90 ms, beside: {time: 2 ms}, waits: 40 ms}",
 ]
 
 START_UP_S = 0.07
