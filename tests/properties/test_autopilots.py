@@ -93,7 +93,7 @@ def _vehicle() -> tuple[VirtualKernel, Autopilot, Link]:
     kernel = VirtualKernel()
     place = LocalFrame(48.0, 11.0, 500.0)
     _, (flight,) = make_world(kernel.now, [Multirotor(sensors="perfect")], seed=1, frame=place)
-    autopilot = Autopilot(kernel, flight, FIRMWARE, warm=True)
+    autopilot = FIRMWARE.create(kernel, flight, warm=True)
     ours, theirs = in_process_pair(kernel, MS, "station")
     autopilot.connect(theirs)
     return kernel, autopilot, ours

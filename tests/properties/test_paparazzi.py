@@ -15,7 +15,6 @@ from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
 from volery.links.pprzlink_codec import PPRZLINK
 from volery.links.pprzlink_messages import message_type
-from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.paparazzi import FIRMWARE
 from volery.simulation.autopilots.paparazzi.endpoint import HANDLERS
@@ -54,7 +53,7 @@ def test_no_message_upsets_it(sent: list[Frame], where: str) -> None:
     kernel = VirtualKernel()
     place = LocalFrame(48.0, 11.0, 500.0)
     _, (flight,) = make_world(kernel.now, [Multirotor(sensors="perfect")], seed=1, frame=place)
-    autopilot = Autopilot(kernel, flight, FIRMWARE, system=AIRCRAFT, warm=True)
+    autopilot = FIRMWARE.create(kernel, flight, system=AIRCRAFT, warm=True)
     link, theirs = in_process_pair(kernel, MS, "ground", PPRZLINK)
     autopilot.connect(theirs)
     received: list[Frame] = []

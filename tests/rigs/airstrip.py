@@ -16,7 +16,6 @@ from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
 from volery.links.link import Link
 from volery.links.wire_faults import WireFaults, faulty_pair
-from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor, Rover
 from volery.trace.events import Operation
@@ -54,10 +53,9 @@ class Airstrip:
         body = Multirotor() if kind is Drone else Rover()
         _, (self.flight,) = make_world(self.kernel.now, [body], seed=7, frame=FRAME)
         firmware = dialects.load(self.firmware).of_version(self.version)
-        self.autopilot = Autopilot(
+        self.autopilot = firmware.create(
             self.kernel,
             self.flight,
-            firmware,
             warm=warm,
             name="craft_1",
             parameters=parameters,

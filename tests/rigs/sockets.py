@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from rigs.airstrip import FRAME, at, dialects
+from rigs.airstrip import FRAME, at
 from volery.base.time import HOUR, MS
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.wall import FollowingKernel
 from volery.links.coded_link import CodedLink
-from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor
 from volery.vehicles import Drone
@@ -38,7 +38,7 @@ def served(
     if follower is not None:
         kernel.every(TICK, lambda: follower.advance(TICK))
     _, (flight,) = make_world(kernel.now, [Multirotor()], seed=7, frame=FRAME)
-    served_one = Autopilot(kernel, flight, dialects.load(autopilot), warm=True)
+    served_one = firmwares.load(autopilot).create(kernel, flight, warm=True)
     link = listen(kernel)
     served_one.connect(link)
     thread = threading.Thread(target=kernel.run, args=(HOUR,), daemon=True)

@@ -12,7 +12,7 @@ from volery.base.time import MS, S, from_seconds, to_seconds
 from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily
+from volery.simulation.autopilots.autopilot import FirmwareFamily
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor, Rover
 from volery.trace.events import Record, ignore
@@ -62,7 +62,7 @@ class Station:
         spec = body(sensors=sensors, heading_deg=self.heading)
         self.world, (self.flight,) = make_world(self.kernel.now, [spec], seed=seed, frame=self.home)
         firmware = self.firmware.with_features(features or self.features)
-        self.autopilot = Autopilot(self.kernel, self.flight, firmware, warm=warm, **options)
+        self.autopilot = firmware.create(self.kernel, self.flight, warm=warm, **options)
         self.vehicle = self.autopilot.vehicle
         self.received: list[Heard] = []
         self.latest: dict[str, dict[str, Any]] = {}

@@ -24,7 +24,6 @@ from volery.bridge import (
     VehicleNode,
     VehicleNodeOptions,
 )
-from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import FOREVER, VirtualKernel
 from volery.kernel.wall import WallKernel
@@ -109,6 +108,7 @@ class Bridge:
         self._graphs = RealGraphs(self.kernel)
         self._interpreted = self.names not in _own_names(address)
         with ExitStack() as undo:
+            self._opened = undo
             undo.callback(self._graphs.close)
             self._link = (
                 self._interpreter(address, wanted)
@@ -117,14 +117,14 @@ class Bridge:
             )
             undo.callback(self._link.close)
             self._node = self._make_node(address, wanted)
-            undo.pop_all()
+            self._opened = undo.pop_all()
         self._node.start(ExecutionContext("bridge"), self.kernel.root)
 
     def _direct_link(self, address: Address, wanted: BridgeOptions) -> Link:
         """Return the link to an autopilot with the protocol of the names."""
         if address.transport == "sim":
             vehicle = parse_simulated(address, address.driver)
-            return _fleet(self.kernel, vehicle, wanted.seed).link_for(vehicle)
+            return self._fleet(vehicle, wanted.seed).link_for(vehicle)
         address.only("baud", LOCAL_ADDRESS, "system", LOCAL_PORT, REPLY_PORT, SIGNING)
         return open_link(self.kernel, address, drivers.load(address.driver).codec)
 
@@ -133,7 +133,7 @@ class Bridge:
         name, factory = address.driver, drivers.load(address.driver)
         if address.transport == "sim":
             vehicle = parse_simulated(address, address.driver)
-            fleet = _fleet(self.kernel, vehicle, wanted.seed)
+            fleet = self._fleet(vehicle, wanted.seed)
             driver = open_simulated_driver(self.kernel, fleet, vehicle, wanted.seed)
         elif address.transport in GRAPHS:
             driver = self._graphs.driver(name, address)
@@ -146,6 +146,14 @@ class Bridge:
                 link.close()
                 raise
         return MavlinkAdapter(self.kernel, driver, ExecutionContext("bridge"))
+
+    def _fleet(self, vehicle: SimulatedVehicle, seed: int) -> SimulatedFleet:
+        """Return a fleet of one vehicle in a world of its own."""
+        from volery.run.assembly.simulated_fleet import fleet_of
+
+        fleet = fleet_of(self.kernel, [vehicle], seed)
+        self._opened.callback(fleet.close)
+        return fleet
 
     def _make_node(self, address: Address, wanted: BridgeOptions) -> VehicleNode | PprzrosNode:
         graph = self._graphs.graph(wanted.graph)
@@ -177,12 +185,11 @@ class Bridge:
         self.kernel.every(period, action)
 
     def run(self) -> None:
-        """Run until ``KeyboardInterrupt``, then close the link and the graph."""
+        """Run until ``KeyboardInterrupt``, then close what was opened."""
         try:
             self.kernel.run(FOREVER)
         finally:
-            self._link.close()
-            self._graphs.close()
+            self._opened.close()
             self.kernel.close("the bridge was stopped")
 
 
@@ -243,10 +250,3 @@ def _check_graph_names(address: Address, wanted: str) -> None:
             f"{address}: {address.driver} is a ROS node itself, under {own}'s names "
             f"(a simulated one: {served}); for other names give --names {choices(MAVLINK_NAMES)}"
         )
-
-
-def _fleet(kernel: Kernel, vehicle: SimulatedVehicle, seed: int) -> SimulatedFleet:
-    """Return a fleet of one vehicle in a world of its own."""
-    from volery.run.assembly.simulated_fleet import fleet_of
-
-    return fleet_of(kernel, [vehicle], seed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread, current_thread
@@ -131,6 +132,7 @@ class RunSession:
         self._thread: Thread | None = None
         self._goes_on = Event()
         self._goes_on.set()
+        self._opened = ExitStack()
         try:
             self._prepare()
         except BaseException:
@@ -197,7 +199,7 @@ class RunSession:
                 left = self._kernel.close(self._ending.reason)
             except BaseException as fault:
                 self._ending.stop_hard("failed", f"{type(fault).__name__}: {fault}")
-                self._close(())
+                self._close(self.leave())
                 raise
             self._close([*left, *self.leave()])
             return False
@@ -271,6 +273,7 @@ class RunSession:
             options.seed,
             through_bytes=with_faulty_links(environment),
         )
+        self._opened.callback(self._fleet.close)
         self._fleet.on_collision = self._ending.vehicle_hit
         self._built = self._build(platform)
         self._recording = Recording(setup, options.folder, attachments_of(system), traced=options.traced)
@@ -325,7 +328,8 @@ class RunSession:
         self._built.start()
 
     def leave(self) -> list[str]:
-        """Leave the graph, if any. Return the names of components that had to be killed."""
+        """End the autopilots and leave the graph, if any. Return the names of components that were killed."""
+        self._opened.close()
         return []
 
     def _close(self, left: Sequence[str]) -> None:
@@ -391,7 +395,8 @@ class GraphSession(RunSession):
 
     def leave(self) -> list[str]:
         """See ``RunSession``."""
-        return [] if self._distributed is None else self._distributed.close()
+        left = [] if self._distributed is None else self._distributed.close()
+        return [*left, *super().leave()]
 
 
 def _raise(error: Exception) -> None:

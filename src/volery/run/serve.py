@@ -15,7 +15,7 @@ from volery.run.assembly.ros_graphs import open_graph
 from volery.run.assembly.simulated_fleet import SimulatedFleet, fleet_of
 from volery.run.assembly.simulated_vehicles import SimulatedVehicle
 from volery.run.assembly.vehicle_nodes import graph_access
-from volery.simulation.autopilots.autopilot import firmwares
+from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.trace.events import Event, LinkState
 from volery.vehicles.address import LOCAL_PORT, SIGNING, Address, listen, parse_listen
 
@@ -101,6 +101,7 @@ class VehicleServer:
         try:
             self.kernel.run(FOREVER)
         finally:
+            self.fleet.close()
             for link in self.links:
                 link.close()
             self.kernel.close("the server was stopped")
@@ -140,5 +141,6 @@ class VehicleNodeServer:
         try:
             self.kernel.run(FOREVER)
         finally:
+            self.fleet.close()
             self.graph.close()
             self.kernel.close("the server was stopped")

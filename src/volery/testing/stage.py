@@ -30,7 +30,7 @@ from volery.run.assembly.ros_graphs import GRAPHS
 from volery.run.assembly.simulated_fleet import fleet_of
 from volery.run.assembly.simulated_vehicles import parse_simulated
 from volery.run.assembly.vehicles import EMBEDDED, KINDS
-from volery.simulation.autopilots.autopilot import Autopilot
+from volery.simulation.autopilots.fleet_autopilot import FleetAutopilot
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.testing.access import ControlledLink, LinkControl, access_to
 from volery.testing.checks import NotPossibleError, demand
@@ -353,9 +353,9 @@ AWAY_DEG = 0.0005
 class SafetyPilot(Commander):
     """The other commander where all programs share one node: the pilot, who uses mode switch and throttle."""
 
-    def __init__(self, kernel: VirtualKernel, driver: Driver, autopilot: Autopilot) -> None:
+    def __init__(self, kernel: VirtualKernel, driver: Driver, autopilot: FleetAutopilot) -> None:
         super().__init__(kernel, driver, protocol="a graph")
-        self._channels = autopilot.vehicle.rc.transmitter
+        self._channels = autopilot.transmitter
         self._away = BOTH_ENDS - self._channels[MODE_SWITCH]
 
     def land(self) -> None:
@@ -465,6 +465,7 @@ class SimulatedStage(Stage):
         """Close drivers and kernel."""
         self.rest()
         self.drone.close()
+        self.fleet.close()
         self.kernel.close()
 
 

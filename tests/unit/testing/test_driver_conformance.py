@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from volery.base.errors import UsageError
 from volery.cli.main import application
 from volery.simulation.autopilots.ardupilot import FIRMWARE
-from volery.simulation.autopilots.autopilot import firmwares
+from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.testing import Outcome, conformance
 from volery.testing.checks import CheckFailedError, demand, raising
 from volery.testing.driver_conformance import chosen

@@ -43,7 +43,7 @@ from volery.model.faults import (
 )
 from volery.run.assembly.computers import LOAD_PERIOD, LOAD_PRIORITY, load_name
 from volery.run.assembly.simulated_fleet import SimulatedFleet, wind_of
-from volery.simulation.autopilots.autopilot import firmwares
+from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.trace.events import Text
 
 WARNING = 4

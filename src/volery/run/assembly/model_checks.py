@@ -35,7 +35,7 @@ from volery.run.assembly.component_builder import (
 )
 from volery.run.assembly.cpp import compile_all, describe_component, is_cpp
 from volery.run.ending import Ending
-from volery.simulation.autopilots.autopilot import firmwares
+from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.simulation.world.sensors import sensors
 
 

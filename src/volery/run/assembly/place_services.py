@@ -47,7 +47,7 @@ def _serve(kernel: Kernel, fleet: SimulatedFleet, places: Sequence[Place], since
     for name, autopilot in fleet.autopilots.items():
         flight = fleet.flights[name]
         truth = flight.truth()
-        place = None if autopilot.vehicle.armed or not truth.on_ground else _nearest(places, truth)
+        place = None if not truth.on_ground or autopilot.state().armed else _nearest(places, truth)
         if place is None:
             since.pop(name, None)
             continue

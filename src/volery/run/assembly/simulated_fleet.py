@@ -28,7 +28,7 @@ from volery.model.environment import Wind as WindModel
 from volery.run.assembly.bodies import body_of
 from volery.run.assembly.simulated_vehicles import LINK_DELAY, SimulatedVehicle
 from volery.run.result import SAMPLING_PERIOD, VehicleProgress
-from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily, firmwares
+from volery.simulation.autopilots.fleet_autopilot import AutopilotFamily, FleetAutopilot, firmwares
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
 from volery.simulation.world.environment_models import Wind
 from volery.simulation.world.scene import Scene, Solid
@@ -86,26 +86,29 @@ class SimulatedFleet:
         self.on_collision: Callable[[Collision], object] = ignore
         """Called with each collision, when it is recorded."""
         self.flights: dict[str, Flight] = {}
-        self.autopilots: dict[str, Autopilot] = {}
-        self._families: dict[str, FirmwareFamily] = {}
+        self.autopilots: dict[str, FleetAutopilot] = {}
+        self._families: dict[str, AutopilotFamily] = {}
         ids = _ids([vehicle.name for vehicle in vehicles], systems or {})
-        for vehicle, flight in zip(vehicles, flights, strict=True):
-            self.flights[vehicle.name] = flight
-            family = firmwares.load(vehicle.autopilot).of_version(vehicle.version)
-            family = family.with_features(vehicle.features)
-            self._families[vehicle.name] = family
-            self.autopilots[vehicle.name] = Autopilot(
-                kernel,
-                flight,
-                family,
-                system=ids[vehicle.name],
-                parameters=vehicle.parameters,
-                warm=vehicle.started == "warm",
-                name=vehicle.name,
-                logging=logging,
-            )
-            for channel, pulse in vehicle.transmitter.items():
-                self.move_transmitter(vehicle.name, kernel.now(), int(channel), pulse)
+        try:
+            for vehicle, flight in zip(vehicles, flights, strict=True):
+                self.flights[vehicle.name] = flight
+                family = firmwares.load(vehicle.autopilot).of_version(vehicle.version)
+                family = family.with_features(vehicle.features)
+                self._families[vehicle.name] = family
+                self.autopilots[vehicle.name] = family.create(
+                    kernel,
+                    flight,
+                    system=ids[vehicle.name],
+                    parameters=vehicle.parameters,
+                    warm=vehicle.started == "warm",
+                    name=vehicle.name,
+                    logging=logging,
+                )
+                for channel, pulse in vehicle.transmitter.items():
+                    self.move_transmitter(vehicle.name, kernel.now(), int(channel), pulse)
+        except BaseException:
+            self.close()
+            raise
 
     @property
     def world(self) -> World:
@@ -114,7 +117,7 @@ class SimulatedFleet:
             raise UsageError("this run has no vehicle and therefore no world")
         return self._world
 
-    def family(self, vehicle: str) -> FirmwareFamily:
+    def family(self, vehicle: str) -> AutopilotFamily:
         """Return the firmware of a vehicle."""
         return self._families[vehicle]
 
@@ -183,7 +186,7 @@ class SimulatedFleet:
             channel: RC channel, from 1.
             pulse: Pulse width, µs.
         """
-        channels = self.autopilots[vehicle].vehicle.rc.transmitter
+        channels = self.autopilots[vehicle].transmitter
 
         def move() -> None:
             channels[channel - 1] = pulse
@@ -199,8 +202,13 @@ class SimulatedFleet:
         return tuple(self._progress(name) for name in self.flights)
 
     def _progress(self, name: str) -> VehicleProgress:
-        vehicle, truth = self.autopilots[name].vehicle, self.flights[name].truth()
-        return VehicleProgress(name, vehicle.mode.name, vehicle.armed, truth.position[2] - truth.ground)
+        state, truth = self.autopilots[name].state(), self.flights[name].truth()
+        return VehicleProgress(name, state.mode, state.armed, truth.position[2] - truth.ground)
+
+    def close(self) -> None:
+        """End the autopilots; their states can still be read."""
+        for autopilot in self.autopilots.values():
+            autopilot.close()
 
     def record_states(self) -> None:
         """Record the present state of every vehicle."""

@@ -47,7 +47,8 @@ class OpenedVehicles:
         kernel: Virtual clock for simulated vehicles, wall clock for real ones.
         vehicles: In the order of their addresses.
         fleet: The simulated fleet, or None for real vehicles.
-        leave: Closes the ROS graphs of the vehicles; called after the vehicles are closed.
+        leave: Closes the simulated fleet, or the ROS graphs of real vehicles; called after the vehicles are
+            closed.
     """
 
     kernel: VirtualKernel | WallKernel
@@ -113,7 +114,7 @@ def _open_simulated(
     kernel = VirtualKernel(pace=stated.pace)
     fleet = fleet_of(kernel, wanted, stated.seed)
     vehicles = [_simulated_vehicle(kernel, fleet, one, kinds[one.vehicle.name], stated) for one in wanted]
-    return OpenedVehicles(kernel, tuple(vehicles), fleet)
+    return OpenedVehicles(kernel, tuple(vehicles), fleet, fleet.close)
 
 
 def _check_home(wanted: SimulatedVehicle, fence: Fence | None) -> None:

@@ -7,7 +7,7 @@ graph.
 
 ```python
 world, flights = make_world(kernel.now, [Multirotor()], seed=7, frame=frame)
-autopilot = Autopilot(kernel, flights[0], firmwares.load("ardupilot"), warm=True)
+autopilot = firmwares.load("ardupilot").create(kernel, flights[0], warm=True)
 ours, theirs = in_process_pair(kernel, 0, "drone_1", MAVLINK)
 autopilot.connect(theirs)
 ```
@@ -15,7 +15,7 @@ autopilot.connect(theirs)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, MutableSequence, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from math import nan
@@ -23,13 +23,13 @@ from typing import NamedTuple
 
 from volery.base.errors import UsageError, choices
 from volery.base.frames import Vector, ned_to_enu
-from volery.base.installed import Registry
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Handle, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.links.link import Codec, Link
 from volery.links.mavlink_codec import MAVLINK
 from volery.ros.graph import RosGraph
+from volery.simulation.autopilots.fleet_autopilot import DefaultLink
 from volery.simulation.autopilots.flight_recorder import FlightRecorder
 from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.autopilots.protocol_endpoint import GraphEndpoint, LinkEndpoint, ProtocolEndpoint
@@ -103,13 +103,6 @@ class Firmware:
     """Create the endpoint of the firmware's protocol (telemetry and commands)."""
 
 
-class DefaultLink(NamedTuple):
-    """An address to which a firmware connects by default, and what the firmware uses that link for."""
-
-    address: str
-    use: str = ""
-
-
 GROUND_STATION = DefaultLink("udp://127.0.0.1:14550")
 """Where ground stations listen for MAVLink."""
 
@@ -175,9 +168,35 @@ class FirmwareFamily:
         kinds = versions[self.version or list(versions)[-1]]
         return replace(self, kinds=kinds, versions=versions)
 
+    def create(
+        self,
+        kernel: Kernel,
+        flight: Flight,
+        *,
+        system: int = 1,
+        parameters: Mapping[str, float] | None = None,
+        warm: bool = False,
+        name: str = "",
+        logging: bool = False,
+    ) -> Autopilot:
+        """Return an autopilot with the firmware for the kind of body; see ``AutopilotFamily``.
 
-firmwares: Registry[FirmwareFamily] = Registry("volery.autopilots", "simulated autopilot")
-"""Entry points of the group ``volery.autopilots``."""
+        Raises:
+            UsageError: It has no such parameter, or no firmware for the kind.
+        """
+        kind = _kind_of(flight)
+        if kind not in self.kinds:
+            raise UsageError(f"{self.name} has no {kind}; it has {choices(self.kinds)}")
+        return Autopilot(
+            kernel,
+            flight,
+            self.kinds[kind],
+            system=system,
+            parameters=parameters,
+            warm=warm,
+            name=name,
+            logging=logging,
+        )
 
 
 WARM_UP = 300 * MS
@@ -185,28 +204,19 @@ WARM_UP = 300 * MS
 
 
 class Autopilot:
-    """One vehicle's autopilot.
+    """One vehicle's autopilot, a ``FleetAutopilot``: *firmware* on the flight stack.
 
-    Args:
-        kernel: Clock and timers.
-        flight: The flight stack's handle.
-        firmware: A firmware, or a family: then the kind of body selects the firmware.
-        system: MAVLink system id.
-        parameters: Parameter values that replace the firmware's.
-        warm: Whether it is booted and has a position before the run begins. A cold autopilot boots when its
-            first link is connected, and takes as long as the firmware does.
-        name: Name in texts and traces; by default firmware and system id.
-        logging: Whether flights are recorded as logs on board.
+    The other arguments are those of ``AutopilotFamily.create``.
 
     Raises:
-        UsageError: The firmware has no such parameter or no such kind of vehicle.
+        UsageError: The firmware has no such parameter or is for another kind of vehicle.
     """
 
     def __init__(
         self,
         kernel: Kernel,
         flight: Flight,
-        firmware: Firmware | FirmwareFamily,
+        firmware: Firmware,
         *,
         system: int = 1,
         parameters: Mapping[str, float] | None = None,
@@ -216,13 +226,17 @@ class Autopilot:
     ) -> None:
         self._kernel = kernel
         self._flight = flight
-        chosen = _of_kind(firmware, "multirotor" if flight.flying else "rover")
-        self.firmware = chosen
-        self.name = name or f"{chosen.name}_{system}"
+        kind = _kind_of(flight)
+        if firmware.kind != kind:
+            raise UsageError(f"{firmware.name} is for a {firmware.kind}, but the body is a {kind}")
+        self.firmware = firmware
+        self.name = name or f"{firmware.name}_{system}"
         self.vehicle = Vehicle(
-            kernel, flight, chosen.rules, system=system, name=self.name, overrides=parameters
+            kernel, flight, firmware.rules, system=system, name=self.name, overrides=parameters
         )
-        self.endpoint: ProtocolEndpoint = chosen.endpoint(self.vehicle)
+        self.transmitter: MutableSequence[int] = self.vehicle.rc.transmitter
+        """See ``FleetAutopilot``."""
+        self.endpoint: ProtocolEndpoint = firmware.endpoint(self.vehicle)
         self.vehicle.output = self.endpoint
         self._recorder = FlightRecorder(self.vehicle) if logging else None
         self.on_reboot: Action = _nothing
@@ -233,7 +247,7 @@ class Autopilot:
         self._booted = warm
         self.vehicle.restart = self._restart
         if warm:
-            self._boot(chosen.rules.startup.warm_age)
+            self._boot(firmware.rules.startup.warm_age)
 
     # -- life
 
@@ -402,14 +416,8 @@ class Autopilot:
         return ned_to_enu((position[0] + offset[0], position[1] + offset[1], position[2] + offset[2]))
 
 
-def _of_kind(firmware: Firmware | FirmwareFamily, kind: str) -> Firmware:
-    if isinstance(firmware, Firmware):
-        if firmware.kind != kind:
-            raise UsageError(f"{firmware.name} is for a {firmware.kind}, but the body is a {kind}")
-        return firmware
-    if kind not in firmware.kinds:
-        raise UsageError(f"{firmware.name} has no {kind}; it has {choices(firmware.kinds)}")
-    return firmware.kinds[kind]
+def _kind_of(flight: Flight) -> str:
+    return "multirotor" if flight.flying else "rover"
 
 
 def _nothing() -> None:

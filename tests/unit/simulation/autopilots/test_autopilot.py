@@ -14,7 +14,8 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
 from volery.simulation.autopilots.ardupilot import FIRMWARE
-from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily, firmwares
+from volery.simulation.autopilots.autopilot import Autopilot, FirmwareFamily
+from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor, Rover
 
@@ -29,7 +30,7 @@ class Yard:
         _, self.flights = make_world(self.kernel.now, list(bodies), seed=5, frame=FRAME)
 
     def autopilot(self, index: int = 0, **options: Any) -> Autopilot:
-        return Autopilot(self.kernel, self.flights[index], FIRMWARE, **options)
+        return FIRMWARE.create(self.kernel, self.flights[index], **options)
 
     def listen(self, autopilot: Autopilot) -> tuple[Any, list[Frame]]:
         ours, theirs = in_process_pair(self.kernel, MS, "station")

@@ -3,7 +3,7 @@
 from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
-from volery.simulation.autopilots.autopilot import Autopilot, firmwares
+from volery.simulation.autopilots.ardupilot import FIRMWARE
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.state_groups import NEVER, GroundState
 from volery.simulation.world.body_specs import Multirotor
@@ -47,7 +47,7 @@ def test_a_take_off_that_never_left_the_ground_ends_after_its_time() -> None:
 def test_a_home_set_by_a_user_stays_marked_until_the_next_boot() -> None:
     kernel = VirtualKernel()
     _, (flight,) = make_world(kernel.now, [Multirotor()], seed=1, frame=LocalFrame(47.4, 8.5, 400.0))
-    vehicle = Autopilot(kernel, flight, firmwares.load("ardupilot"), warm=True).vehicle
+    vehicle = FIRMWARE.create(kernel, flight, warm=True).vehicle
     vehicle.set_home_here()
     assert vehicle.home is not None
     assert not vehicle.home.by_user

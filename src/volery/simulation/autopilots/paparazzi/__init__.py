@@ -5,7 +5,8 @@ Protocol and rules follow public definitions and recordings of the firmware's ow
 """
 
 from volery.links.pprzlink_codec import PPRZLINK
-from volery.simulation.autopilots.autopilot import DefaultLink, FirmwareFamily
+from volery.simulation.autopilots.autopilot import FirmwareFamily
+from volery.simulation.autopilots.fleet_autopilot import DefaultLink
 from volery.simulation.autopilots.paparazzi.firmware import ROTORCRAFT
 
 GROUND_SEGMENT = DefaultLink("udp://127.0.0.1:4242?from=4243")

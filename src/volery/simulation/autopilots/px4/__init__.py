@@ -3,7 +3,8 @@
 The multirotor follows recordings of the firmware's own simulator.
 """
 
-from volery.simulation.autopilots.autopilot import DefaultLink, FirmwareFamily
+from volery.simulation.autopilots.autopilot import FirmwareFamily
+from volery.simulation.autopilots.fleet_autopilot import DefaultLink
 from volery.simulation.autopilots.px4.airframes import copter, rover
 from volery.simulation.autopilots.px4.firmware import ONBOARD, STATION
 from volery.simulation.autopilots.px4.versions import VERSIONS

@@ -15,7 +15,7 @@ from volery.simulation.autopilots.ardupilot import FIRMWARE
 from volery.simulation.autopilots.ardupilot.copter import arming_problems
 from volery.simulation.autopilots.ardupilot.feature import Build, Check, Feature, Item, Kept
 from volery.simulation.autopilots.ardupilot.features import OPTIONAL, ORDER, absent, features_of
-from volery.simulation.autopilots.autopilot import firmwares
+from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.vehicles.address import parse
 
 PACKAGE = Path(volery.simulation.autopilots.ardupilot.__file__).parent

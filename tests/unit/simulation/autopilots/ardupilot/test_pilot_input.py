@@ -7,7 +7,6 @@ from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
 from volery.simulation.autopilots.ardupilot import FIRMWARE
 from volery.simulation.autopilots.ardupilot.pilot_input import sticks_rest, switches_of
-from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor
 
@@ -15,7 +14,7 @@ from volery.simulation.world.body_specs import Multirotor
 def test_sticks_are_read_again_after_a_channel_or_a_parameter_has_changed() -> None:
     kernel = VirtualKernel()
     _, flights = make_world(kernel.now, [Multirotor()], seed=1, frame=LocalFrame(46.0, 7.0, 500.0))
-    autopilot = Autopilot(kernel, flights[0], FIRMWARE.of_version("4.5"), warm=True)
+    autopilot = FIRMWARE.of_version("4.5").create(kernel, flights[0], warm=True)
     kernel.run(5 * S)
     vehicle = autopilot.vehicle
     assert sticks_rest(vehicle)

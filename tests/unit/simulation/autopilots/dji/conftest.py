@@ -14,7 +14,6 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.ros.graph import EmbeddedGraph, ServiceError
 from volery.ros.messages import new, request
-from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.dji import FIRMWARE
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.world.body_specs import Multirotor
@@ -53,9 +52,7 @@ class Apron:
         self.kernel = VirtualKernel(record=self.events.append)
         body = Multirotor(sensors="rtk")
         _, (self.flight,) = make_world(self.kernel.now, [body], seed=7, frame=FRAME)
-        self.autopilot = Autopilot(
-            self.kernel, self.flight, FIRMWARE, warm=warm, name="d", parameters=parameters
-        )
+        self.autopilot = FIRMWARE.create(self.kernel, self.flight, warm=warm, name="d", parameters=parameters)
         self.graph = EmbeddedGraph(self.kernel, unrecorded=True)
         self.autopilot.join(self.graph, f"/d/{package}", ExecutionContext("d"))
         self.node = self.graph.node("program", context=ExecutionContext("program"))

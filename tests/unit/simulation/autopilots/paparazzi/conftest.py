@@ -15,7 +15,6 @@ from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
 from volery.links.paparazzi_aircraft import stock_aircraft
 from volery.links.wire_faults import WireFaults, faulty_pair
-from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
 from volery.simulation.autopilots.paparazzi import FIRMWARE
 from volery.simulation.world.body_specs import Battery, Multirotor
@@ -41,8 +40,8 @@ class Craft:
         body = Multirotor(sensors="rtk", battery=battery or Multirotor().battery)
         _, flights = make_world(self.kernel.now, [body], seed=5, frame=FRAME, wind=wind)
         self.flight: Flight = flights[0]
-        self.autopilot = Autopilot(
-            self.kernel, self.flight, FIRMWARE, system=AIRCRAFT, parameters=parameters, warm=warm
+        self.autopilot = FIRMWARE.create(
+            self.kernel, self.flight, system=AIRCRAFT, parameters=parameters, warm=warm
         )
         codec = FIRMWARE.codec
         assert codec is not None

@@ -10,7 +10,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.kernel.virtual import VirtualKernel
-from volery.simulation.autopilots.autopilot import Autopilot, firmwares
+from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.paparazzi import FIRMWARE
 from volery.simulation.world.body_specs import Rover
@@ -27,7 +27,7 @@ def test_there_is_no_rover() -> None:
     kernel = VirtualKernel()
     _, flights = make_world(kernel.now, [Rover()], seed=1, frame=LocalFrame(48.0, 11.0, 500.0))
     with pytest.raises(UsageError, match=r"paparazzi has no rover; it has multirotor"):
-        Autopilot(kernel, flights[0], FIRMWARE)
+        FIRMWARE.create(kernel, flights[0])
 
 
 def test_it_waits_at_its_holding_point_in_nav(craft: Any) -> None:

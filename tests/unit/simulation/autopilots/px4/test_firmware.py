@@ -14,7 +14,6 @@ from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
 from volery.links.mavlink_messages import from_bytewise, status_text_chunks, to_bytewise
-from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.flight_stack.flight import make_world
 from volery.simulation.autopilots.mavlink.channel import StatusTextPolicy, StatusTextQueue
 from volery.simulation.autopilots.px4 import FIRMWARE
@@ -132,7 +131,7 @@ def flown(kind: str, seed: int, wanted: frozenset[str] | None = None) -> list[tu
     kernel = VirtualKernel()
     spec = Multirotor() if kind == "multirotor" else Rover()
     _, flights = make_world(kernel.now, [spec], seed=seed, frame=LocalFrame(46.0, 7.0, 500.0))
-    autopilot = Autopilot(kernel, flights[0], FIRMWARE, warm=True)
+    autopilot = FIRMWARE.create(kernel, flights[0], warm=True)
     ours, theirs = in_process_pair(kernel, MS, "station")
     received: list[tuple[Any, ...]] = []
     ours.receive(lambda frame: received.append((kernel.now(), frame.name, repr(frame.fields))))
@@ -184,7 +183,7 @@ def test_a_stated_position_is_cut_off_and_not_rounded() -> None:
     kernel = VirtualKernel()
     frame = LocalFrame(46.0, -7.0, 500.0)
     _, flights = make_world(kernel.now, [Multirotor()], seed=3, frame=frame)
-    autopilot = Autopilot(kernel, flights[0], FIRMWARE, warm=True)
+    autopilot = FIRMWARE.create(kernel, flights[0], warm=True)
     ours, theirs = in_process_pair(kernel, MS, "station")
     cuts: list[tuple[float, float]] = []
 
