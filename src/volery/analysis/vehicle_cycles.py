@@ -13,7 +13,7 @@ from volery.base.time import Ns
 from volery.bridge.naming_schemes import MAVROS_TOPICS, ROSCOPTER_TOPICS
 from volery.bridge.vehicle_node import MAX_WAITING, PPRZROS_PERIOD, VehicleNodeOptions
 from volery.run.assembly.vehicle_nodes import ROSCOPTER_NAMES
-from volery.simulation.autopilots.autopilot import firmwares
+from volery.simulation.autopilots.fleet_autopilot import firmwares
 
 REQUESTS = 8
 """Set-points and requests of one commander in a cycle that are counted, at most."""
