@@ -10,26 +10,30 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 # where it is set, as in many containers, each of the hundreds of programs that tests start compiles all its modules
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-all check bench docs wheel clean
+.PHONY: demo caches test test-all check bench docs wheel clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/volery.stamp ## parcels across a city, two allocations side by side, a report
 	$(BIN)/volery demo
 
-test: $(VENV)/test.stamp ## all tests, against real sockets, clients and a browser
+caches: $(VENV)/dev.stamp # what each of the many processes would compile else: physics, and assertions of tests
+	@$(BIN)/python -c "import volery; volery.fly('examples/mission.py', 'sim:px4')"
+	@$(BIN)/pytest --collect-only -qq >/dev/null
+
+BY_FILE := --dist loadfile --no-loadscope-reorder --durations=5
+
+test: $(VENV)/test.stamp caches ## all tests, against real sockets, clients and a browser
 	@status=0; \
-	$(BIN)/pytest -n auto --dist worksteal --durations=5 -m "not integration and not optional" || status=1; \
-	echo "real ROS, of whose time most is waiting, beside the other integration tests; its result comes last"; \
-	$(BIN)/pytest --durations=5 tests/integration/transports >$(VENV)/transports.log 2>&1 & transports=$$!; \
-	$(BIN)/pytest -n 3 --dist loadfile --no-loadscope-reorder --durations=5 -m "integration and not long" tests/integration \
-		--ignore tests/integration/transports || status=1; \
+	echo "real ROS, of whose time most is waiting, in two processes beside all others; its result comes last"; \
+	$(BIN)/pytest -n 2 $(BY_FILE) tests/integration/transports >$(VENV)/transports.log 2>&1 & transports=$$!; \
+	$(BIN)/pytest -n auto $(BY_FILE) -m "not long and not optional" --ignore tests/integration/transports \
+		|| status=1; \
 	wait $$transports || status=1; \
 	cat $(VENV)/transports.log; \
 	exit $$status
 
-test-all: test ## the same, features that are off by default, and what computes for minutes: compiled modules
-	$(BIN)/pytest -n auto -m "optional and not integration"
-	$(BIN)/pytest -m long
+test-all: test ## the same, features that are off by default, and what is rare or computes for minutes
+	$(BIN)/pytest -n auto $(BY_FILE) -m "long or optional"
 
 CHECKS := check-style check-types check-types-of-scripts check-layers check-words check-pages
 
@@ -85,13 +89,14 @@ $(VENV)/dev.stamp: $(VENV)/volery.stamp
 	@$(PIP) install --group dev
 	@touch $@
 
-$(VENV)/test.stamp: $(VENV)/dev.stamp scripts/debian-packages $(VENV)/ros1.stamp $(ROS2)
+$(VENV)/test.stamp: $(VENV)/ros1.stamp scripts/debian-packages $(ROS2)
 	@echo "setting up $(VENV): independent MAVLink clients"
 	@$(PIP) install --group clients
 	@scripts/debian-packages chromium native libeigen3-dev
 	@touch $@
 
-$(VENV)/ros1.stamp: $(VENV)/volery.stamp scripts/debian-packages scripts/ros1-modules
+# after dev.stamp: with `make -j`, one installs into $(VENV) at a time, beside those that make ROS 2
+$(VENV)/ros1.stamp: $(VENV)/dev.stamp scripts/debian-packages scripts/ros1-modules
 	@echo "setting up $(VENV): ROS 1"
 	@scripts/debian-packages ros1 roscpp
 	@$(PIP) install --group ros1

@@ -1,5 +1,6 @@
 """For all tests: how fast a machine is, and how busy, is not what they are about; nor who started them."""
 
+import os
 import signal
 from collections import Counter
 
@@ -15,11 +16,19 @@ if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:  # by nohup; with a handle
     signal.signal(signal.SIGHUP, lambda *_: None)
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """One more than there are cores: some tests wait."""
+    return len(os.sched_getaffinity(0)) + 1
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the files that take long: those with the longest time-outs, then those with most tests."""
+    """Begin with the files that take long: the longest time-outs, what starts programs, then most tests."""
     files = Counter(item.path for item in items)
-    limits = Counter[object]()
+    limits, programs = Counter[object](), set()
     for item in items:
         marker = item.get_closest_marker("timeout")
         limits[item.path] = max(limits[item.path], marker.args[0] if marker else 0)
-    items.sort(key=lambda item: (-limits[item.path], -files[item.path]))
+        if item.get_closest_marker("integration"):
+            programs.add(item.path)
+    items.sort(key=lambda item: (-limits[item.path], item.path not in programs, -files[item.path]))

@@ -8,6 +8,7 @@ from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
 from volery.ros.graph import EmbeddedGraph
 from volery.ros.graph.snapshot import GraphSnapshot, snapshot
+from volery.ros.messages import new
 
 TEXT = "std_msgs/String"
 
@@ -44,3 +45,15 @@ def test_a_node_that_is_there_is_not_waited_for(within: int):
     assert found.nodes == ("/talker",)
     assert found.topics[0].rate == (0.0 if within else None)
     assert at <= 100 * MS + within
+
+
+def test_the_rate_of_a_topic_is_its_messages_in_a_second():
+    kernel = VirtualKernel()
+    graph = EmbeddedGraph(kernel)
+    with kernel.adopt("reader"):
+        publisher = graph.node("talker").advertise("/words", TEXT)
+        for number in range(100):
+            kernel.call_at(number * 100 * MS, lambda: publisher.publish(new(TEXT, data="word")))
+        (topic,) = snapshot(graph, 2 * S).topics
+    graph.close()
+    assert topic.rate == pytest.approx(10.0, abs=0.5)  # one more or less in 2 s
