@@ -16,7 +16,11 @@ Seed = Annotated[int, typer.Option(help="Seed of every random stream of the run.
 Out = Annotated[Path | None, typer.Option(help="Run folder; by default a new one in ./runs.")]
 Record = Annotated[
     str,
-    typer.Option(metavar="full|summary|none", help="Keep everything, run.json alone, or no run folder."),
+    typer.Option(
+        metavar="trace|/TOPIC,...|full|summary|none",
+        help="Keep everything but the content of long messages (images, point clouds); also that of some "
+        "topics, or of all; run.json alone; or no run folder.",
+    ),
 ]
 Overrides = Annotated[
     list[str] | None,

@@ -16,7 +16,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from volery.base.errors import UsageError, choices
+from volery.base.errors import UsageError
 from volery.base.time import clock, to_seconds
 from volery.cli.command import BAD_INPUT, BAD_INPUT_ERRORS, FAILED, OK
 from volery.cli.console import Output
@@ -25,7 +25,7 @@ from volery.report.terminal import summary_table
 from volery.requirements.record import RunRecord
 from volery.run.event_log import LogOptions, parse_level
 from volery.run.recording import make_folder
-from volery.run.result import FULL, NOTHING, SUMMARY, Progress, Run
+from volery.run.result import FULL, NOTHING, SUMMARY, TRACE, Progress, Run, check_record
 
 DRAWING_PERIOD_S = 0.1
 """Wall seconds between two drawings: to draw takes longer than to simulate one second."""
@@ -194,13 +194,12 @@ def recorded_folder(out: Path | None, name: str, record: str) -> Iterator[Path |
     Args:
         out: The folder; None for a new one in ``RUNS``.
         name: Name of a new folder, without its number.
-        record: ``full``, ``summary`` or ``none``.
+        record: As ``Options.record``, or ``none``.
 
     Raises:
         UsageError: The folder cannot be written, there is no such record, or a folder is named for none.
     """
-    if record not in (FULL, SUMMARY, NOTHING):
-        raise UsageError(f"--record {record}: there is {choices((FULL, SUMMARY, NOTHING))}")
+    check_record(record, (FULL, TRACE, SUMMARY, NOTHING), "--record")
     if record != NOTHING:
         with run_folder(out, name) as folder:
             yield folder

@@ -32,6 +32,7 @@ from volery.trace.events import (
     LinkState,
     Message,
     Milestone,
+    Omitted,
     Operation,
     Slice,
     Text,
@@ -152,6 +153,7 @@ class Digest:
         self._deliveries: set[tuple[str, str]] = set()
         self._subscriptions: dict[str, set[str]] = {}
         self._lost: dict[str, list[int]] = {}
+        self._omitted: dict[str, list[int]] = {}
         self._last: Ns = 0
         self.takers: dict[type[Any], Callable[[Any], None]] = {
             VehicleState: self._state,
@@ -159,6 +161,7 @@ class Digest:
             Activation: self._activation,
             Milestone: self._milestone,
             Message: self._message,
+            Omitted: self._omission,
             **dict.fromkeys((Collision, Failure, Operation, LinkState, Text), self._remark),
         }
         """What adds an event of each kind that matters."""
@@ -206,6 +209,11 @@ class Digest:
             vehicle = event.topic.lstrip("/").partition("/")[0]
             if vehicle in self._tracks:
                 self._subscriptions.setdefault(event.subscriber.strip("/"), set()).add(vehicle)
+
+    def _omission(self, event: Omitted) -> None:
+        counts = self._omitted.setdefault(event.topic, [0, 0])
+        counts[0] += 1
+        counts[1] += event.size
 
     def _names_of_vehicles(self) -> dict[str, str]:
         """Return {name in a note: vehicle}: its own name, or a node that subscribes to it alone."""
@@ -255,6 +263,10 @@ class Digest:
             "collisions": self._collisions,
             "remarks": sorted(self._remarks, key=lambda remark: float(remark["t"])),
             "left_out": self._left_out,
+            "omitted": [
+                {"topic": topic, "messages": messages, "bytes": size}
+                for topic, (messages, size) in sorted(self._omitted.items())
+            ],
             "messages": [
                 {"topic": topic, "sent": sent, "lost": lost}
                 for topic, (sent, lost) in sorted(self._lost.items())

@@ -19,7 +19,7 @@ from volery.ros.graph.interface import (
 )
 from volery.ros.graph.snapshot import GraphSnapshot, TopicSnapshot
 from volery.ros.graph.unserved import PUBLISHED, SUBSCRIBED
-from volery.trace.events import Call, Message, Published, Unserved
+from volery.trace.events import Call, Message, Omitted, Published, Unserved
 from volery.trace.mcap_writer import TRACE_FILE
 from volery.trace.reader import Reading
 
@@ -43,7 +43,7 @@ def graph_of_run(folder: Path) -> GraphSnapshot:
     last = 0
     with Reading(folder / TRACE_FILE) as reading:
         for event in reading.events():
-            if isinstance(event, Published):
+            if isinstance(event, Published | Omitted):
                 types[event.topic] = event.type
                 messages[event.topic] += 1
                 publishers.setdefault(event.topic, {})[event.publisher] = None

@@ -226,6 +226,7 @@ def render(material: ReportContent) -> str:
             not_counted=record.not_counted,
             warnings=record.warnings,
             unserved=[str(one) for one in record.unserved],
+            omitted=_omitted(data["omitted"]),
             laws=laws_grid(record),
             remarks=_remarks(data["remarks"]),
             left_out=data["left_out"],
@@ -233,6 +234,15 @@ def render(material: ReportContent) -> str:
             data=embedded(data),
         )
     )
+
+
+def _omitted(topics: list[Json]) -> list[str]:
+    """Return a line for each topic whose messages are in the trace without their content."""
+    return [
+        f"{one['topic']}: {one['messages']} messages of {one['bytes'] / 1e6:.1f} MB; "
+        f"volery simulate --record {one['topic']} records their content, too"
+        for one in topics
+    ]
 
 
 def embedded(data: Any) -> Markup:

@@ -216,8 +216,16 @@ SAMPLING_PERIOD: Ns = 200 * MS
 """Period at which the state of every vehicle is recorded."""
 
 
-FULL, SUMMARY, NOTHING = "full", "summary", "none"
+FULL, TRACE, SUMMARY, NOTHING = "full", "trace", "summary", "none"
 """What is recorded of a run. ``NOTHING`` is stated by ``Options.out = None``."""
+
+
+def check_record(record: str, levels: Collection[str], option: str = "record") -> None:
+    """Raise ``UsageError`` unless *record* is one of *levels* or names topics: ``/scan,/camera/image``."""
+    names = record.split(",")
+    if record not in levels and not all(one.startswith("/") and one.strip("/ ") for one in names):
+        what = f"there is {choices(levels)}, or names of topics as /camera/image_raw,/scan"
+        raise UsageError(f"{option} {record}: {what}")
 
 
 @dataclass(frozen=True)
@@ -229,8 +237,11 @@ class Options:
         seed: Seed of every random stream.
         pace: Simulated seconds per wall second, or None for as fast as possible.
         out: Run folder, or None to keep nothing.
-        record: What the run folder gets: ``full`` is everything, ``summary`` is ``run.json`` alone, without
-            trace and report. The figures of ``run.json`` are the same.
+        record: What the run folder gets: ``trace`` is everything but the content of messages with an array of
+            4096 bytes and more (images, point clouds), ``/camera/image_raw,/scan`` also that of these topics,
+            ``full`` that of all topics; ``summary`` is ``run.json`` alone, without trace and report. The
+            figures of ``run.json`` are the same. Taps get the content of ``full`` and of topics without a
+            folder, too.
         show: Receives the progress about once a simulated second.
         tell: Receives single lines that the user should read at once.
         graph: ``ros1`` or ``ros2`` to run the components as processes on that graph, at a pace of 1 unless
@@ -246,7 +257,7 @@ class Options:
     seed: int = 1
     pace: float | None = None
     out: Path | None = None
-    record: str = FULL
+    record: str = TRACE
     show: Show | None = None
     tell: Tell | None = None
     graph: str = ""
@@ -256,8 +267,7 @@ class Options:
     if_killed: LinkLossAction | None = None
 
     def __post_init__(self) -> None:
-        if self.record not in (FULL, SUMMARY):
-            raise UsageError(f"no record {self.record!r}; there is {choices((FULL, SUMMARY))}, or no folder")
+        check_record(self.record, (FULL, TRACE, SUMMARY))
         if self.if_killed is not None and self.if_killed not in LINK_LOSS_ACTIONS:
             hint = did_you_mean(self.if_killed, LINK_LOSS_ACTIONS)
             raise UsageError(f"no action {self.if_killed!r}{hint}; there is {choices(LINK_LOSS_ACTIONS)}")
@@ -270,7 +280,11 @@ class Options:
     @property
     def traced(self) -> bool:
         """Whether the run writes a trace."""
-        return self.out is not None and self.record == FULL
+        return self.out is not None and self.record != SUMMARY
+
+    def wants_all_of(self, topic: str) -> bool:
+        """Return whether also long messages of a topic are recorded with their content."""
+        return self.record == FULL or topic in self.record.split(",")
 
 
 DEFAULT_OPTIONS = Options()

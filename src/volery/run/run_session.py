@@ -6,6 +6,7 @@ import gc
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from threading import Event, Thread, current_thread
 from typing import Any
@@ -17,7 +18,7 @@ from volery.model.builder import ModelBuilder
 from volery.model.system import System
 from volery.model.system_loader import load
 from volery.requirements.verdicts import Observers
-from volery.ros.graph.embedded_graph import record_all, record_none
+from volery.ros.graph.graph_context import Recorded
 from volery.run.assembly.component_builder import Builder, BuiltComponents, with_executables
 from volery.run.assembly.computers import Platform, PowerFeed
 from volery.run.assembly.fault_effects import Affected, FleetLinks, inject, with_faulty_links
@@ -256,9 +257,10 @@ class RunSession:
         return setup_of(self._system, platform, self._options.seed, self._options.fidelity)
 
     def _build(self, platform: Platform) -> BuiltComponents:
-        records = record_all if self._options.traced else record_none
+        options = self._options
+        records = partial(_recorded, options)
         builder = Builder(self._system, self._kernel, platform, self._fleet, self._ending, records=records)
-        return builder.build(self._options.fidelity, self._options.seed, self._options.traces)
+        return builder.build(options.fidelity, options.seed, options.traces)
 
     def _prepare(self) -> None:
         """Create all parts of the run."""
@@ -397,6 +399,12 @@ class GraphSession(RunSession):
         """See ``RunSession``."""
         left = [] if self._distributed is None else self._distributed.close()
         return [*left, *super().leave()]
+
+
+def _recorded(options: Options, topic: str) -> Recorded:
+    if options.wants_all_of(topic):
+        return Recorded.ALL
+    return Recorded.SHORT if options.traced else Recorded.NOTHING
 
 
 def _raise(error: Exception) -> None:

@@ -41,6 +41,7 @@ from volery.trace.events import (
     LinkState,
     Message,
     Milestone,
+    Omitted,
     Operation,
     Preemption,
     Published,
@@ -321,6 +322,7 @@ def _story(journey: list[tuple[Ns, float, float, float]]) -> Iterator[Event]:
     )
     yield Text(2 * S, "drone_1", 6, "EKF3 IMU0 is using GPS")
     yield Unserved(22 * S, "service", "/mavros/land", "", "/ground", 0, 2 * S, "did you mean /drone_1/land?")
+    yield Omitted(22 * S, "/drone_1/camera", "sensor_msgs/msg/Image", "/camera", 230_456)
     yield Text(21 * S, "drone_2", 4, "Arm: Battery below minimum")
     yield LinkState(500 * MS, "drone_1", "up", "")
     figures = 0.3, 0.2, 0.1, 0.1, 0.0, 0.0, 0.1

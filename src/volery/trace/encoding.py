@@ -14,7 +14,7 @@ from collections.abc import Callable
 from operator import itemgetter
 from typing import Any, NamedTuple, get_args
 
-from volery.trace.events import Event, Published, VehicleState
+from volery.trace.events import Event, Omitted, Published, VehicleState
 
 PACKAGE = "volery_msgs"
 LITTLE_ENDIAN_CDR = 0x0100  # the bytes 00 01 00 00, read as a little-endian uint32
@@ -24,6 +24,8 @@ _STRUCT_CODE = {"Ns": "q", "float": "d", "int": "i", "bool": "?"}
 _WIDTH = {"Ns": 8, "float": 8, "int": 4, "bool": 1}
 _TIMES = (("received", "sent"), ("end", "start"), ("finished", "released"), ("at", "at"))
 """The fields for the log time and the publish time of an event."""
+_SUBJECTS: dict[type[Any], tuple[str, ...]] = {VehicleState: ("vehicle",), Omitted: ("topic",)}
+"""Fields of an event that decide its channel."""
 _REMEMBERED = 4096  # combinations of strings per type of event; with more, they hardly repeat
 
 OWN_EVENTS: tuple[type[Any], ...] = tuple(kind for kind in get_args(Event) if kind is not Published)
@@ -111,7 +113,7 @@ class Codec:
         self.layout = Layout(
             log,
             publish,
-            subject=(kind._fields.index("vehicle"),) if kind is VehicleState else (),
+            subject=tuple(kind._fields.index(one) for one in _SUBJECTS.get(kind, ())),
             codes="".join(_STRUCT_CODE[annotations[index]] for index in numbers),
             numbers=tuple(numbers),
             words=tuple(words),

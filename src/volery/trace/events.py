@@ -112,6 +112,16 @@ class Published(NamedTuple):
     data: bytes
 
 
+class Omitted(NamedTuple):
+    """A long ROS message was published whose content is not recorded; ``size`` is that of its CDR bytes."""
+
+    at: Ns
+    topic: str
+    type: str
+    publisher: str
+    size: int
+
+
 class VehicleState(NamedTuple):
     """A vehicle's true state (ENU metres about the world's origin) and its autopilot's estimate.
 
@@ -305,6 +315,7 @@ Event = (
     | Message
     | Transmission
     | Published
+    | Omitted
     | VehicleState
     | Collision
     | BatteryService

@@ -188,9 +188,9 @@ class McapWriter:
         self._chunk.add(record)
         return channel
 
-    def _own_channel(self, codec: Codec, vehicle: str = "") -> int:
-        """Return the channel of events of one kind; states of vehicles have one for each vehicle."""
-        name = f"{vehicle}/state" if codec.kind is VehicleState else codec.kind.__name__.lower()
+    def _own_channel(self, codec: Codec, subject: str = "") -> int:
+        """Return the channel of events of one kind; each vehicle's states and each topic have their own."""
+        name = f"{subject}/state" if codec.kind is VehicleState else codec.kind.__name__.lower() + subject
         schema = self._schema(type_name(codec.kind), codec.definition)
         return self._channel(f"/volery/{name}", schema, {})
 

@@ -45,7 +45,7 @@ def fly(
     ] = None,
     if_killed: IfKilled = None,
     out: Out = None,
-    record: Record = "full",
+    record: Record = "trace",
     log_file: LogFile = None,
     log_level: LogLevel = "info",
 ) -> int:
@@ -54,7 +54,7 @@ def fly(
     from volery.run.assembly.fences import read_fence
     from volery.run.fly import Restrictions
     from volery.run.fly import fly as run_flight
-    from volery.run.result import FULL, SUMMARY, Options
+    from volery.run.result import NOTHING, TRACE, Options
 
     if not mission.is_file():
         expected = "a Python file with `def mission(drone: Drone)` is expected"
@@ -74,7 +74,7 @@ def fly(
             seed=seed,
             pace=pace,
             out=folder,
-            record=SUMMARY if record == SUMMARY else FULL,
+            record=TRACE if record == NOTHING else record,
             show=show,
             tell=output.note,
             log=read_log_options(log_file, log_level),

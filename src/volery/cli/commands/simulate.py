@@ -52,7 +52,7 @@ def simulate(
         typer.Option(help="With --graph: others start the components, from packages of `volery ros deploy`."),
     ] = False,
     out: Out = None,
-    record: Record = "full",
+    record: Record = "trace",
     log_file: LogFile = None,
     log_level: LogLevel = "info",
 ) -> int:
@@ -64,7 +64,7 @@ def simulate(
     from volery.cli.run_display import read_log_options, recorded_folder, run_progress, show_outcome
     from volery.model.system_loader import load
     from volery.run.assembly.model_checks import vocabulary
-    from volery.run.result import FULL, SUMMARY, Options
+    from volery.run.result import NOTHING, TRACE, Options
     from volery.run.simulate import simulate as run_simulation
 
     pace = parse_speed(speed)
@@ -78,7 +78,7 @@ def simulate(
             seed=seed,
             pace=pace,
             out=folder,
-            record=SUMMARY if record == SUMMARY else FULL,
+            record=TRACE if record == NOTHING else record,
             show=show,
             tell=output.note,
             graph=graph,

@@ -23,7 +23,7 @@ from volery.ros.graph.endpoints import (
     EmbeddedSubscription,
     topic_named,
 )
-from volery.ros.graph.graph_context import GraphContext, NodeContext, Parameters, Records
+from volery.ros.graph.graph_context import GraphContext, NodeContext, Parameters, Recorded, Records
 from volery.ros.graph.interface import (
     AS_OFFERED,
     CLOCK,
@@ -314,14 +314,14 @@ class ClockPublisher:
             subscription.arrive(message, now, CLOCK, cdr_size(message))
 
 
-def record_all(topic_name: str) -> bool:
-    """Record the content of all topics."""
-    return True
+def record_short(topic_name: str) -> Recorded:
+    """Record all topics, long messages without their content."""
+    return Recorded.SHORT
 
 
-def record_none(topic_name: str) -> bool:
-    """Record the content of no topic."""
-    return False
+def record_none(topic_name: str) -> Recorded:
+    """Record no topic."""
+    return Recorded.NOTHING
 
 
 class EmbeddedGraph:
@@ -331,7 +331,8 @@ class EmbeddedGraph:
         kernel: Clock and tasks of its nodes.
         tariffs: Prices of each node's calls.
         route: Path of messages from node to node.
-        records: Topics whose messages are recorded with their content.
+        records: What is recorded of each topic: messages with their content are events ``Published``, those
+            without are ``Omitted``.
         epoch: ROS time at the kernel's zero, ns: 0 in virtual time, Unix time on the wall clock.
         unrecorded: Record no event; for a graph that is no part of the modelled system, such as the wire to a
             simulated vehicle.
@@ -345,7 +346,7 @@ class EmbeddedGraph:
         tariffs: Tariffs = free,
         route: Routing = no_route,
         *,
-        records: Records = record_all,
+        records: Records = record_short,
         epoch: Ns = 0,
         unrecorded: bool = False,
         as_bytes: bool = False,

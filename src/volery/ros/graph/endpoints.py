@@ -20,6 +20,7 @@ from volery.ros.graph.graph_context import (
     GraphContext,
     NodeContext,
     PublisherEnd,
+    Recorded,
     ServiceEnd,
     SubscriptionEnd,
     Topic,
@@ -38,8 +39,8 @@ from volery.ros.graph.interface import (
 from volery.ros.graph.unserved import PUBLISHED, SERVICE, SUBSCRIBED
 from volery.ros.graph.work import Work
 from volery.ros.messages import cdr_size, message_class, service
-from volery.ros.messages.encodings import copied_to_cdr, encoded_size
-from volery.trace.events import NONE, Call, Message, Published, Text
+from volery.ros.messages.encodings import abridged_cdr, copied_to_cdr, encoded_size
+from volery.trace.events import NONE, Call, Message, Omitted, Published, Text
 
 WARNING = 4
 """Severity, as in syslog."""
@@ -215,10 +216,20 @@ class EmbeddedPublisher:
         with node.kernel:
             sent = node.consume("publish", 1.0)
             content = message.copy()
-            data = copied_to_cdr(content)
-            if self._recorded:
-                node.kernel.record(Published(sent, self.topic, self.type, node.name, data))
-            connection.deliver(content, sent, node.name, len(data))
+            size = self._record(content, sent) if self._recorded else encoded_size(content)
+            connection.deliver(content, sent, node.name, size)
+
+    def _record(self, content: Any, sent: Ns) -> int:
+        """Record a message and return its size, bytes."""
+        node = self.node
+        data, missing = abridged_cdr(content)
+        size = len(data) + missing
+        if missing and self._recorded < Recorded.ALL:
+            node.kernel.record(Omitted(sent, self.topic, self.type, node.name, size))
+        else:
+            whole = copied_to_cdr(content) if missing else bytes(data)
+            node.kernel.record(Published(sent, self.topic, self.type, node.name, whole))
+        return size
 
     @property
     def connected(self) -> int:
@@ -241,9 +252,7 @@ class EmbeddedPublisher:
             content = message.converted() if fresh else message.copy()
         size = 0
         if self._recorded:
-            data = copied_to_cdr(content)
-            size = len(data)
-            node.kernel.record(Published(sent, self.topic, self.type, node.name, data))
+            size = self._record(content, sent)
         elif self._checked and not fresh:
             size = encoded_size(content)
         elif self._checked or self._sized:

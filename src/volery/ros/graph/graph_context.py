@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import Any, Protocol
 
 from mypy_extensions import mypyc_attr
@@ -24,8 +25,17 @@ from volery.ros.graph.unserved import Want, Wants
 from volery.ros.messages import Message, cdr_size, from_cdr, to_cdr
 from volery.trace.events import Charge, Event
 
-Records = Callable[[str], bool]
-"""Whether the content of a topic's messages is recorded, by the topic's name."""
+
+class Recorded(IntEnum):
+    """What is recorded of a topic's messages: of ``SHORT`` a long one is an event without its content."""
+
+    NOTHING = 0
+    SHORT = 1
+    ALL = 2
+
+
+Records = Callable[[str], Recorded]
+"""What is recorded of a topic's messages, by the topic's name."""
 
 
 class PublisherEnd(Protocol):
@@ -150,7 +160,7 @@ class GraphContext:
     Attributes:
         tariffs: Prices of each node's calls.
         route: Path of messages from node to node.
-        records: Topics whose messages are recorded with their content.
+        records: What is recorded of each topic.
         epoch: ROS time at the kernel's zero, ns.
         changed: Notified whenever a node, publisher, subscription or service joins or leaves.
         listen_to_clock: Called for each subscription to ``/clock``.

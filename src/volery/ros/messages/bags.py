@@ -54,6 +54,8 @@ MAX_SALVAGED = 2 << 30
 
 OF_THE_RUN = "/volery/"
 """Prefix of the topics of a run's trace that carry no ROS messages."""
+OMITTED = f"{OF_THE_RUN}omitted"
+"""Prefix of those that stand for long messages without their content; the topic of the messages follows."""
 
 ROSBAG1, ROSBAG2, MCAP = "rosbag 1", "rosbag 2", "MCAP"
 _SUFFIXES = {".bag": ROSBAG1, ".mcap": MCAP, ".db3": ROSBAG2}
@@ -141,6 +143,20 @@ class Bag:
         """Topics that are read by default: all that can be decoded, without those of a run's trace."""
         names = {one.source.topic for one in self.connections if not one.problem}
         return sorted(name for name in names if not name.startswith(OF_THE_RUN))
+
+    @property
+    def omitted(self) -> dict[str, str]:
+        """Topics of a run's trace with messages whose content is not recorded, and how to get it."""
+        counts = {
+            one.source.topic.removeprefix(OMITTED): one.messages
+            for one in self.connections
+            if one.source.topic.startswith(f"{OMITTED}/")
+        }
+        return {
+            topic: f"the content of {count} long messages is not recorded; "
+            f"volery simulate --record {topic} records it"
+            for topic, count in sorted(counts.items())
+        }
 
     @property
     def differences(self) -> list[str]:

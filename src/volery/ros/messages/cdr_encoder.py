@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any
 
 from volery.ros.messages import lazy_rosbags as rosbags
+from volery.ros.messages.message import LONG, may_be_long
 from volery.ros.messages.store import message_class, store
 
 CDR_HEADER = b"\x00\x01\x00\x00"
@@ -25,7 +26,8 @@ FORMATS = {
 }  # fmt: skip
 """Codes of ``struct`` of the primitive types that are numbers; a ``byte`` is signed, as in rosbags."""
 
-Append = Callable[[Any, bytearray], None]
+Append = Callable[[Any, bytearray], int]
+"""Appends a message without a header; returns how many bytes of long arrays it has left out."""
 
 
 def encode(message: Any) -> bytes:
@@ -44,14 +46,24 @@ def encoded(message: Any) -> bytearray:
     return out
 
 
+def abridged(message: Any) -> tuple[bytearray, int]:
+    """Return the CDR bytes without the content of long arrays, and how many bytes are missing.
+
+    Nothing is missing of a message without an array of ``LONG`` bytes. Errors as of ``encode``.
+    """
+    out = bytearray(CDR_HEADER)
+    return out, appender(message.__msgtype__, abridging=True)(message, out)
+
+
 @cache
-def appender(name: str) -> Append:
-    """Return the function that appends a message of type `name`, without a header."""
+def appender(name: str, abridging: bool = False) -> Append:
+    """Return the function that appends a message of type `name`, if *abridging* without long arrays."""
     message_class(name)
-    writing = _Writing()
+    writing = _Writing(abridging)
     writing.fields(name, "message")
     writing.end_run()
-    source = "\n    ".join(["def append(message, out):", *writing.lines])
+    lines = ["missing = 0", *writing.lines, "return missing"]
+    source = "\n    ".join(["def append(message, out):", *lines])
     exec(compile(source, f"<CDR of {name}>", "exec"), writing.names)
     made: Append = writing.names["append"]
     return made
@@ -74,7 +86,8 @@ def _layouts(codes: str) -> tuple[Callable[..., bytes], ...]:
 class _Writing:
     """Source of one appending function, with a run of numbers that is not written yet."""
 
-    def __init__(self) -> None:
+    def __init__(self, abridging: bool) -> None:
+        self._abridging = abridging
         self.lines: list[str] = []
         self.names: dict[str, Any] = {}
         self._codes = ""
@@ -110,7 +123,9 @@ class _Writing:
         if kind == rosbags.Nodetype.NAME:
             self.fields(str(detail), self._assigned(expression))
         elif kind != rosbags.Nodetype.BASE:
-            self._list(detail[0], self._assigned(expression), counted=kind == rosbags.Nodetype.SEQUENCE)
+            inner, length = detail
+            counted = kind == rosbags.Nodetype.SEQUENCE
+            self._list(inner, self._assigned(expression), 0 if counted else int(length))
         elif detail[0] == "string":
             text = self._assigned(f"{expression}.encode()")
             self._number("I", f"len({text}) + 1")
@@ -119,15 +134,15 @@ class _Writing:
         else:
             self._number(FORMATS[str(detail[0])], expression)
 
-    def _list(self, inner: Any, values: str, counted: bool) -> None:
-        """Write a sequence, which its count precedes, or an array."""
-        if counted:
+    def _list(self, inner: Any, values: str, length: int) -> None:
+        """Write a sequence (length 0), which its count precedes, or an array."""
+        if not length:
             self._number("I", f"len({values})")
         self.end_run()
         kind, detail = inner
         if kind == rosbags.Nodetype.NAME:
-            self.names[f"append_{values}"] = appender(str(detail))
-            self.lines.append(f"for item in {values}: append_{values}(item, out)")
+            self.names[f"append_{values}"] = appender(str(detail), self._abridging)
+            self.lines.append(f"for item in {values}: missing += append_{values}(item, out)")
         elif detail[0] == "string":
             self.lines += [
                 f"for item in {values}:",
@@ -139,4 +154,13 @@ class _Writing:
             width = struct.calcsize(f"<{code}")
             if width > 1:
                 self.lines.append(f"if len({values}): out += bytes((4 - len(out)) % {width})")
-            self.lines.append(f"out += {values}.data")
+            if self._abridging and may_be_long(str(detail[0]), length):
+                self.lines += [
+                    f"size = {values}.nbytes",
+                    f"if size >= {LONG}:",
+                    "    out += bytes(size & 7)  # what follows is aligned as behind the array",
+                    "    missing += size & ~7",
+                    f"else: out += {values}.data",
+                ]
+            else:
+                self.lines.append(f"out += {values}.data")

@@ -33,6 +33,7 @@ from volery.ros.messages.message import (
     TimeValue,
     default_value,
     generated_copy,
+    may_be_long,
     plain_number,
     set_written,
     slot_of,
@@ -234,8 +235,16 @@ def _boxed(value: Any) -> Any:
 
 
 def _as_numpy(one: Field, library: Library) -> bool:
-    """Return whether a client library has a list of numbers as numpy array, as the graph has."""
-    return library == RCLPY and bool(one.length) and one.base in _CODES
+    """Return whether a client library has a list of numbers as numpy array, as the graph has.
+
+    A long one of the graph cannot be written.
+    """
+    return (
+        library == RCLPY
+        and bool(one.length)
+        and one.base in _CODES
+        and not may_be_long(one.base, one.length or 0)
+    )
 
 
 def _converting(cls: Any, one: Field, convert: Callable[[Any], Any], put: Callable[[Any], Any] | None) -> Any:
@@ -361,7 +370,8 @@ def _ros1_type_of(one: Field) -> str:
 
 def _as_tuple(base: str, values: Any) -> Any:
     if base in ("uint8", "char"):
-        return values.tobytes()
+        shared = values.base
+        return shared if shared.__class__ is bytes and len(shared) == len(values) else values.tobytes()
     return tuple((values.view(np.int8) if base in BYTES else values).tolist())
 
 
@@ -828,9 +838,9 @@ def _rclpy_list(of_graph: Any, one: Field) -> Any:
             (lambda values: [bytes([item]) for item in values]) if one.base in BYTES else np.ndarray.tolist
         )
         return _converting(of_graph, one, as_list, None)
+    dtype = np.dtype("uint8" if one.base == "char" else one.base)
     if one.length:
-        dtype = np.dtype("uint8" if one.base == "char" else one.base)
-        return _converting(of_graph, one, np.asarray, lambda values: np.array(values, dtype))
+        return _converting(of_graph, one, np.array, lambda values: np.array(values, dtype))
     code = _CODES[one.base]
 
     def as_array(values: Any) -> array[Any]:
@@ -838,7 +848,14 @@ def _rclpy_list(of_graph: Any, one: Field) -> Any:
         made.frombytes(np.ascontiguousarray(values).data.cast("B"))
         return made
 
-    return _converting(of_graph, one, as_array, lambda values: array(code, values))
+    def assigned(values: Any) -> array[Any]:
+        if isinstance(values, array) and values.typecode == code:
+            return values  # as rclpy, without a copy
+        if isinstance(values, np.ndarray) and values.dtype == dtype:
+            return as_array(values)
+        return array(code, values)
+
+    return _converting(of_graph, one, as_array, assigned)
 
 
 def _as_bytes(values: Any) -> list[bytes]:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
 from volery.ros.messages import lazy_rosbags as rosbags
-from volery.ros.messages.cdr_encoder import CDR_HEADER, FORMATS, encode, encoded
+from volery.ros.messages.cdr_encoder import CDR_HEADER, FORMATS, abridged, encode, encoded
 from volery.ros.messages.conversion import FILLER, HEADER, Conversion
 from volery.ros.messages.message import Message
 from volery.ros.messages.store import ROS1_SPELLING, message_class, message_name, service, service_name, store
@@ -50,19 +50,35 @@ def to_cdr(message: Message) -> bytes:
 
 def copied_to_cdr(message: Message) -> bytes:
     """Encode a message that ``Message.copy`` has returned, without preparing it again."""
-    return bytes(_checked(message))
+    try:
+        return bytes(encoded(message))
+    except _MISFITS as error:
+        raise _misfit(message, error) from error
+
+
+def abridged_cdr(message: Message) -> tuple[bytearray, int]:
+    """Return what ``copied_to_cdr`` does without the content of long arrays, and how many bytes are missing.
+
+    An array is long from ``message.LONG`` bytes on; nothing is missing of a message without one.
+    """
+    try:
+        return abridged(message)
+    except _MISFITS as error:
+        raise _misfit(message, error) from error
 
 
 def encoded_size(message: Message) -> int:
     """Return the number of bytes of ``copied_to_cdr``; a value that does not fit raises as there."""
-    return len(_checked(message))
+    data, missing = abridged_cdr(message)
+    return len(data) + missing
 
 
-def _checked(message: Message) -> bytearray:
-    try:
-        return encoded(message)
-    except (struct.error, OverflowError, TypeError, ValueError, AttributeError) as error:
-        raise UsageError(f"{message.__msgtype__}: {_culprit(message)}: {error}") from error
+_MISFITS = (struct.error, OverflowError, TypeError, ValueError, AttributeError)
+"""What encoding a value that does not fit its field raises."""
+
+
+def _misfit(message: Message, error: Exception) -> UsageError:
+    return UsageError(f"{message.__msgtype__}: {_culprit(message)}: {error}")
 
 
 @cache
@@ -111,6 +127,8 @@ def _varying_paths(name: str, above: str = "") -> list[str] | None:
 
 _sizes: dict[tuple[str, tuple[int, ...]], int] = {}
 """Sizes of encodings by type and lengths of strings and lists: nothing else changes a size."""
+_REMEMBERED = 4096
+"""Sizes that are kept at most: clouds of points differ in length without end."""
 
 
 def cdr_size(message: Message) -> int:
@@ -121,12 +139,14 @@ def cdr_size(message: Message) -> int:
         return fixed
     read = _varying(name)
     if read is None:
-        return len(copied_to_cdr(message))
+        return encoded_size(message)
     lengths = [len(one.encode() if isinstance(one, str) else one) for one in read(message)]
     key = name, tuple(lengths)
     size = _sizes.get(key)
     if size is None:
-        size = _sizes[key] = len(copied_to_cdr(message))
+        if len(_sizes) >= _REMEMBERED:
+            _sizes.clear()
+        size = _sizes[key] = encoded_size(message)
     return size
 
 

@@ -2,6 +2,7 @@
 
 A class is a slotted dataclass. Arrays of numbers are numpy arrays of the field's type; an assigned list
 becomes an array when the message is copied, as by publishing, and numbers become what their encoding gives.
+Copies share a long array, which is read-only then.
 Client libraries have classes derived from these (``client_classes``). Times and durations have arithmetic and
 also ROS 1's spelling (``stamp.secs``, ``stamp.to_sec()``).
 """
@@ -20,6 +21,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 import numpy as np
 
 from volery.base.errors import UsageError
+
+LONG = 4096
+"""Bytes from which on an array is long: copies of a message share it, its content is recorded on demand."""
 
 Copy = Callable[[Any], Any]
 _MISFITS = (TypeError, ValueError, AttributeError, OverflowError, struct.error)
@@ -199,6 +203,8 @@ def _conversions(fields: list[Any], of: str, names: dict[str, Any]) -> list[str]
             names[f"type_{number}"], names[f"copier_{number}"] = _dtype(one.base), _copier(one)
             shape = f"{value}.shape != ({one.length},)" if one.length else f"{value}.ndim != 1"
             wrong = f"type({value}) is not ndarray or {value}.dtype is not type_{number} or {shape}"
+            if may_be_long(one.base, one.length):
+                wrong += f" or {value}.nbytes >= {LONG}"  # the copier makes it one that can be shared
             lines += [f"if {wrong}:", f"    {value} = copier_{number}({value})"]
     return lines
 
@@ -413,6 +419,11 @@ def _dtype(base: str) -> np.dtype[Any]:
     return np.dtype({"bool": "bool", "byte": "uint8", "char": "uint8", "octet": "uint8"}.get(base, base))
 
 
+def may_be_long(base: str, length: int) -> bool:
+    """Return whether an array of numbers of this length, or a sequence (0), can have ``LONG`` bytes."""
+    return not length or length * _dtype(base).itemsize >= LONG
+
+
 def _copier(one: Field) -> Copier | None:
     if one.length is None:
         if one.nested:
@@ -472,11 +483,15 @@ def _copy_array(dtype: np.dtype[Any], count: int, values: Any) -> Any:
         values = values.array
     elif kind is bytes or kind is bytearray:
         values = np.frombuffer(values, np.uint8)
-    copied = np.array(values, dtype)
-    if copied.ndim != 1 or (count and copied.shape[0] != count):
+    given: Any = np.asarray(values, dtype)
+    if given.ndim != 1 or (count and given.shape[0] != count):
         wanted = count or "one row of"
-        raise ValueError(f"an array of shape {copied.shape}, but the field has {wanted} values")
-    return copied
+        raise ValueError(f"an array of shape {given.shape}, but the field has {wanted} values")
+    if given.nbytes < LONG:
+        return given.copy()
+    if given.base.__class__ is bytes:  # these never change
+        return given
+    return np.frombuffer(given.tobytes(), dtype)
 
 
 _SECOND = 1_000_000_000

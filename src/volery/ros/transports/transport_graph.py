@@ -17,7 +17,7 @@ from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
-from volery.ros.graph.embedded_graph import record_all
+from volery.ros.graph.embedded_graph import record_short
 from volery.ros.graph.endpoints import WARNING
 from volery.ros.graph.graph_context import GraphContext, Records
 from volery.ros.graph.interface import (
@@ -116,7 +116,7 @@ class TransportGraph:
     Args:
         kernel: Clock and tasks of the nodes.
         library: Client library that connects them.
-        records: Topics whose messages are recorded with their content.
+        records: What is recorded of each topic; here of long messages the content as well.
         epoch: ROS time at the kernel's zero, ns; by default the Unix time then.
     """
 
@@ -125,7 +125,7 @@ class TransportGraph:
         kernel: Kernel,
         library: ClientLibrary,
         *,
-        records: Records = record_all,
+        records: Records = record_short,
         epoch: Ns | None = None,
     ) -> None:
         self.kernel = kernel

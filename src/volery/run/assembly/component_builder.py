@@ -37,7 +37,7 @@ from volery.model.system_loader import check_code
 from volery.ros.client_libraries.importable_modules import importable_modules
 from volery.ros.client_libraries.library_base import Launch, node_label
 from volery.ros.graph import EmbeddedGraph, Node, RosGraph
-from volery.ros.graph.embedded_graph import record_all
+from volery.ros.graph.embedded_graph import record_short
 from volery.ros.graph.graph_context import Records
 from volery.ros.graph.unserved import Surroundings
 from volery.ros.messages import Library, Workspace, define_imported
@@ -201,8 +201,7 @@ class ProcessPart:
 class Builder:
     """Builder of the components of one run, or of the *part* of it in this process.
 
-    Without a *fleet* the vehicles are in another process. *records* selects the topics whose messages are
-    recorded with their content.
+    Without a *fleet* the vehicles are in another process. *records* is that of ``EmbeddedGraph``.
     """
 
     def __init__(
@@ -214,7 +213,7 @@ class Builder:
         ending: Ending,
         *,
         part: ProcessPart | None = None,
-        records: Records = record_all,
+        records: Records = record_short,
     ) -> None:
         self._system = system
         self._kernel = kernel

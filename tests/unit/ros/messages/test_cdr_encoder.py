@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 
 from volery.base.errors import UsageError
-from volery.ros.messages import from_cdr, message_class, new, to_cdr
-from volery.ros.messages.message import Field, Message
+from volery.ros.messages import cdr_size, define, from_cdr, message_class, new, to_cdr
+from volery.ros.messages.cdr_encoder import abridged, encode
+from volery.ros.messages.message import LONG, Field, Message
 from volery.ros.messages.store import store, types
 
 TYPES = sorted(types())
@@ -83,3 +84,25 @@ def test_every_type_has_an_encoder() -> None:
 def test_a_value_that_does_not_fit_is_named(kind: str, fields: dict[str, Any], named: str) -> None:
     with pytest.raises(UsageError, match=named):
         to_cdr(new(kind, **fields))
+
+
+@pytest.mark.parametrize("count", [LONG // 4 - 1, *range(LONG // 4, LONG // 4 + 9)])
+@pytest.mark.parametrize("place", ["", "x", "xyz"])
+def test_a_size_is_known_without_encoding_long_arrays(count: int, place: str) -> None:
+    message = new(
+        "sensor_msgs/msg/LaserScan", header={"frame_id": place}, ranges=[1.0] * count, intensities=[2.0]
+    ).copy()
+    data, missing = abridged(message)
+    whole = encode(message)
+    assert len(data) + missing == len(whole) == cdr_size(message)
+    assert bool(missing) == (4 * count >= LONG)
+    assert missing or data == whole
+
+
+def test_long_arrays_in_lists_of_messages_are_counted() -> None:
+    define("encoder_test_msgs/msg/Rig", "sensor_msgs/Image[] images\nfloat64[600] cells\nfloat64 end")
+    images = [new("sensor_msgs/msg/Image", encoding="x" * one, data=bytes(5000 + one)) for one in range(9)]
+    message = new("encoder_test_msgs/msg/Rig", images=images).copy()
+    data, missing = abridged(message)
+    assert missing > 9 * 4992
+    assert len(data) + missing == len(by_rosbags(message)) == cdr_size(message)

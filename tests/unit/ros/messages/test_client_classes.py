@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import pickle
 from array import array
 from pathlib import Path
 from typing import Any
@@ -206,3 +207,27 @@ def test_a_type_that_cannot_be_defined_leaves_its_package_usable(tmp_path: Path)
     for name, why in (("Wide", "wstring"), ("Far", "nowhere_msgs/Thing"), ("Farther", "partly_msgs/Far")):
         with pytest.raises(AttributeError, match=why):
             getattr(partly, name)
+
+
+def test_a_long_array_is_the_receiver_s_own_when_it_can_be_changed() -> None:
+    data = bytes(5000)
+    one, other = (received("sensor_msgs/msg/Image", ROSPY, data=data) for _ in range(2))
+    assert one.data is other.data is data
+    assert pickle.loads(pickle.dumps(one)) == one
+    sent = message_of("sensor_msgs/msg/Image", ROSPY)(data=data).copy()
+    one, other = (adopt(sent.copy(), RCLPY) for _ in range(2))
+    one.data[0] = 7
+    assert (one.data[0], other.data[0], data[0]) == (7, 0, 0)
+    define("values_test_msgs/msg/Grid", "float64[600] cells")
+    sent = message_of("values_test_msgs/msg/Grid")().copy()
+    one, other = (adopt(sent.copy(), RCLPY) for _ in range(2))
+    one.cells[0] = 7.0
+    assert (type(one.cells), one.cells[0], other.cells[0]) == (np.ndarray, 7.0, 0.0)
+
+
+def test_rclpy_keeps_the_array_that_is_assigned() -> None:
+    made: Any = message_of("sensor_msgs/msg/Image", RCLPY)()
+    made.data = given = array("B", [1, 2])
+    assert made.data is given
+    made.data = np.array([3, 4], np.uint8)
+    assert made.data == array("B", [3, 4])

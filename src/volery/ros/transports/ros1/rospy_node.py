@@ -17,7 +17,7 @@ from typing import Any
 from volery.base.errors import LinkError, UsageError
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
-from volery.ros.graph.embedded_graph import record_all
+from volery.ros.graph.embedded_graph import record_short
 from volery.ros.graph.graph_context import Records
 from volery.ros.graph.interface import (
     TRANSIENT_LOCAL,
@@ -466,7 +466,7 @@ def ros1_graph(
     *,
     master: str = "",
     start_master: bool = True,
-    records: Records = record_all,
+    records: Records = record_short,
     epoch: Ns | None = None,
 ) -> TransportGraph:
     """Return the graph of a ROS master.
@@ -475,7 +475,7 @@ def ros1_graph(
         kernel: Clock and tasks of the nodes.
         master: URI of the master; empty for ``ROS_MASTER_URI`` or ROS's default.
         start_master: Start ``roscore`` if no master answers, and stop it in ``close``.
-        records: Topics whose messages are recorded with their content.
+        records: What is recorded of each topic; here of long messages the content as well.
         epoch: ROS time at the kernel's zero, ns; by default the Unix time then.
 
     Raises:

@@ -14,7 +14,7 @@ from typing import Any
 from volery.base.errors import UsageError
 from volery.base.time import Ns
 from volery.kernel.api import Kernel
-from volery.ros.graph.embedded_graph import record_all
+from volery.ros.graph.embedded_graph import record_short
 from volery.ros.graph.graph_context import Records
 from volery.ros.graph.interface import (
     NameTakenError,
@@ -322,7 +322,7 @@ def ros2_graph(
     kernel: Kernel,
     *,
     domain: int | None = None,
-    records: Records = record_all,
+    records: Records = record_short,
     epoch: Ns | None = None,
 ) -> TransportGraph:
     """Return the graph of the ROS 2 nodes in a domain.
@@ -330,7 +330,7 @@ def ros2_graph(
     Args:
         kernel: Clock and tasks of the nodes.
         domain: DDS domain; None for ``ROS_DOMAIN_ID``.
-        records: Topics whose messages are recorded with their content.
+        records: What is recorded of each topic; here of long messages the content as well.
         epoch: ROS time at the kernel's zero, ns; by default the Unix time then.
 
     Raises:
