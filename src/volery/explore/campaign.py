@@ -25,6 +25,7 @@ from volery.base.installed import MissingExtraError, require_extra
 from volery.base.time import S
 from volery.explore.campaign_store import CampaignStore
 from volery.explore.executors import EngineLostError, open_executor
+from volery.explore.flight_phases import Phases, flight_phases
 from volery.explore.parquet_table import write_parquet
 from volery.explore.points import Point, Row, Value
 from volery.explore.run_process import (
@@ -36,13 +37,18 @@ from volery.explore.run_process import (
     read_variant,
 )
 from volery.explore.space import Choices, Parameter, default_space
-from volery.explore.specification import Specification, read_specification, specification_of
+from volery.explore.specification import Specification, read_specification, run_seed, specification_of
 from volery.explore.statistics import Interval, Until
 from volery.model import rules
 from volery.model.builder import ModelBuilder
 from volery.model.text import CollectedModelError
+from volery.trace.events import Operation, VehicleState
+from volery.trace.mcap_writer import TRACE_FILE
+from volery.trace.reader import Reading
 
 TABLE_FILE: Final = "rows.parquet"
+UNDISTURBED: Final = "undisturbed"
+"""Run folder of the run without faults."""
 AHEAD: Final = 2
 """Runs that are handed to an engine for each that it makes at a time, so that no worker waits."""
 CHECKED: Final = 100
@@ -258,6 +264,30 @@ class Campaign:
         self._check_unchanged()
         system = read_variant(self.setting.model, row.point.values)
         return simulate(system, Options(fidelity=self.setting.fidelity, seed=row.point.seed, out=Path(out)))
+
+    def flight_phases(self) -> Phases:
+        """Return when each vehicle goes through which phase in a run of the model as it is.
+
+        The run is made with the first seed of the campaign, and kept in the folder ``undisturbed``.
+
+        Raises:
+            UsageError: The run did not come to its regular end, or no vehicle moved.
+        """
+        from volery.run.result import Options  # noqa: PLC0415  # reading a campaign needs no simulation
+        from volery.run.simulate import simulate  # noqa: PLC0415
+
+        folder = self.folder / UNDISTURBED
+        system = read_variant(self.setting.model, {})
+        seed = run_seed(self.specification.seed, 0)
+        run = simulate(system, Options(fidelity=self.setting.fidelity, seed=seed, out=folder))
+        if not run.completed:
+            raise UsageError(f"{folder}: the run without faults did not come to its regular end: {run.error}")
+        with Reading(folder / TRACE_FILE) as reading:
+            rovers = {one.name for one in system.vehicles if one.kind == "rover"}
+            phases = flight_phases(reading.events([VehicleState, Operation]), rovers)
+        if not phases:
+            raise UsageError(f"{folder}: no vehicle was armed, so there is no phase in which to try faults")
+        return phases
 
     def _check_unchanged(self) -> None:
         """Raise ``UsageError`` if the rows that exist would be different today."""

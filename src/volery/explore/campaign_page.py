@@ -132,9 +132,9 @@ def of_faults(faults: FaultCampaign) -> Findings:
     for (kind, subject), by_phase in faults.table().items():
         cells = []
         for phase in faults.phases:
-            met, _, runs = by_phase.get(phase, "").partition("/")
+            met, _, runs = by_phase.get(phase, "–").partition("/")
             status: CellStatus = "good" if met == runs else "bad" if met == "0" else "warn"
-            cells.append(Cell(by_phase.get(phase, "–"), status=status))
+            cells.append(Cell(by_phase.get(phase, "–"), status=status if runs else "quiet"))
         rows.append((Cell(kind), Cell(subject), *cells))
     columns = (Column("fault"), Column("of"), *(Column(phase, numeric=True) for phase in faults.phases))
     grids = [Grid("Faults: runs that met all requirements", columns, tuple(rows))]

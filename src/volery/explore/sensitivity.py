@@ -18,6 +18,7 @@ import numpy as np
 from volery.base.errors import UsageError, did_you_mean
 from volery.base.installed import require_extra
 from volery.base.time import Ns, S
+from volery.explore.flight_phases import EVERYWHERE, Phases
 from volery.explore.points import Evaluate, Point, Row, Value
 from volery.explore.search import Discard, Objective, search
 from volery.explore.space import Choices, Range, Space
@@ -439,7 +440,7 @@ class FaultCampaign:
 def fault_campaign(
     evaluate: Evaluate,
     system: System,
-    phases: Mapping[str, Ns],
+    phases: Phases,
     *,
     values: Mapping[str, Value] | None = None,
     duration_ns: Ns | None = None,
@@ -450,12 +451,14 @@ def fault_campaign(
 
     Example::
 
-        fault_campaign(campaign.evaluate, system, {"take-off": 5 * S, "flight": 40 * S, "landing": 90 * S})
+        fault_campaign(campaign.evaluate, system, campaign.flight_phases())
+        fault_campaign(campaign.evaluate, system, {"take-off": {EVERYWHERE: 5 * S}})
 
     Args:
         evaluate: Runs points; ``Campaign.evaluate``.
         system: The system, whose vehicles, computers and networks get the faults.
-        phases: When each phase is, ns from the start of the run; such as the middle of an operation.
+        phases: When each phase is, ns from the start of the run, by its name and by vehicle. What has no
+            vehicle, and is not carried by one, gets its faults in the phases of the first vehicle.
         values: What the variant sets besides, such as ``{"scenario": "windy"}``.
         duration_ns: How long a fault lasts, ns; for good if it is None.
         repetitions: Runs of each.
@@ -475,7 +478,10 @@ def fault_campaign(
             without.append(kind)
         for key, subject in subjects:
             about = {key: subject} if key else {}
-            for phase, at in phases.items():
+            for phase, times in phases.items():
+                at = _time_of(times, key, subject, system)
+                if at is None:
+                    continue
                 fault = {"kind": kind, "at": _seconds(at), **stated, **about, **_severe(kind)}
                 points = [
                     Point({**(values or {}), FAULT_PATH: fault}, run_seed(seed, run))
@@ -491,6 +497,16 @@ def fault_campaign(
         tuple(phases),
         tuple(without),
     )
+
+
+def _time_of(times: Mapping[str, Ns], key: str, subject: str, system: System) -> Ns | None:
+    """Return when a subject goes through a phase; None for a vehicle that does not."""
+    if EVERYWHERE in times:
+        return times[EVERYWHERE]
+    vehicle = subject if key == "vehicle" else None
+    if key == "processor":
+        vehicle = next((one.carried_by for one in system.processors if one.name == subject), None)
+    return next(iter(times.values())) if vehicle is None else times.get(vehicle)
 
 
 def _seconds(at: Ns) -> str:

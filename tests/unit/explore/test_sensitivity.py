@@ -5,6 +5,7 @@ import pytest
 
 from volery.base.errors import UsageError
 from volery.base.time import S
+from volery.explore.flight_phases import EVERYWHERE
 from volery.explore.points import FAILED, Row
 from volery.explore.run_process import read_variant
 from volery.explore.sensitivity import fault_campaign, margin, sensitivity, worst_case
@@ -125,6 +126,9 @@ def test_a_failed_run_is_the_worst_case():
     assert all(one.point.values["a"] > 3.1 for one in found.failed)
 
 
+PHASES = {"take-off": {"drone_1": 5 * S}, "flight": {EVERYWHERE: 20 * S}, "drive": {"rover_9": 7 * S}}
+
+
 def test_every_fault_is_tried_in_every_phase():
     asked = []
 
@@ -136,11 +140,13 @@ def test_every_fault_is_tried_in_every_phase():
         ]
 
     system = read_variant("examples/starter", {})
-    found = fault_campaign(evaluate, system, {"take-off": 5 * S, "flight": 20 * S}, duration_ns=3 * S)
+    found = fault_campaign(evaluate, system, PHASES, duration_ns=3 * S)
     table = found.table()
     assert {kind for kind, _ in table} | set(found.without_subject) == set(FAULTS)
-    assert table["wind", "all"] == {"take-off": "0/1", "flight": "0/1"}
+    assert table["wind", "all"] == {"take-off": "0/1", "flight": "0/1", "drive": "0/1"}
     vehicle = system.vehicles[0].name
     assert table["gps-lost", vehicle] == {"take-off": "1/1", "flight": "1/1"}
+    times = {one.values["environment.faults.campaign"]["at"] for one in asked}
+    assert times == {"5.0 s", "20.0 s", "7.0 s"}
     for one in asked[::2]:  # each is a model; read_variant raises otherwise
         read_variant("examples/starter", one.values)

@@ -9,21 +9,25 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from volery.base import units
-from volery.base.errors import UsageError
+from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.installed import require_extra
 from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output, make_table, number_column
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from volery.base.time import Ns
     from volery.explore.campaign import Campaign, CampaignProgress
     from volery.explore.campaign_page import Findings
+    from volery.explore.flight_phases import Phases
     from volery.explore.points import Row
     from volery.explore.search import Objective
 
 commands = Commands()
 
 CAMPAIGN = Path("campaign")
+ALL = "all"
 SHOWN_VARIANTS = 40
 SHOWN_REASONS = 8
 
@@ -92,8 +96,9 @@ def explore(
     faults: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="PHASE=TIME",
-            help="Try every kind of fault on everything at this time of the run; may be repeated.",
+            metavar="all|PHASE|PHASE=TIME",
+            help="Try every kind of fault on everything in this phase of a flight: take-off, cruise, "
+            "hover or landing, or at this time of the run; may be repeated.",
         ),
     ] = None,
     on: Annotated[
@@ -225,7 +230,7 @@ def _study(campaign: Campaign, study: _Study) -> Findings:
         found = sensitivity(campaign.evaluate, space, study.influence, method=study.method, seed=seed)
         return of_influences(found)
     if study.faults:
-        phases = dict(_phase(text) for text in study.faults)
+        phases = _phases(campaign, study.faults)
         system = read_variant(campaign.setting.model, {})
         repetitions = campaign.specification.seeds
         return of_faults(
@@ -251,13 +256,38 @@ def _objective(campaign: Campaign, name: str, maximise: bool) -> Objective:
     return hardware_cost(model, currencies[0])
 
 
-def _phase(text: str) -> tuple[str, Ns]:
-    """Return the name and the time of a phase that is written as ``take-off=5 s``."""
+def _phases(campaign: Campaign, texts: list[str]) -> Phases:
+    """Return the phases that are stated, and those that are to be found in a run without faults."""
+    from volery.explore.flight_phases import EVERYWHERE
+
+    stated = [_phase(text) for text in texts]
+    if all(at is not None for _, at in stated):
+        found: Phases = {}
+    else:
+        found = campaign.flight_phases()
+    phases: dict[str, Mapping[str, Ns]] = {}
+    for name, at in stated:
+        if at is not None:
+            phases[name] = {EVERYWHERE: at}
+        elif name == ALL:
+            phases |= found
+        elif name in found:
+            phases[name] = found[name]
+        else:
+            raise UsageError(
+                f"--faults {name}: the flight has no such phase{did_you_mean(name, found)}; "
+                f"there is {choices((ALL, *found))}, or write a time: `{name}=5 s`"
+            )
+    return phases
+
+
+def _phase(text: str) -> tuple[str, Ns | None]:
+    """Return the name and the time of a phase that is written as ``landing`` or ``landing=5 s``."""
     name, found, at = text.partition("=")
-    if not found or not name.strip():
-        raise UsageError(f"--faults {text!r}: write a name and a time, such as `take-off=5 s`")
+    if not name.strip():
+        raise UsageError(f"--faults {text!r}: write a phase, such as `landing`, or with a time `landing=5 s`")
     try:
-        return name.strip(), units.read_ns(at.strip())
+        return name.strip(), units.read_ns(at.strip()) if found else None
     except units.QuantityError as error:
         raise UsageError(f"--faults {text!r}: {error}") from None
 

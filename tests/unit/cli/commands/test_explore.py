@@ -64,7 +64,7 @@ def test_influences_are_shown_with_intervals(explore, monkeypatch):
     [
         (("--until", "soon"), "soon"),
         (("--until", "counted within 5 %", "--minimise", ENERGY), "one of them at a time"),
-        (("--faults", "take-off"), "write a name and a time, such as `take-off=5 s`"),
+        (("--faults", "=5 s"), "write a phase, such as `landing`"),
         (("--faults", "take-off=5 m"), "'5 m' is a length"),
         ((*ONE, "--minimise", ENERGY, "--minimise", ENERGY), "one to three different objectives"),
         ((*ONE, "--maximise", "hardware_price"), "hardware_price is minimised in one currency"),
