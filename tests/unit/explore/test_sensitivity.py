@@ -1,4 +1,5 @@
 from math import pi, sin
+from random import Random
 
 import numpy as np
 import pytest
@@ -11,6 +12,9 @@ from volery.explore.run_process import read_variant
 from volery.explore.sensitivity import fault_campaign, margin, sensitivity, worst_case
 from volery.explore.space import Choices, Range
 from volery.model.faults import FAULTS
+
+MARGINS = 100
+"""Margins whose coverage is counted: with a true one of 90 % the test would fail 19 times in 20."""
 
 SPACE = {name: Range(-pi, pi) for name in ("a", "b", "c")}
 FIRST = {"a": 0.3139, "b": 0.4424, "c": 0.0}
@@ -80,21 +84,18 @@ class Windy:
         rows = []
         for one in points:
             speed = float(one.values["wind"].split()[0])
-            drawn = np.random.default_rng([self.root, one.seed]).random()
+            drawn = Random(self.root << 32 | one.seed).random()
             rows.append(Row(0, one, verdicts={"in_time": bool(drawn < self.probability(speed))}))
         return rows
 
 
-def test_a_margin_contains_the_limit():
+def test_margins_contain_the_limit_as_often_as_they_say():
     truth = 12.0 - np.log(9.0) / 2.0  # met with a probability of 0.9
-    right, runs = 0, 0
-    for root in range(10):
-        found = margin(Windy(root), "wind", Range(0.0, 20.0, "m/s"), "in_time")
-        right += float(found.holds.split()[0]) <= truth <= float(found.fails.split()[0])
-        runs += found.runs
-        assert float(found.fails.split()[0]) - float(found.holds.split()[0]) < 5.0
-    assert right >= 9
-    assert runs / 10 < 3000
+    found = [margin(Windy(root), "wind", Range(0.0, 20.0, "m/s"), "in_time") for root in range(MARGINS)]
+    ends = np.array([[float(end.split()[0]) for end in (one.holds, one.fails)] for one in found])
+    assert np.mean((ends[:, 0] <= truth) & (truth <= ends[:, 1])) >= 0.95
+    assert np.diff(ends).max() < 5.0
+    assert np.mean([one.runs for one in found]) < 3000
 
 
 def test_ends_of_margins():
