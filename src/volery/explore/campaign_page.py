@@ -145,7 +145,14 @@ def of_faults(faults: FaultCampaign) -> Findings:
 
 
 def _values(values: Mapping[str, Value]) -> str:
-    return ", ".join(f"{path} = {value}" for path, value in values.items())
+    return ", ".join(f"{path} = {_text(value)}" for path, value in values.items())
+
+
+def _text(value: Value) -> str:
+    """Return a value as a reader of the page knows it: that of a fault is a mapping."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key}: {_text(one)}" for key, one in value.items())
+    return str(value)
 
 
 def _interval_cell(one: Interval) -> Cell:
@@ -180,7 +187,7 @@ class _Choices:
         self.column = _Column()
 
     def put(self, index: int, value: Value) -> None:
-        text = value if isinstance(value, str) else repr(value)
+        text = _text(value)
         self.column.put(index, self.known.setdefault(text, len(self.known)))
 
     def axis(self, name: str, count: int) -> Axis:
@@ -317,6 +324,7 @@ def _render(campaign: Campaign, found: Findings) -> str:
             "the share of all runs that meet them, with 95 % intervals",
             grid=_requirements(table),
         ),
+        *(_Section(grid.title, grid=grid) for grid in found.grids),
         _Section("Variants", _variants_note(table), grid=_variants(table, shown)),
         _parallel(table, shown, front),
         _pareto(table, objectives, front, links),
@@ -329,7 +337,6 @@ def _render(campaign: Campaign, found: Findings) -> str:
             for title, effects in found.effects.items()
             if effects
         ),
-        *(_Section(grid.title, grid=grid) for grid in found.grids),
         _distributions(table, shown),
         _Section("Runs without a regular end", grid=_reasons(table)),
     ]
@@ -483,7 +490,7 @@ def _variants(table: _Table, shown: Sequence[str]) -> Grid:
         values = table.variant_values[variant]
         rows.append(
             (
-                *(Cell(str(values.get(name, ""))) for name in table.parameters),
+                *(Cell(_text(values.get(name, ""))) for name in table.parameters),
                 Cell(str(runs[variant])),
                 Cell(f"{good[variant]}", status="good" if good[variant] == runs[variant] else "warn"),
                 Cell(f"{judged.low:.3g} to {judged.high:.3g}"),
@@ -609,7 +616,7 @@ def _run(table: _Table, index: int, shown: Sequence[str], links: Mapping[int, st
         "link": "" if links[index].startswith("#") else links[index],
         "cells": [
             Cell(status, status="quiet" if status == COMPLETED else "bad"),
-            *(Cell(str(values.get(name, ""))) for name in table.parameters),
+            *(Cell(_text(values.get(name, ""))) for name in table.parameters),
             *(Cell(figure(_known(table.observables[name][index]))) for name in shown),
         ],
     }
