@@ -483,7 +483,7 @@ class _Inbox:
         self._commands.put((_PACE, None))  # for it is not watched
         self._commands.put((_STOP, "the program that watched it has ended"))
         if not self.prepared.is_set():
-            os.kill(os.getpid(), signal.SIGTERM)
+            os.killpg(0, signal.SIGTERM)  # and what it has started to compile
 
 
 class _Outbox:

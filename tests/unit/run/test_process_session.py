@@ -75,7 +75,7 @@ def children() -> set[str]:
     }
 
 
-@pytest.mark.parametrize(("example", "duration"), [("starter", 30), ("delivery", 5)])
+@pytest.mark.parametrize(("example", "duration"), [("starter", 15), ("delivery", 3)])
 def test_the_trace_is_that_of_a_session_in_this_process(example, duration, tmp_path):
     digests = []
     for kind in (RunSession, ProcessRunSession):
