@@ -113,7 +113,7 @@ STATE = WORLD_LAYOUT.end
 U_THROTTLE = _add(
     "U_THROTTLE",
     "1",
-    "motor commands 0..1 without an autopilot; rover: steering, throttle -1..1",
+    "motor commands 0..1 without a flight stack; rover: steering, throttle -1..1",
     ROTORS,
     MOTORS,
 )

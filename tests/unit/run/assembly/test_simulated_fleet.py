@@ -3,79 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from math import nan
-from typing import Any
 
 import pytest
 
+from rigs.hovering_autopilot import HoveringFamily
 from volery import Options, simulate
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
-from volery.links.mavlink_codec import MAVLINK
 from volery.model.environment import Place, Vehicle, Wind
 from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings
 from volery.simulation.autopilots.fleet_autopilot import firmwares
-from volery.trace.events import VehicleState
-
-
-class Sleeper:
-    """An autopilot that does nothing."""
-
-    banner = b""
-
-    def __init__(self, kernel: Any, flight: Any, name: str) -> None:
-        self.transmitter = [1500] * 8
-        self.closed = 0
-        self._kernel, self._flight, self._name = kernel, flight, name
-
-    def connect(self, link: Any, *, use: str = "") -> None:
-        raise NotImplementedError
-
-    def join(self, graph: Any, namespace: str, place: Any) -> None:
-        raise NotImplementedError
-
-    def swap_battery(self) -> None:
-        self._flight.set_charge(1.0)
-
-    def state(self) -> VehicleState:
-        seen = self._flight.truth()
-        where = *seen.position, *seen.attitude, *seen.velocity, nan, nan, nan
-        power = seen.battery_left, seen.volts, seen.amps
-        return VehicleState(self._kernel.now(), self._name, *where, *power, False, "ASLEEP")
-
-    def close(self) -> None:
-        self.closed += 1
-
-
-@dataclass
-class Sleepers:
-    """Their family; it has no rovers."""
-
-    name: str = "sleeper"
-    codec: Any = MAVLINK
-    default_links: tuple[Any, ...] = ()
-    airframes: bool = False
-    made: list[Sleeper] = field(default_factory=list)
-
-    def of_version(self, version: str) -> Sleepers:
-        return self
-
-    def with_features(self, names: str) -> Sleepers:
-        return self
-
-    def create(self, kernel: Any, flight: Any, *, name: str, **options: Any) -> Sleeper:
-        if not flight.flying:
-            raise UsageError("sleepers do not drive")
-        self.made.append(Sleeper(kernel, flight, name))
-        return self.made[-1]
 
 
 @pytest.fixture
-def sleepers() -> Iterator[Sleepers]:
-    family = Sleepers()
+def hovering() -> Iterator[HoveringFamily]:
+    family = HoveringFamily()
     firmwares.add(family.name, family)
     yield family
     del firmwares._added[family.name]
@@ -83,39 +27,44 @@ def sleepers() -> Iterator[Sleepers]:
 
 MODEL = """
 volery: 1
-name: rest
+name: hover
 environment:
   origin: {latitude: 47, longitude: 8}
-  places: {here: {east: 2 m, north: 3 m, battery_swap: 1 s}}
-  vehicles:
-    drone_1: {kind: multirotor, autopilot: sleeper, at: here, battery: {capacity: 2 Ah, charge: 50 %}}
-run: {duration: 5 s}
+  places: {here: {east: 2 m, north: 3 m}}
+  vehicles: {drone_1: {kind: multirotor, autopilot: hovering, at: here, sensors: rtk}}
+run: {duration: 30 s}
 """
 
 
-def test_a_model_runs_with_an_autopilot_that_volery_does_not_know(sleepers, tmp_path):
+def test_an_autopilot_that_drives_the_motors_hovers_in_a_model(hovering, tmp_path):
     (tmp_path / "model.yaml").write_text(MODEL)
     run = simulate(tmp_path / "model.yaml", Options(out=tmp_path / "run"))
     assert run.ok
-    assert run.observables["drone_1.battery_swaps"] == 1.0
-    assert [one.closed for one in sleepers.made] == [1]
+    assert [one.closed for one in hovering.made] == [1]
+    flown = run.arrays("drone_1")
+    last = flown["time_s"] > 20.0
+    assert last.sum() == 50
+    assert flown["z"][last] == pytest.approx(8.12, abs=0.5)  # its feet are 0.12 m below its centre
+    assert flown["x"][last] == pytest.approx(2.0, abs=0.5)
+    assert flown["y"][last] == pytest.approx(3.0, abs=0.5)
 
 
 def _fleet(*kinds: str) -> SimulatedFleet:
     here = Place("here", 47.0, 8.0, 0.0, 0.0, 0.0)
-    vehicles = [Vehicle(f"{kind}_{at}", kind, "sleeper", here) for at, kind in enumerate(kinds)]
+    vehicles = [Vehicle(f"{kind}_{at}", kind, "hovering", here) for at, kind in enumerate(kinds)]
     return SimulatedFleet(VirtualKernel(), vehicles, Surroundings(LocalFrame(47.0, 8.0), Wind()), 1)
 
 
-def test_progress_and_transmitter_are_those_of_the_autopilot(sleepers):
+def test_progress_and_transmitter_are_those_of_the_autopilot(hovering):
     fleet = _fleet("multirotor")
-    assert [(one.mode, one.armed) for one in fleet.progress()] == [("ASLEEP", False)]
+    assert [(one.mode, one.armed) for one in fleet.progress()] == [("OFF", False)]
     fleet.move_transmitter("multirotor_0", S, 3, 1900)
     fleet._kernel.run(2 * S)
-    assert sleepers.made[0].transmitter[:4] == [1500, 1500, 1900, 1500]
+    assert hovering.made[0].transmitter[:4] == [1500, 1500, 1900, 1500]
+    assert [(one.mode, one.armed) for one in fleet.progress()] == [("HOVER", True)]
 
 
-def test_those_that_were_made_end_where_a_later_one_is_refused(sleepers):
-    with pytest.raises(UsageError, match="sleepers do not drive"):
+def test_those_that_were_made_end_where_a_later_one_is_refused(hovering):
+    with pytest.raises(UsageError, match="hovering autopilots do not drive"):
         _fleet("multirotor", "rover")
-    assert [one.closed for one in sleepers.made] == [1]
+    assert [one.closed for one in hovering.made] == [1]

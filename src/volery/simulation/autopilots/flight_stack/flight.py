@@ -27,6 +27,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_HOVER_KEPT,
     C_STICK,
     C_YAW_P,
+    EXTERNAL,
     FLIGHT,
     HOLD_HEADING,
     K_HOVER_THROTTLE,
@@ -62,6 +63,7 @@ from volery.simulation.world.state_layout import (
     U_MAG_BLOCKED,
     U_MOTOR_HEALTH,
     U_PUSH,
+    U_THROTTLE,
     U_WIND,
     W_ROTATION,
 )
@@ -274,6 +276,30 @@ class Flight:
         if row != self._driven:
             self._driven = row
             self._world.set_input(self._body, C_CONTROL, *row)
+
+    def drive_motors(self, commands: Sequence[float]) -> None:
+        """Turn the motors by *commands* from the next grid step on; the flight stack rests for ever.
+
+        For an autopilot with an estimator and loops of its own. It reads the samples of its sensors from
+        ``estimate``, in which all that a flight stack estimates stands still.
+
+        Args:
+            commands: Of each motor, 0..1, in the order of the body's rotors; of a rover steering, right
+                positive, and throttle, both -1..1.
+
+        Raises:
+            UsageError: There are more or fewer motors, or a command is outside its range.
+
+        Example: ``flight.drive_motors([flight.spec.hover_throttle] * flight.rotors)``
+        """
+        count, least = (self.rotors, 0.0) if self.flying else (2, -1.0)
+        if len(commands) != count or not all(least <= one <= 1.0 for one in commands):
+            raise UsageError(f"motor commands {[*commands]}: give {count}, each from {least:g} to 1")
+        if not self._driven or self._driven[0] != EXTERNAL:
+            self._driven = (float(EXTERNAL),)
+            self._world.set_input(self._body, C_CONTROL, *self._driven)
+        inputs = commands if self.flying else (-commands[0], commands[1])
+        self._world.set_input(self._body, U_THROTTLE, *inputs)
 
     @property
     def mass(self) -> float:

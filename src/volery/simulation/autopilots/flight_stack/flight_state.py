@@ -44,7 +44,8 @@ from volery.simulation.world.state_layout import (
 class Control(IntEnum):
     """Quantities that the inner loops control.
 
-    Multirotors take OFF to VELOCITY_HEIGHT, MOTOR and RATE; rovers take OFF, IDLE, POSITION, STEER and DRIVE.
+    Multirotors take OFF to VELOCITY_HEIGHT, MOTOR and RATE; rovers take OFF, IDLE, POSITION, STEER and DRIVE;
+    both take EXTERNAL.
     """
 
     OFF = 0  # motors stopped: disarmed
@@ -59,10 +60,11 @@ class Control(IntEnum):
     DRIVE = 9  # rover: speed, and heading or turn rate
     MOTOR = 10  # multirotor on the ground: one motor, the others stopped
     RATE = 11  # multirotor: body rates and throttle
+    EXTERNAL = 12  # nothing: the motors are inputs, and the whole flight stack rests
 
 
 OFF, IDLE, ATTITUDE, CLIMB, VELOCITY, POSITION, POSITION_CLIMB, VELOCITY_HEIGHT = range(8)
-STEER, DRIVE, MOTOR, RATE = range(8, 12)
+STEER, DRIVE, MOTOR, RATE, EXTERNAL = range(8, 13)
 
 HOLD_HEADING, YAW_ANGLE, YAW_RATE, YAW_ANGLE_AND_RATE = range(4)
 """Values of ``C_YAW_MODE``."""

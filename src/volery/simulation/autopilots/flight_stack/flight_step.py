@@ -1,7 +1,8 @@
 """The compiled step of all vehicles with their flight stacks.
 
 One grid step of a vehicle is: guidance (every fifth step) and attitude loops on the estimate of step k, then
-the body's motion from k to k + 1 with the samples due there, then the estimate of k + 1.
+the body's motion from k to k + 1 with the samples due there, then the estimate of k + 1. Under external
+control only the body moves, by the motor commands in its inputs.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from volery.simulation.autopilots.flight_stack.estimator import (
 )
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_CONTROL,
+    EXTERNAL,
     K_HOVER_THROTTLE,
     K_LANDED,
     K_MOTORS,
@@ -43,7 +45,9 @@ from volery.simulation.world.state_layout import (
     MULTIROTOR,
     P_KIND,
     P_ROTORS,
+    ROTORS,
     S_STARTED,
+    U_THROTTLE,
     W_THROTTLE,
     Array,
     Bodies,
@@ -94,6 +98,11 @@ def _compose(digest: str) -> Callable[..., int]:
                 _boot(row)
             goal = goal_of(bodies, body)
             while reached[body] < goal:
+                if row[C_CONTROL] == EXTERNAL:
+                    for i in range(ROTORS):
+                        row[W_THROTTLE + i] = row[U_THROTTLE + i]
+                    step_body(bodies, body, row)
+                    continue
                 _control(row, reached[body])
                 step_body(bodies, body, row)
                 k = reached[body]
