@@ -199,8 +199,11 @@ class PositionLoops:
         self._state = np.zeros(LOOP_COLUMNS)
         self._row = cast("memoryview[float]", memoryview(cast("Any", self._state)))
         self._span = np.zeros(2, dtype=np.int64)
-        self._advance: Action | None = None
-        """Machine code that advances the state over the span; ``None``: nothing has flown yet."""
+        self._advance: Action = fly_px4_loops.bind(self._state, vehicle.flight.keys, self._span)
+        """Machine code that advances the state over the span. It is compiled here, before time passes: who
+        commands a served vehicle would take the pause of a later compilation for a lost link."""
+        self._started = False
+        """Whether the loops have flown once."""
         self._tuned: tuple[int, bool, float] | None = None
         """Number of parameter changes, whether a trajectory was followed, and the mass, when the gains were
         written."""
@@ -255,7 +258,7 @@ class PositionLoops:
     def rest(self) -> None:
         """Advance the error of the estimate while the vehicle stands and the motors run."""
         row = self._row
-        if self._advance is None or not self._noisy:
+        if not self._started or not self._noisy:
             return
         if row[I_TASK] != REST:
             row[I_TASK] = REST
@@ -286,13 +289,13 @@ class PositionLoops:
         """Put the airframe where the vehicle is, on the ground without thrust."""
         row, grounded = self._row, self._vehicle.estimate.landed
         self._trajectory, self._tuned = False, None
-        self._state[: LOOP_COLUMNS if self._advance is None else E_STATES] = 0.0
+        self._state[: E_STATES if self._started else LOOP_COLUMNS] = 0.0
         row[A_HEADING] = self._vehicle.estimate.attitude[2]
-        if self._advance is None:
-            self._advance = fly_px4_loops.bind(self._state, self._vehicle.flight.keys, self._span)
+        if not self._started:
+            self._started = True
             start_errors(self._state)
             if self._noisy:
-                self._settle(self._advance)
+                self._settle()
         _write(row, A_POSITION, here)
         _write(row, A_VELOCITY, velocity)
         if grounded:
@@ -310,12 +313,12 @@ class PositionLoops:
         hover = airframe_of(self._vehicle)[2]
         _write(row, A_HOVER, (hover, hover, FIRST_VARIANCE))
 
-    def _settle(self, advance: Action) -> None:
+    def _settle(self) -> None:
         """Let the errors of the estimate become those of a filter that has run since the boot."""
         row = self._row
         row[I_TASK], row[I_NOISY] = REST, 1.0
         self._span[:] = settling(self._vehicle.uptime())
-        advance()
+        self._advance()
 
     def _fly(self, steps: int, yaw: float | None, yaw_rate: float | None) -> None:
         """Advance to now, and let the flight stack follow the airframe of the loops."""
@@ -360,8 +363,7 @@ class PositionLoops:
         """Advance the state by that many substeps."""
         first = self._last // STEP
         self._span[0], self._span[1] = first, first + steps
-        if self._advance is not None:
-            self._advance()
+        self._advance()
         self._last += steps * STEP
 
     def _without_error(self, stated: Vector, first: int) -> Vector:
