@@ -2,8 +2,8 @@
 
 A package brings an autopilot of its own by an entry point of the group ``volery.autopilots`` that names an
 ``AutopilotFamily``. ``autopilot.FirmwareFamily`` is that of the firmwares that volery simulates. An autopilot
-with an estimator and loops of its own reads samples from ``Flight.estimate`` and gives ``Flight.drive_motors``
-one command for each motor.
+with an estimator and loops of its own reads the samples in ``Flight.estimate`` and gives
+``Flight.drive_motors`` one command for each motor.
 """
 
 from __future__ import annotations
