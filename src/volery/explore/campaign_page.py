@@ -65,23 +65,22 @@ class Findings:
 
 def of_front(front: Front) -> Findings:
     """Return what a search found."""
+    shown = (*front.solutions, *front.alike)
+    requirements = dict.fromkeys(name for one in shown for name in one.requirements)
     columns = (
         Column("variant"),
         *(Column(str(one), numeric=True) for one in front.objectives),
-        *(
-            Column(name, numeric=True)
-            for name in (front.solutions[0].requirements if front.solutions else ())
-        ),
+        *(Column(name, numeric=True) for name in requirements),
         Column("not distinguished from"),
     )
     rows = []
-    for one in (*front.solutions, *front.alike):
+    for one in shown:
         like = "" if one.like is None else _values(front.solutions[one.like].values)
         rows.append(
             (
                 Cell(_values(one.values)),
                 *(_interval_cell(each) for each in one.objectives),
-                *(Cell(f"{each.low:.3g} to {each.high:.3g}") for each in one.requirements.values()),
+                *(_probability_cell(one.requirements.get(name)) for name in requirements),
                 Cell(like, status="quiet"),
             )
         )
@@ -95,6 +94,11 @@ def of_front(front: Front) -> Findings:
         Grid(share, (Column("reason"), Column("variants", numeric=True)), discarded),
     ]
     return Findings(front.objectives, [one.values for one in front.solutions], grids=grids)
+
+
+def _probability_cell(of: Interval | None) -> Cell:
+    """Return the probability to meet a requirement; empty where the variant does not have it."""
+    return Cell("" if of is None else f"{of.low:.3g} to {of.high:.3g}")
 
 
 def of_influences(influences: Influences) -> Findings:

@@ -179,7 +179,7 @@ def search(  # noqa: PLR0913  # each is an option
         evaluations: Variants that are run, without the judgement of the best. Where a space has no more
             variants than this, all of them are.
         seed: Seed of the search and of its runs. The same seed gives the same front.
-        constraints: Requirements that a variant has to meet in each run of the search.
+        constraints: Requirements that a variant has to meet in each run of the search, if its model has them.
         repetitions: Runs of each variant during the search.
         confirmations: Further runs of each variant that is judged. 0 for what has no noise: then the
             means of ``repetitions`` runs are compared as they are.
@@ -250,6 +250,7 @@ class _Search:
         self._known: dict[str, _Variant] = {}
         self._reasons: Counter[str] = Counter()
         self._runs = 0
+        self._judged: dict[str, None] = {}  # requirements, an ordered set
 
     def run(
         self, variants: Sequence[Mapping[str, Value]], most: float = float("inf")
@@ -272,6 +273,7 @@ class _Search:
         for (key, values), rows in zip(
             new.items(), self._rows(list(new.values()), range(self._repetitions)), strict=True
         ):
+            self._judged.update(dict.fromkeys(name for one in rows for name in one.verdicts))
             unmet = tuple(_unmet(rows, one) for one in self._constraints)
             self._known[key] = _Variant(values, self._scores(rows).mean(axis=0), unmet)
         return [self._known.get(key) for key in keys]
@@ -329,6 +331,10 @@ class _Search:
 
     def judge(self, confirmations: int, level: float) -> Front:
         """Run the best variants again, and return those that are not dominated."""
+        for name in self._constraints if self._judged else ():
+            if name not in self._judged:
+                there = ", ".join(self._judged)
+                raise UsageError(f"no run judges a requirement {name!r}; there is {there}")
         feasible = [one for one in self._evaluated if one.feasible]
         best = _best(feasible, JUDGED if confirmations else len(feasible))
         if not confirmations:
@@ -359,14 +365,20 @@ class _Search:
         return Solution(
             one.values,
             tuple(mean(column, level) for column in values.T),
-            {name: met(rows, name, level) for name in self._constraints},
+            {name: met(rows, name, level) for name in self._constraints if _judged(rows, name)},
             like,
         )
 
 
 def _unmet(rows: Sequence[Row], requirement: str) -> float:
-    """Return the share of rows that do not meet a requirement."""
-    return 1.0 - met(rows, requirement).estimate if any(one.verdicts for one in rows) else 1.0
+    """Return the share of rows that do not meet a requirement; 0 if the variant has no such requirement."""
+    if not any(one.verdicts for one in rows):
+        return 1.0
+    return 1.0 - met(rows, requirement).estimate if _judged(rows, requirement) else 0.0
+
+
+def _judged(rows: Sequence[Row], requirement: str) -> bool:
+    return any(requirement in one.verdicts for one in rows)
 
 
 def _signs(objectives: Sequence[Objective]) -> Array:

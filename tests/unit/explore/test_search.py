@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -85,6 +87,23 @@ def test_constraints_hold_in_the_front():
     (best,) = front.solutions
     assert 0.4 < best.values["x0"] < 0.5
     assert best.requirements["cheap"].estimate == 1.0
+
+
+def test_a_variant_need_not_meet_a_requirement_that_it_does_not_have():
+    def evaluate(points):
+        return [
+            replace(row, verdicts={"fits": True} | ({"quick": False} if row.point.values["n"] == 2 else {}))
+            for row in mixed(points)
+        ]
+
+    front = search(
+        evaluate, SMALL, ["minimise time"], evaluations=100, constraints=["fits", "quick"], confirmations=0
+    )
+    (best,) = front.solutions
+    assert best.values["n"] == 1
+    assert list(best.requirements) == ["fits"]
+    with pytest.raises(UsageError, match="no run judges a requirement 'quik'; there is fits, quick"):
+        search(evaluate, SMALL, ["minimise time"], evaluations=100, constraints=["quik"], confirmations=0)
 
 
 def test_what_noise_hides_is_not_reported_as_a_front():

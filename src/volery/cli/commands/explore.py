@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -214,17 +215,19 @@ def _study(campaign: Campaign, study: _Study) -> Findings:
         until = read_until(study.until)
         return of_intervals(until, campaign.run_until(until))
     if study.objectives:
-        system = read_variant(campaign.setting.model, {})
         front = search(
             campaign.evaluate,
             space,
             [_objective(campaign, name, maximise) for name, maximise in study.objectives],
             evaluations=study.evaluations,
             seed=seed,
-            constraints=[one.name for one in system.requirements],
+            constraints=_requirements(campaign),
             repetitions=campaign.specification.seeds,
             discard=analysis_discards(campaign.setting.model, campaign.setting.fidelity),
         )
+        if front.discarded and not front.evaluated:
+            reasons = "; ".join(f"{why} ({count})" for why, count in front.discarded.items())
+            raise UsageError(f"the analysis discards every variant, so none is run: {reasons}")
         return of_front(front)
     if study.influence:
         found = sensitivity(campaign.evaluate, space, study.influence, method=study.method, seed=seed)
@@ -238,6 +241,22 @@ def _study(campaign: Campaign, study: _Study) -> Findings:
         )
     campaign.run(campaign.specification.run_points())
     return Findings()
+
+
+def _requirements(campaign: Campaign) -> list[str]:
+    """Return the names of the requirements that the variants have, of which each may have others."""
+    from volery.base.errors import ModelError
+    from volery.explore.run_process import read_variant
+    from volery.explore.space import Choices
+    from volery.model.text import CollectedModelError
+
+    names: dict[str, None] = {}
+    for path, one in campaign.specification.space.items():
+        for value in one.values if isinstance(one, Choices) else [one.at(0.5)]:
+            with suppress(ModelError, CollectedModelError):  # its runs say what is wrong
+                system = read_variant(campaign.setting.model, {path: value})
+                names |= {each.name: None for each in system.requirements}
+    return list(names)
 
 
 def _objective(campaign: Campaign, name: str, maximise: bool) -> Objective:

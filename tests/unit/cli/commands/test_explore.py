@@ -2,6 +2,7 @@
 
 import json
 from concurrent.futures import Future
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -77,3 +78,17 @@ def test_what_is_wrong_with_a_method_is_refused_by_name(explore, options, said):
     result = explore(*options)
     assert result.exit_code == 2
     assert said in " ".join(result.output.split())
+
+
+def test_a_space_in_which_nothing_can_work_is_refused_with_the_reasons(tmp_path):
+    slow = "platform.processors.onboard_1.frequency, platform.processors.onboard_2.frequency=600 MHz, 800 MHz"
+    options = ("--scenario", "pocket", "--fidelity", "times", "--on", "stub", "--out", str(tmp_path / "out"))
+    delivery = str(Path(__file__).parents[4] / "examples" / "delivery")
+    result = CliRunner().invoke(
+        application(), ["explore", delivery, *options, "--set", slow, "--minimise", ENERGY]
+    )
+    assert result.exit_code == 2
+    assert "the analysis discards every variant" in result.output
+    assert (
+        "landing_1 takes 138.8 ms at least on onboard_1: landing_in_time_1 cannot be met (1)" in result.output
+    )
