@@ -1,6 +1,6 @@
 """The front of the delivery service: energy of its computers, delivery time, price of its hardware.
 
-    python bench/delivery_front.py [--workers 2] [--repetitions 10] [--budget 16] [--out FOLDER]
+    python bench/delivery_front.py [--workers 2] [--repetitions 10] [--budget 32] [--out FOLDER]
 
 Two orders in the pocket city, by 1 to 4 drones, on three computers (ground, on board of drones, on board of
 rovers) with frequencies and an allocation each. Every variant that the analysis does not discard is run once,
@@ -136,7 +136,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     options.add_argument("--workers", type=int, default=2)
     options.add_argument("--repetitions", type=int, default=10)
-    options.add_argument("--budget", type=int, default=16)
+    options.add_argument("--budget", type=int, default=32)
     options.add_argument("--out", type=Path)
     chosen = options.parse_args()
     with TemporaryDirectory() as temporary:
