@@ -357,7 +357,7 @@ def _render(campaign: Campaign, found: Findings) -> str:
             runs=[_run(table, int(index), shown, links) for index in drawn],
             runs_title=f"the {len(drawn)} runs that are drawn"
             if len(drawn) < len(table.numbers)
-            else f"all {len(drawn)} runs",
+            else f"all {_counted(len(drawn), 'run')}",
             run_columns=["status", *table.parameters, *shown],
             again=f"volery explore --out {campaign.folder} --show RUN makes one again, with trace and report",
             footer="volery: one model, simulated, priced and flown",
@@ -381,13 +381,15 @@ def _svg(text: str) -> Markup:
 def _subtitle(campaign: Campaign) -> str:
     stated = campaign.stated
     model = stated["model"] or "a model built in Python"
-    return f"{model} · {campaign.specification.seeds} seeds a variant · volery {stated['version']}"
+    return (
+        f"{model} · {_counted(campaign.specification.seeds, 'seed')} a variant · volery {stated['version']}"
+    )
 
 
 def _outcome(asked: int, finished: int) -> Fact:
     if finished < asked:
         return Fact("unfinished", f"{finished} of {asked} runs", status="warn")
-    return Fact("finished", f"{finished} runs", status="good")
+    return Fact("finished", _counted(finished, "run"), status="good")
 
 
 def _facts(table: _Table) -> list[Fact]:
@@ -395,7 +397,7 @@ def _facts(table: _Table) -> list[Fact]:
     discarded = sum(status == DISCARDED for status in table.statuses)
     failed = count - completed - discarded
     facts = [
-        Fact("runs", str(count), f"{len(table.variant_values)} variants"),
+        Fact("runs", str(count), _counted(len(table.variant_values), "variant")),
         Fact("completed", str(completed)),
         Fact("met all requirements", _share(int(table.met.sum()), count)),
         Fact(
@@ -550,12 +552,37 @@ def _parallel(table: _Table, shown: Sequence[str], front: Flags) -> _Section:
         for axis in table.parameters.values()
         if len(np.unique(axis.values)) > 1 and len(axis.choices) <= MOST_CHOICES
     ]
-    axes = [*varied, *(Axis(name, table.observables[name]) for name in shown)][:MOST_AXES]
+    results = [Axis(name, table.observables[name]) for name in shown]
+    kept = _most_related(varied, results, MOST_AXES - len(results))
+    axes = [*kept, *results]
     if len(axes) < 2:
         return _Section("")
     note = "one line a run; red: a requirement is not met" + ("; strong: the front" if front.any() else "")
+    if len(kept) < len(varied):
+        note += f"; the {len(kept)} of {len(varied)} parameters that go most with {shown[0]}" if shown else ""
     picture = _svg(parallel_coordinates(axes, table.met, front))
     return _Section("All runs", note, [picture], wide=True)
+
+
+def _most_related(axes: Sequence[Axis], results: Sequence[Axis], most: int) -> list[Axis]:
+    """Return the axes that have the greatest correlation with the first result, in their own order."""
+    if len(axes) <= most or not results:
+        return list(axes[:most])
+
+    def relation(axis: Axis) -> float:
+        known = np.isfinite(axis.values) & np.isfinite(results[0].values)
+        one, other = axis.values[known], results[0].values[known]
+        if len(one) < 2 or not np.ptp(one) or not np.ptp(other):
+            return 0.0
+        return abs(float(np.corrcoef(one, other)[0, 1]))
+
+    kept = sorted(range(len(axes)), key=lambda place: -relation(axes[place]))[:most]
+    return [axes[place] for place in sorted(kept)]
+
+
+def _counted(count: int, noun: str) -> str:
+    """Return a number with its noun."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def _pareto(table: _Table, objectives: Sequence[str], front: Flags, links: Mapping[int, str]) -> _Section:

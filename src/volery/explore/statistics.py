@@ -22,7 +22,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import ceil, floor, inf, isnan, log10, nan, sqrt
+from math import ceil, floor, inf, isfinite, isnan, log10, nan, sqrt
 from typing import Any
 
 import numpy as np
@@ -163,6 +163,8 @@ def mean(values: Sequence[float] | Array, level: float = LEVEL) -> Interval:
     estimate = float(known.mean())
     if count == 1:
         return Interval(estimate, -inf, inf, 1, level, "t", "too few runs: 2 needed")
+    if not isfinite(estimate):
+        return Interval(estimate, -inf, inf, count, level, "t", "an infinite value")
     half = _t(level, count - 1) * float(known.std(ddof=1)) / sqrt(count)
     return Interval(estimate, estimate - half, estimate + half, count, level, "t")
 

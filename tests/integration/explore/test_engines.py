@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -15,6 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from threading import Thread
 
 import pytest
@@ -30,9 +32,10 @@ from volery.explore.run_process import Setting, Task, VersionMismatchError, exec
 pytestmark = pytest.mark.integration
 
 WITHIN_S = 300
-COMMAND = [sys.executable, "-c", "from volery.cli.main import main; main()", "explore"]
 SPACE = {COUNT: [1, 3], "allocation": ["only", "slow"]}
 SEEDS = 25
+ROOM_B = 100_000
+"""Greatest file, as if the disk ended there: fewer bytes than the rows of the campaign need."""
 
 
 @pytest.fixture(scope="module")
@@ -64,11 +67,12 @@ def children(pid: int) -> list[int]:
     return found
 
 
-def start(made: Path, out: Path, *options: str) -> subprocess.Popen[str]:
-    """Start the campaign as a command."""
+def start(made: Path, out: Path, *options: str, first: str = "") -> subprocess.Popen[str]:
+    """Start the campaign as a command, in a process that executes *first* before."""
     paths = [f"--set={COUNT}=1,3", "--allocation=only", "--allocation=slow", f"--seeds={SEEDS}"]
+    code = f"{first}\nfrom volery.cli.main import main\nmain()"
     return subprocess.Popen(
-        [*COMMAND, str(made), f"--out={out}", *paths, *options],
+        [sys.executable, "-c", code, "explore", str(made), f"--out={out}", *paths, *options],
         env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
@@ -152,6 +156,26 @@ def test_a_campaign_that_was_ended_is_resumed(undisturbed, tmp_path, number):
     again = Campaign(out).table()
     assert same_rows(again, table)
     assert (again["attempt"] == 1).sum() >= done  # what was finished was not run again
+
+
+def test_a_full_disk_is_said_and_the_campaign_goes_on_when_there_is_room(undisturbed, tmp_path):
+    made, table = undisturbed
+    out = tmp_path / "out"
+    limit = f"import resource; resource.setrlimit(resource.RLIMIT_FSIZE, ({ROOM_B}, {ROOM_B}))"
+    process = start(made, out, first=limit)
+    _, said = process.communicate(timeout=WITHIN_S)
+    assert process.returncode == 1
+    assert f"{out} cannot be written" in said
+    assert "when there is room again, the same command resumes the campaign" in " ".join(said.split())
+    assert "Traceback" not in said
+    done = finished(out)
+    assert 0 < done < len(table)
+    resumed = start(made, out, "--json")
+    _, said = resumed.communicate(timeout=WITHIN_S)
+    assert resumed.returncode == 0, said
+    again = Campaign(out).table()
+    assert same_rows(again, table)
+    assert (again["attempt"] == 1).sum() >= done
 
 
 def test_a_worker_of_another_version_is_refused(model):
@@ -241,6 +265,66 @@ def test_a_scheduler_that_dies_is_named_and_the_campaign_goes_on_elsewhere(undis
     assert same_rows(again, table)
 
 
+class Cable:
+    """A TCP connection to a server that can be cut: a proxy on loopback."""
+
+    def __init__(self, address: str) -> None:
+        host, _, port = address.removeprefix("dask://").rpartition(":")
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self._ends: list[socket.socket] = []
+        self._to = (host, int(port))
+        Thread(target=self._accept, daemon=True).start()
+
+    @property
+    def address(self) -> str:
+        return f"dask://127.0.0.1:{self._server.getsockname()[1]}"
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            while True:
+                ours, _ = self._server.accept()
+                theirs = socket.create_connection(self._to)
+                self._ends += [ours, theirs]
+                for one, other in ((ours, theirs), (theirs, ours)):
+                    Thread(target=self._pass, args=(one, other), daemon=True).start()
+
+    def _pass(self, one: socket.socket, other: socket.socket) -> None:
+        with suppress(OSError):
+            while data := one.recv(65536):
+                other.sendall(data)
+            other.shutdown(socket.SHUT_WR)
+
+    def cut(self) -> None:
+        for one in (self._server, *self._ends):
+            with suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
+            one.close()
+
+
+def test_a_connection_to_the_scheduler_that_is_cut_is_named_and_the_campaign_goes_on(
+    undisturbed, cluster, tmp_path
+):
+    made, table = undisturbed
+    out = tmp_path / "out"
+    wait_for(lambda: _workers(cluster.address) == 2)
+    cable = Cable(cluster.address)
+
+    def cut() -> None:
+        wait_for(lambda: finished(out) > 10)
+        cable.cut()
+
+    thread = Thread(target=cut)
+    thread.start()
+    with pytest.raises(EngineLostError, match=r"was lost after \d+ of 100 runs.*resumes the campaign"):
+        volery.explore(made, out, SPACE, seeds=SEEDS, on=cable.address)
+    thread.join()
+    done = finished(out)
+    assert 10 < done < len(table)
+    again = volery.explore(made, out, SPACE, seeds=SEEDS, on=cluster.address).table()
+    assert same_rows(again, table)
+    assert (again["attempt"] == 1).sum() >= done
+
+
 def _workers(address: str) -> int:
     from distributed import Client
 
@@ -251,13 +335,51 @@ def _workers(address: str) -> int:
 # -- Ray
 
 
-def test_ray_makes_the_same_rows(undisturbed, tmp_path, monkeypatch):
-    made, table = undisturbed
+@pytest.fixture
+def ray_settings(tmp_path, monkeypatch):
+    """Keep what Ray writes about itself in the folder of the test."""
     for name, value in {
         "HOME": str(tmp_path),
         "RAY_AUTH_MODE": "disabled",
         "RAY_USAGE_STATS_ENABLED": "0",
     }.items():
         monkeypatch.setenv(name, value)
+
+
+def test_ray_makes_the_same_rows(undisturbed, tmp_path, ray_settings):
+    made, table = undisturbed
     campaign = volery.explore(made, tmp_path / "out", SPACE, seeds=SEEDS, on="ray", workers=2)
     assert same_rows(campaign.table(), table)
+
+
+@pytest.mark.long
+def test_a_ray_that_others_started_makes_the_same_rows(undisturbed, tmp_path, ray_settings):
+    made, table = undisturbed
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    with TemporaryDirectory(prefix="ray-") as short:  # a socket's path has 107 characters at most
+        head = subprocess.Popen(
+            [
+                *(sys.executable, "-m", "ray.scripts.scripts", "start", "--head", "--block"),
+                *("--node-ip-address", "127.0.0.1", "--port", str(port), "--num-cpus", "2"),
+                *("--include-dashboard", "false", "--temp-dir", short),
+            ],
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        try:
+            wait_for(lambda: _answers(port))
+            on = f"ray://127.0.0.1:{port}"
+            campaign = volery.explore(made, tmp_path / "out", SPACE, seeds=SEEDS, on=on)
+            assert same_rows(campaign.table(), table)
+            assert head.poll() is None, "the cluster goes on"
+        finally:
+            head.terminate()  # and with it what it has started
+            head.wait(WITHIN_S)
+
+
+def _answers(port: int) -> bool:
+    with suppress(OSError), socket.create_connection(("127.0.0.1", port), 1.0):
+        return True
+    return False

@@ -118,3 +118,25 @@ def test_an_objective_that_no_run_observed_is_named(page):
 def test_a_campaign_without_a_finished_run_has_no_page(page):
     with pytest.raises(UsageError, match="no run is finished yet"):
         page([])
+
+
+def test_of_many_parameters_those_are_drawn_that_matter_beside_the_result(page):
+    def row(run):
+        values = {f"p{place:02}": (run * (place + 3)) % 17 for place in range(12)}
+        return Row(run, Point(values, run), observables={"energy": 10.0 * values["p11"] - values["p03"]})
+
+    drawn = page([row(run) for run in range(60)])
+    assert "the 8 of 12 parameters that go most with energy" in text_of(drawn)
+    lines = drawn[drawn.index("All runs") : drawn.index("Distributions")]
+    assert ">p11<" in lines
+    assert ">energy<" in lines
+
+
+def test_a_single_run_and_an_infinite_value_are_said_in_words(page):
+    said = text_of(page([Row(0, Point({COUNT: 3}, 1), observables={"time": float("inf")})]))
+    assert "finished 1 run " in said
+    assert "1 variant " in said
+    infinite = [
+        Row(n, Point({COUNT: n % 2}, n), observables={"time": [1.0, 2.0, float("inf")][n]}) for n in range(3)
+    ]
+    assert "inf" in text_of(page(infinite))
