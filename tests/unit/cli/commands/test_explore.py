@@ -67,6 +67,7 @@ def test_influences_are_shown_with_intervals(explore, monkeypatch):
         (("--until", "counted within 5 %", "--minimise", ENERGY), "one of them at a time"),
         (("--faults", "=5 s"), "write a phase, such as `landing`"),
         (("--faults", "take-off=5 m"), "'5 m' is a length"),
+        (("--faults", "all"), "no vehicle was armed"),
         ((*ONE, "--minimise", ENERGY, "--minimise", ENERGY), "one to three different objectives"),
         ((*ONE, "--maximise", "hardware_price"), "hardware_price is minimised in one currency"),
         ((*ONE, "--influence", ENERGY), "compares two parameters"),
@@ -92,3 +93,18 @@ def test_a_space_in_which_nothing_can_work_is_refused_with_the_reasons(tmp_path)
     assert (
         "landing_1 takes 138.8 ms at least on onboard_1: landing_in_time_1 cannot be met (1)" in result.output
     )
+
+
+def test_faults_are_tried_in_the_phases_of_the_flight(tmp_path):
+    def run(*options):
+        command = ["explore", "examples/starter", "--fidelity", "times", "--on", "stub", "--json"]
+        return CliRunner().invoke(application(), [*command, "--out", str(tmp_path / "out"), *options])
+
+    rows = found(run("--faults", "hover", "--faults", "late=90 s"))["findings"][0]["rows"]
+    assert {"fault": "gps-lost", "of": "drone_1", "hover": "1/1", "late": "1/1"} in rows
+    assert (tmp_path / "out" / "undisturbed" / "trace.mcap").exists()
+    wrong = run("--faults", "hovr")
+    assert wrong.exit_code == 2
+    said = " ".join(wrong.output.split())
+    assert "did you mean 'hover'" in said
+    assert "there is all, arming, cruise, ground contact, hover, landing or take-off" in said
