@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 # where it is set, as in many containers, each of the hundreds of programs that tests start compiles all its modules
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo caches test test-all check bench docs wheel clean
+.PHONY: demo caches test test-python test-all check bench docs wheel clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/volery.stamp ## parcels across a city, two allocations side by side, a report
@@ -31,6 +31,10 @@ test: $(VENV)/test.stamp caches ## all tests, against real sockets, clients and 
 	wait $$transports || status=1; \
 	cat $(VENV)/transports.log; \
 	exit $$status
+
+test-python: ## traces, embedded ROS and C++ on another version of Python: make test-python PYTHON=python3.13
+	@$(MAKE) --no-print-directory PYTHON=python3 $(VENV)/volery.stamp
+	@scripts/test-python $(VENV) $(PYTHON)
 
 test-all: test ## the same, features that are off by default, and what is rare or computes for minutes
 	$(BIN)/pytest -n auto $(BY_FILE) -m "long or optional"
