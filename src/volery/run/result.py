@@ -282,9 +282,10 @@ class Options:
         """Whether the run writes a trace."""
         return self.out is not None and self.record != SUMMARY
 
-    def wants_all_of(self, topic: str) -> bool:
-        """Return whether also long messages of a topic are recorded with their content."""
-        return self.record == FULL or topic in self.record.split(",")
+    @property
+    def record_topics(self) -> tuple[str, ...]:
+        """The topics that ``record`` names."""
+        return tuple(self.record.split(",")) if self.record.startswith("/") else ()
 
 
 DEFAULT_OPTIONS = Options()

@@ -6,7 +6,6 @@ import gc
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from threading import Event, Thread, current_thread
 from typing import Any
@@ -37,6 +36,7 @@ from volery.run.ending import Ending
 from volery.run.recording import Recording
 from volery.run.result import (
     DEFAULT_OPTIONS,
+    FULL,
     ComponentLogReporter,
     Options,
     ProgressReporter,
@@ -129,6 +129,7 @@ class RunSession:
         self._options = options
         self._kernel = VirtualKernel(pace=options.pace, watchdog_s=PATIENCE_S)
         self._ending = Ending(self._kernel)
+        self._unpublished = set(options.record_topics)
         self._result: Run | None = None
         self._thread: Thread | None = None
         self._goes_on = Event()
@@ -258,9 +259,17 @@ class RunSession:
 
     def _build(self, platform: Platform) -> BuiltComponents:
         options = self._options
-        records = partial(_recorded, options)
-        builder = Builder(self._system, self._kernel, platform, self._fleet, self._ending, records=records)
+        builder = Builder(
+            self._system, self._kernel, platform, self._fleet, self._ending, records=self._recorded
+        )
         return builder.build(options.fidelity, options.seed, options.traces)
+
+    def _recorded(self, topic: str) -> Recorded:
+        """Return what is recorded of a topic that somebody publishes."""
+        self._unpublished.discard(topic)
+        if self._options.record == FULL or topic in self._options.record_topics:
+            return Recorded.ALL
+        return Recorded.SHORT if self._options.traced else Recorded.NOTHING
 
     def _prepare(self) -> None:
         """Create all parts of the run."""
@@ -338,7 +347,8 @@ class RunSession:
         now, ending = self._kernel.now(), self._ending
         self._built.finish()
         self._fleet.record_states()
-        for warning in (*self._built.warnings(), *self._log.finish()):
+        unpublished = (f"record {one}: nobody published this topic" for one in sorted(self._unpublished))
+        for warning in (*self._built.warnings(), *self._log.finish(), *unpublished):
             self._recording.stream(Text(now, WHO, WARNING, warning))
         for one in self._built.unserved():
             self._recording.stream(one)
@@ -361,6 +371,9 @@ class GraphSession(RunSession):
     _distributed: DistributedRun | None = None
 
     def __init__(self, system: System, options: Options) -> None:
+        if options.record_topics:
+            what = "on a real graph the content of every message is recorded"
+            raise UsageError(f"record {options.record}: {what}; leave it out")
         options = replace(options, pace=options.pace or 1.0)
         system, unjudged = without_computers(system)
         self._unjudged = dict.fromkeys(unjudged, NOT_MODELLED)
@@ -399,12 +412,6 @@ class GraphSession(RunSession):
         """See ``RunSession``."""
         left = [] if self._distributed is None else self._distributed.close()
         return [*left, *super().leave()]
-
-
-def _recorded(options: Options, topic: str) -> Recorded:
-    if options.wants_all_of(topic):
-        return Recorded.ALL
-    return Recorded.SHORT if options.traced else Recorded.NOTHING
 
 
 def _raise(error: Exception) -> None:

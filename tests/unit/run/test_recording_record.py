@@ -13,7 +13,7 @@ from volery.report.graph_picture import graph_of_run
 from volery.ros.messages import cdr_size, new
 from volery.ros.messages.bags import open_bag
 from volery.run.result import Options
-from volery.trace.events import Omitted, Published
+from volery.trace.events import Omitted, Published, Text
 from volery.trace.reader import read
 
 STARTER = Path(__file__).parents[3] / "examples" / "starter"
@@ -119,7 +119,9 @@ def test_long_messages_are_in_the_trace_without_their_content(looking, tmp_path)
     assert trace.stat().st_size < IMAGE_SIZE
     seen = {one.name: one for one in graph_of_run(tmp_path / "run").topics}
     assert (seen["/image"].type, seen["/image"].subscribers) == ("sensor_msgs/msg/Image", ("/viewer",))
-    assert "volery simulate --record /scan records it" in open_bag(trace).omitted["/scan"]
+    bag = open_bag(trace)
+    assert list(bag.omitted) == ["/image", "/scan"]
+    assert f"/scan ({bag.omitted['/scan']}); volery simulate --record /scan " in bag.omission(["/scan"])
     assert "--record /image records their content" in (tmp_path / "run" / "report.html").read_text()
 
 
@@ -144,3 +146,11 @@ def test_taps_get_long_messages_as_they_are_recorded(looking, tmp_path):
         session.tap(taken.append, Omitted, Published)
         session.run()
         assert {type(one) for one in taken if getattr(one, "topic", "") == "/image"} == kinds
+
+
+def test_a_topic_that_nobody_publishes_is_named(looking, tmp_path):
+    run = volery.simulate(looking, Options(out=tmp_path / "run", record="/image,/imege"))
+    assert "record /imege: nobody published this topic" in [
+        one.text for one in read(tmp_path / "run" / "trace.mcap").events if isinstance(one, Text)
+    ]
+    assert run.completed

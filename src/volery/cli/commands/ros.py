@@ -200,8 +200,8 @@ def convert(
     recorded = {topic.name for topic in bag.topics}
     chosen = set(topics or (one for one in recorded if not one.startswith(OF_THE_RUN)))
     unknown = chosen - recorded
-    for one in sorted(unknown & bag.omitted.keys()):
-        raise UsageError(f"{recording}: {one}: {bag.omitted[one]}")
+    if unknown and unknown <= bag.omitted.keys():
+        raise UsageError(bag.omission(sorted(unknown)))
     if unknown:
         raise UsageError(f"{recording} has no topic {', '.join(sorted(unknown))}")
     _note_reading(output, bag)
@@ -230,8 +230,8 @@ def convert(
 
 
 def _note_reading(output: Output, bag: Bag) -> None:
-    for topic, why in bag.omitted.items():
-        output.note(f"{topic}: {why}")
+    if bag.omitted:
+        output.note(bag.omission(list(bag.omitted)))
     if bag.remark:
         output.note(bag.remark)
     if not bag.complete and all(part.complete for part in bag.parts) and bag.parts:

@@ -127,6 +127,8 @@ def _integer_class(name: str, operands: tuple[str, ...]) -> str:
         return kind
     if name == "mov":
         return "move" if _REGISTER.fullmatch(operands[-1]) else "alu"
+    if not operands:  # clrex
+        return "alu"
     shifted = _SHIFTED.match(operands[-1]) if name not in ("movz", "movk", "movn") else None
     if shifted is None:
         return "alu"

@@ -197,7 +197,7 @@ def _advertise(node: Node, bag: Bag, how: PlayOptions) -> dict[str, Publisher]:
     there = [topic.name for topic in bag.topics]
     for name in how.topics or ():
         if name in bag.omitted and name not in there:
-            raise UsageError(f"{bag.path}: {name}: {bag.omitted[name]}")
+            raise UsageError(bag.omission([name]))
         if name not in there:
             hint = did_you_mean(name, there)
             raise UsageError(f"{bag.path} has no topic {name!r}{hint}; it has {choices(there)}")

@@ -145,18 +145,16 @@ class Bag:
         return sorted(name for name in names if not name.startswith(OF_THE_RUN))
 
     @property
-    def omitted(self) -> dict[str, str]:
-        """Topics of a run's trace with messages whose content is not recorded, and how to get it."""
-        counts = {
-            one.source.topic.removeprefix(OMITTED): one.messages
-            for one in self.connections
-            if one.source.topic.startswith(f"{OMITTED}/")
-        }
-        return {
-            topic: f"the content of {count} long messages is not recorded; "
-            f"volery simulate --record {topic} records it"
-            for topic, count in sorted(counts.items())
-        }
+    def omitted(self) -> dict[str, int]:
+        """Topics of a run's trace, and how many long messages without their content they have."""
+        counts = ((one.source.topic.removeprefix(OMITTED), one) for one in self.connections)
+        return {topic: one.messages for topic, one in counts if topic != one.source.topic}
+
+    def omission(self, topics: Collection[str]) -> str:
+        """Return how to get the content of long messages of *topics*, which are some of ``omitted``."""
+        found = ", ".join(f"{topic} ({self.omitted[topic]})" for topic in topics)
+        what = f"{self.path} has long messages without their content: {found}"
+        return f"{what}; volery simulate --record {','.join(topics)} records it"
 
     @property
     def differences(self) -> list[str]:

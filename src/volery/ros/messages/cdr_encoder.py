@@ -52,7 +52,12 @@ def abridged(message: Any) -> tuple[bytearray, int]:
     Nothing is missing of a message without an array of ``LONG`` bytes. Errors as of ``encode``.
     """
     out = bytearray(CDR_HEADER)
-    return out, appender(message.__msgtype__, abridging=True)(message, out)
+    return out, _abridging(message.__msgtype__)(message, out)
+
+
+@cache
+def _abridging(name: str) -> Append:
+    return appender(name, abridging=True)
 
 
 @cache

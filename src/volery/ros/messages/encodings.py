@@ -69,7 +69,10 @@ def abridged_cdr(message: Message) -> tuple[bytearray, int]:
 
 def encoded_size(message: Message) -> int:
     """Return the number of bytes of ``copied_to_cdr``; a value that does not fit raises as there."""
-    data, missing = abridged_cdr(message)
+    try:
+        data, missing = abridged(message)
+    except _MISFITS as error:
+        raise _misfit(message, error) from error
     return len(data) + missing
 
 

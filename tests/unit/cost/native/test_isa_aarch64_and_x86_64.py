@@ -92,6 +92,7 @@ def test_x86_reads_and_writes_memory_at_once():
         ("csel w0, w1, wzr, lt", "alu", {"x1", "flags"}, {"x0"}),
         ("scvtf d0, w1", "transfer", {"x1"}, {"v0"}),
         ("b.ne .LBB0_1", "branch", {"flags"}, set()),
+        ("clrex", "alu", set(), set()),
     ],
 )
 def test_a64(text, operation, reads, writes):
