@@ -265,7 +265,7 @@ class RunSession:
         return builder.build(options.fidelity, options.seed, options.traces)
 
     def _recorded(self, topic: str) -> Recorded:
-        """Return what is recorded of a topic that somebody publishes."""
+        """Return what is recorded of a topic when a node publishes it."""
         self._unpublished.discard(topic)
         if self._options.record == FULL or topic in self._options.record_topics:
             return Recorded.ALL
@@ -347,7 +347,7 @@ class RunSession:
         now, ending = self._kernel.now(), self._ending
         self._built.finish()
         self._fleet.record_states()
-        unpublished = (f"record {one}: nobody published this topic" for one in sorted(self._unpublished))
+        unpublished = (f"record {one}: no node published this topic" for one in sorted(self._unpublished))
         for warning in (*self._built.warnings(), *self._log.finish(), *unpublished):
             self._recording.stream(Text(now, WHO, WARNING, warning))
         for one in self._built.unserved():

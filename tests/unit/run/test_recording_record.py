@@ -150,7 +150,7 @@ def test_taps_get_long_messages_as_they_are_recorded(looking, tmp_path):
 
 def test_a_topic_that_nobody_publishes_is_named(looking, tmp_path):
     run = volery.simulate(looking, Options(out=tmp_path / "run", record="/image,/imege"))
-    assert "record /imege: nobody published this topic" in [
+    assert "record /imege: no node published this topic" in [
         one.text for one in read(tmp_path / "run" / "trace.mcap").events if isinstance(one, Text)
     ]
     assert run.completed
