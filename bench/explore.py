@@ -1,6 +1,6 @@
 """What a campaign costs beside the runs that it makes, and what it holds in memory.
 
-    python bench/explore.py [--runs 60] [--rows 100000] [--reference CHECKOUT]
+    python bench/explore.py [--runs 60] [--rows 100000] [--deliveries 10] [--reference CHECKOUT]
 
 Processor seconds, all processes of a campaign included. Rounds in this process and campaigns take turns, so
 both meet the same machine. `--reference` is a checkout of an older volery whose command is called for each
@@ -11,54 +11,35 @@ from __future__ import annotations
 
 import argparse
 import os
+import pickle
 import resource
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Executor, Future
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
-from typing import Any
 
-import numpy as np
 import pyarrow as pa
 
-from volery.explore.campaign import CampaignRequest, prepare
+from explore_stub import OBSERVABLES
+from volery.explore.campaign import Campaign, CampaignRequest, prepare
 from volery.explore.campaign_store import CampaignStore
-from volery.explore.executors import executors
 from volery.explore.points import Point, Row
+from volery.explore.run_process import Task
 from volery.explore.specification import run_seed
+from volery.kernel import virtual
 from volery.run.result import Options
 from volery.run.run_session import read_system
 from volery.run.simulate import simulate
+from volery.simulation.world.body_step import advance_bodies
 
-STARTER = Path(__file__).parents[1] / "examples" / "starter"
+EXAMPLES = Path(__file__).parents[1] / "examples"
+STARTER, DELIVERY = EXAMPLES / "starter", EXAMPLES / "delivery"
+STATED_S = {STARTER: 1.28, DELIVERY: 5.9}
+"""Processor seconds of a call of `volery simulate --record none` of commit 0001042e, plain Python."""
 TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
-OBSERVABLES = 51
-"""As many as a run of the starter has."""
-
-
-class Stub(Executor):
-    """Stands for an engine: makes a row at once, of numbers that depend on the seed."""
-
-    def __init__(self, address: str, workers: int) -> None:
-        self.workers = workers or 2
-
-    def submit(self, function: Any, /, *arguments: Any, **options: Any) -> Future[Any]:
-        (task,) = arguments
-        future: Future[Any] = Future()
-        values = np.random.default_rng(task.point.seed).random(OBSERVABLES)
-        observables = {f"subject.quantity_{place}": float(one) for place, one in enumerate(values)}
-        verdicts = {"landing": bool(values[0] < 0.97), "battery": True}
-        future.set_result(
-            Row(task.run, task.point, "completed", "", verdicts, observables, 100.0, 0.3, 0.3, "stub")
-        )
-        return future
-
-
-executors.add("stub", Stub)
 
 
 def descendants(pid: int) -> Iterator[int]:
@@ -82,10 +63,12 @@ def memory_mb(pid: int) -> tuple[float, float]:
     return sizes["Rss:"], sizes["Pss:"]
 
 
-def campaign_costs(folder: Path, runs: int, workers: int) -> tuple[float, float, tuple[float, float]]:
-    """Run a campaign of the starter. Return processor seconds, wall seconds, and memory of a worker."""
+def campaign_costs(
+    folder: Path, runs: int, workers: int, model: Path = STARTER
+) -> tuple[float, float, tuple[float, float]]:
+    """Run a campaign. Return processor seconds, wall seconds, and memory of a worker."""
     before, began = process_time(), perf_counter()
-    with prepare(CampaignRequest.of(STARTER, folder, workers=workers, seeds=runs)) as campaign:
+    with prepare(CampaignRequest.of(model, folder, workers=workers, seeds=runs)) as campaign:
         campaign.run(campaign.specification.run_points())
         wall = perf_counter() - began
         below = list(descendants(os.getpid()))
@@ -121,10 +104,10 @@ def overhead(runs: int, folder: Path) -> float:
     return median(plain)
 
 
-def against_command_line(runs: int, folder: Path, checkout: Path | None) -> None:
-    """Compare a campaign with one call of an older command for each run."""
-    used, _, _ = campaign_costs(folder / "whole", runs, 2)
-    each, source = 1.28, "stated"
+def against_command_line(model: Path, runs: int, folder: Path, checkout: Path | None, bound: float) -> float:
+    """Compare a campaign with one call of an older command for each run. Return its seconds for a run."""
+    used, _, _ = campaign_costs(folder / f"whole-{model.name}", runs, 2, model)
+    each, source = STATED_S[model], "stated"
     if checkout is not None:
         source = "measured"
         command = [
@@ -132,11 +115,11 @@ def against_command_line(runs: int, folder: Path, checkout: Path | None) -> None
             "-c",
             "from volery.cli.main import main; main()",
             "simulate",
-            str(checkout / "examples/starter"),
+            str(checkout / "examples" / model.name),
         ]
         environment = os.environ | {"PYTHONPATH": str(checkout / "src")}
         calls = []
-        for seed in range(1, 7):  # the first one compiles
+        for seed in range(1, 5):  # the first one compiles
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
             subprocess.run(
                 [*command, "--record", "none", "--seed", str(seed), "--quiet"],
@@ -148,9 +131,11 @@ def against_command_line(runs: int, folder: Path, checkout: Path | None) -> None
             calls.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
         each = median(calls[1:])
     print(
-        f"{runs} runs: {used:.1f} s of processor time, start included; by the command line of 0001042e "
-        f"{runs * each:.0f} s ({each:.2f} s each, {source}): 1/{runs * each / used:.1f} (bound: 1/6)"
+        f"{runs} runs of {model.name}: {used:.1f} s of processor time, start included; by the older command "
+        f"line {runs * each:.0f} s ({each:.2f} s each, {source}): 1/{runs * each / used:.1f} "
+        f"(bound: 1/{bound:g})"
     )
+    return used / runs
 
 
 def two_workers(runs: int, folder: Path) -> None:
@@ -165,25 +150,65 @@ def two_workers(runs: int, folder: Path) -> None:
     print(f"two workers are {walls[1] / walls[2]:.2f} times as fast as one (bound: 1.8)")
 
 
-def large_table(rows: int, folder: Path) -> None:
-    """Write, resume and read a table; each in a process, whose peak is printed."""
+def tier() -> str:
+    """Return what of volery is machine code here."""
+    compiled = not (virtual.__file__ or "").endswith(".py")
+    return (
+        f"physics: {'object code of a wheel' if advance_bodies.shipped else 'compiled by numba'}; "
+        f"events: {'compiled' if compiled else 'plain Python'}"
+    )
+
+
+def large_table(rows: int, folder: Path) -> float:
+    """Write, resume, report and read a table; each in a process, whose peak is printed.
+
+    Return processor seconds of the coordinator for a row.
+    """
+    step = f"explore(CampaignRequest.of({str(STARTER)!r}, {str(folder)!r}, on='stub', seeds="
+    opened = f"Campaign({str(folder)!r})"
     steps = {
-        "written": f"explore({str(STARTER)!r}, {str(folder)!r}, on='stub', seeds={rows}).close()",
-        "resumed": f"explore({str(STARTER)!r}, {str(folder)!r}, on='stub', seeds={rows + 1000}).close()",
-        "read": f"assert len(Campaign({str(folder)!r}).table()) == {rows + 1000}",
+        "written, with Parquet": f"{step}{rows})).close()",
+        "resumed, 1,000 more": f"{step}{rows + 1000})).close()",
+        "on the page": f"write_page({opened})",
+        "a run of it made again": f"{opened}.show({rows - 1}, {str(folder / 'again')!r})",
+        "as a data frame": f"assert len({opened}.table()) == {rows + 1000}",
     }
+    needed = []
     for what, code in steps.items():
         script = (
             f"import sys, resource; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
-            "import explore as bench\nfrom volery.explore.campaign import Campaign, explore\n"
-            "from time import perf_counter\n"
-            f"began = perf_counter(); {code}\n"
-            "print(perf_counter() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)"
+            "import explore_stub\nfrom volery.explore.campaign import Campaign, CampaignRequest, explore\n"
+            "from volery.explore.campaign_page import write_page\n"
+            "from time import process_time\n"
+            f"began = process_time(); {code}\n"
+            "print(process_time() - began, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)"
         )
         done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
         seconds, peak = map(float, done.stdout.split())
-        size = sum(one.stat().st_size for one in folder.iterdir()) / 1e6
-        print(f"{rows:,} rows (stub) {what}: {seconds:.1f} s, {peak:.0f} MB at most, folder {size:.0f} MB")
+        needed.append(seconds)
+        print(f"{rows:,} rows (stub) {what}: {seconds:.1f} s of processor time, {peak:.0f} MB at most")
+    for file in sorted(folder.iterdir()):
+        if file.is_file() and (size := file.stat().st_size) > 1e4:
+            print(f"  {file.name}: {size / 1e6:.1f} MB, {size / rows:.0f} bytes a row")
+    return needed[0] / rows
+
+
+def on_paper(delivery_s: float, row_s: float, deliveries: Path, runs: float = 1e6, cores: int = 1000) -> None:
+    """Say what a large campaign of deliveries costs by what was measured, and what is full first."""
+    with Campaign(deliveries) as campaign:
+        row = campaign.row(0)
+        task = Task(campaign.setting, row.run, row.point)
+    traffic, stored = len(pickle.dumps(task)) + len(pickle.dumps(row)), 8 * len(row.observables) + 100
+    wall_s = runs * delivery_s / cores
+    rate = runs / wall_s
+    print(
+        f"{runs:,.0f} deliveries on {cores:,} cores, on paper: {delivery_s:.2f} s each, "
+        f"{wall_s / 60:.0f} min, {rate:.0f} rows/s;\n"
+        f"  the coordinator needs {1e6 * row_s:.0f} µs a row, {rate * row_s:.0%} of a core: full at "
+        f"{cores / (rate * row_s):,.0f} cores;\n"
+        f"  {traffic:,} bytes a run on the network, {rate * traffic / 1e6:.1f} MB/s; some {stored:,} bytes a "
+        f"row on the disk, {runs * stored / 1e9:.1f} GB"
+    )
 
 
 def stores(rows: int, folder: Path) -> None:
@@ -221,15 +246,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--runs", type=int, default=60)
     parser.add_argument("--rows", type=int, default=100_000)
+    parser.add_argument("--deliveries", type=int, default=10)
     parser.add_argument("--reference", type=Path)
     options = parser.parse_args(arguments)
     with TemporaryDirectory() as made:
         folder = Path(made)
+        print(tier())
         overhead(options.runs, folder)
-        against_command_line(200, folder, options.reference)
+        against_command_line(STARTER, 200, folder, options.reference, 6.0)
+        delivery_s = against_command_line(DELIVERY, options.deliveries, folder, options.reference, 2.0)
         two_workers(options.runs, folder)
         stores(3000, folder)
-        large_table(options.rows, folder / "table")
+        row_s = large_table(options.rows, folder / "table")
+        on_paper(delivery_s, row_s, folder / f"whole-{DELIVERY.name}")
 
 
 if __name__ == "__main__":

@@ -11,11 +11,12 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import Executor, Future
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -307,7 +308,8 @@ class Campaign:
         if self._engine is None:
             self._engine = open_executor(self._on, self._workers)
         executor, workers = self._engine
-        waiting: dict[Future[Row], int] = {}
+        waiting = 0
+        done: SimpleQueue[Future[Row]] = SimpleQueue()  # `wait` would look at all that wait
         unfinished = self._store.unfinished()
         progress = _ProgressClock(self._store, self._show)
         finished: list[Row] = []
@@ -315,20 +317,21 @@ class Campaign:
         try:
             while True:
                 started = []
-                while (
-                    len(waiting) < AHEAD * workers and (task := _next_task(unfinished, setting)) is not None
-                ):
-                    waiting[executor.submit(execute, task)] = task.run
+                while waiting < AHEAD * workers and (task := _next_task(unfinished, setting)) is not None:
+                    executor.submit(execute, task).add_done_callback(done.put)
+                    waiting += 1
                     started.append(task.run)
                 self._store.record(finished, started)
                 progress.add(finished)
                 if not waiting:
                     return
-                done, _ = wait(waiting, LATEST_S, FIRST_COMPLETED)
                 finished = []
-                for one in done:
-                    del waiting[one]
-                    finished.append(self._result(one, finished))
+                with suppress(Empty):
+                    one = done.get(timeout=LATEST_S)
+                    while True:
+                        waiting -= 1
+                        finished.append(self._result(one, finished))
+                        one = done.get_nowait()
         except BaseException:
             self.leave_engine()
             raise
