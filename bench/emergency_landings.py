@@ -24,6 +24,7 @@ from volery.control.safety_switch import SwitchSettings
 from volery.kernel.waiting import sleep
 from volery.run.assembly.vehicles import VehicleSettings, open_vehicles
 from volery.run.go import ACTUATIONS, WAYS
+from volery.simulation.autopilots.autopilot import Autopilot
 from volery.vehicles import Drone
 
 NAME = "ardupilot"
@@ -123,8 +124,9 @@ def landed(by: str, phase: Phase, link: Link, known: float) -> Landed:
     kernel, fleet, drone = opened.kernel, opened.fleet, opened.vehicles[0]
     assert fleet is not None
     assert isinstance(drone, Drone)
-    vehicle, truth = fleet.autopilots[NAME].vehicle, fleet.flights[NAME].truth
-    switch = vehicle.rc.transmitter
+    autopilot, truth = fleet.autopilots[NAME], fleet.flights[NAME].truth
+    assert isinstance(autopilot, Autopilot)
+    vehicle, switch = autopilot.vehicle, autopilot.transmitter
     switch[SWITCH.channel - 1] = 1500
     moved = inf
     armed_at = ended = speed = highest = 0.0

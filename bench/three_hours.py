@@ -32,6 +32,7 @@ from volery.run.assembly.simulated_fleet import SimulatedFleet, fleet_of
 from volery.run.assembly.simulated_vehicles import SimulatedVehicle, parse_simulated
 from volery.run.assembly.vehicle_nodes import PrivateGraph, open_simulated_driver, reached_over_links
 from volery.run.recording import REPORT_FILE, Recording
+from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.mavlink.endpoint import MavlinkEndpoint
 from volery.trace.attachments import RunSetup, VehicleSetup
 from volery.trace.mcap_writer import TRACE_FILE
@@ -67,11 +68,11 @@ class Client:
 
     def on_link(self, kernel: VirtualKernel, fleet: SimulatedFleet, name: str) -> None:
         """Join on a link; a MAVLink autopilot is asked for all messages, Paparazzi sends them unasked."""
-        link, endpoint = fleet.link(name), fleet.autopilots[name].endpoint
+        link, autopilot = fleet.link(name), fleet.autopilots[name]
         link.receive(self.take)
-        if not isinstance(endpoint, MavlinkEndpoint):
+        if not (isinstance(autopilot, Autopilot) and isinstance(autopilot.endpoint, MavlinkEndpoint)):
             return
-        asked = iter(endpoint.firmware.telemetry.messages)
+        asked = iter(autopilot.endpoint.firmware.telemetry.messages)
 
         def beat() -> None:
             link.send(Frame("HEARTBEAT", HEARTBEAT, *STATION))

@@ -17,6 +17,7 @@ from typing import Annotated, Any, TypeVar
 from volery.base.errors import Location
 from volery.base.time import Ns
 from volery.model import rules
+from volery.model.airframes import FRAMES
 from volery.model.fields import (
     HEADING,
     NETWORK,
@@ -127,7 +128,26 @@ def _multirotors(reading: Reading) -> list[str]:
     ]
 
 
+USUAL_MOTORS = 4
+"""Motors of a multirotor without an airframe of the model's own."""
+
 MULTIROTOR = Reference("multirotor", _multirotors)
+
+
+class _Motor(Whole):
+    """Number of a motor of the vehicle that the fault names."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> int:
+        """See ``Syntax``."""
+        motor: int = super().read(node, path, reading)
+        fault = reading.root.at(path[:-1])
+        vehicle = fault.child("vehicle") if fault else None
+        where = ("environment", "vehicles", str(vehicle.value if vehicle else ""), "airframe", "frame")
+        frame = reading.root.at(where)
+        motors = FRAMES.get(str(frame.value), USUAL_MOTORS) if frame else USUAL_MOTORS
+        if motor > motors:
+            reading.problems.add(path, f"the vehicle has {motors} motors, no motor {motor}", node.where)
+        return motor
 
 
 @fault("motor-dead")
@@ -136,7 +156,7 @@ class MotorDead(VehicleFault):
     """A motor of a multirotor gives no thrust, or only a share of it."""
 
     vehicle: Annotated[str, MULTIROTOR, "The vehicle that it happens to."]
-    motor: Annotated[int, Whole(least=1, most=4), "Number of the motor."] = 1
+    motor: Annotated[int, _Motor(least=1), "Number of the motor, up to that of its frame."] = 1
     thrust: Annotated[float, SHARE, "Share of its thrust that is left."] = 0.0
 
 

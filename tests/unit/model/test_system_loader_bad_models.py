@@ -361,7 +361,7 @@ SPOILT = {
         ),
         "motor-dead",
         "environment.faults.f.motor",
-        ["5 is too much: at most 4"],
+        ["the vehicle has 4 motors, no motor 5"],
     ),
     "fault of an unknown computer": (
         ("  workload:", "  faults: {f: {kind: computer-stopped, processor: bord, at: 5 s}}\n  workload:"),

@@ -193,7 +193,7 @@ def simulate_faults(vehicle: Vehicle) -> None:
         vehicle.flight.offset_gps(there[0], there[1])
     vehicle.flight.block_gps(bool(wanted[0]))
     if vehicle.flies:
-        for motor in range(4):
+        for motor in range(vehicle.flight.rotors):
             weak = motor == round(wanted[1])
             vehicle.flight.weaken_motor(motor, min(1.0, max(0.0, wanted[2])) if weak else 1.0)
 

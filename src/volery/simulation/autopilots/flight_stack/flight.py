@@ -480,11 +480,14 @@ class Flight:
         """Inject a fault: a motor gives only a fraction of its thrust.
 
         Args:
-            motor: Index of the motor, 0 to 3.
+            motor: Index of the motor, from 0.
             health: Fraction of the thrust, 0..1.
+
+        Raises:
+            UsageError: There is no such motor, or the fraction is outside its range.
         """
-        if not 0 <= motor <= 3 or not 0.0 <= health <= 1.0:
-            raise UsageError(f"motor {motor} at {health}: motors are 0 to 3, health 0 to 1")
+        if not 0 <= motor < self.rotors or not 0.0 <= health <= 1.0:
+            raise UsageError(f"motor {motor} at {health}: motors are 0 to {self.rotors - 1}, health 0 to 1")
         self._world.set_input(self._body, U_MOTOR_HEALTH + motor, health)
 
     def to_ned(self, latitude: float, longitude: float, amsl: float) -> Vector:
