@@ -13,7 +13,8 @@ WIDTH, ROW, BOX, HEIGHT = 960, 84, 150, 38
 COLUMNS = {
     "cli": 2.3, "report": 0.3, "analysis": 1.0, "deploy": 1.65, "drawing": 2.95, "calibration": 2.3,
     "checks": 2.95, "explore": 1.0, "testing": 3.6, "run": 2.3, "components": 1.7, "bridge": 2.9,
-    "control": 0.6, "vehicles": 2.3, "simulation": 3.6, "links": 3.0, "ros": 2.6, "kernel": 2.6,
+    "control": 0.6, "autonomy": 1.1, "vehicles": 2.3, "simulation": 3.6, "links": 3.0, "ros": 2.6,
+    "kernel": 2.6,
     "requirements": 0.45, "exchange": 1.2, "model": 0.9, "cost": 1.75, "trace": 2.6, "base": 1.75,
 }  # fmt: skip
 """Horizontal places, 0 to 4, chosen so that arrows pass between the boxes. A new package needs one."""
