@@ -26,12 +26,13 @@ from numba import carray, cfunc, types  # type: ignore[attr-defined]  # numba do
 
 from volery.base.numeric_code import NumericCode, parsed
 from volery.cost.native.core_model import execute_blocks
+from volery.simulation.added_sensors.beams import cast_beams
 from volery.simulation.autopilots.flight_stack.flight_step import advance_flights
 from volery.simulation.autopilots.px4.loop_step import fly_px4_loops
 from volery.simulation.world.body_step import advance_bodies
 from volery.simulation.world.rasteriser import draw_picture
 
-ENTRY_POINTS = (advance_flights, advance_bodies, fly_px4_loops, execute_blocks, draw_picture)
+ENTRY_POINTS = (advance_flights, advance_bodies, fly_px4_loops, cast_beams, draw_picture, execute_blocks)
 
 ERROR_PATHS = """
 /* What numba's code calls where it raises an error; none does, since a division by zero gives an infinity. */

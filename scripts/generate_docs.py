@@ -381,6 +381,8 @@ def _value(one: dict[str, Any]) -> str:
 
 def _collection(one: dict[str, Any]) -> str:
     """Return how a list or a mapping is written; an empty text for anything else."""
+    if one.get("maxProperties") == 1:
+        return "one of " + ", ".join(f"`{key}`: {_value(below)}" for key, below in one["properties"].items())
     if "items" in one:
         return f"list of {_value(one['items'])}"
     if "patternProperties" in one:

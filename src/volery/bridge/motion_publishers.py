@@ -359,7 +359,7 @@ class PosePublisher:
 
 
 TF, TF_STATIC = "/tf", "/tf_static"
-_TF_MESSAGE = "tf2_msgs/msg/TFMessage"
+TF_MESSAGE = "tf2_msgs/msg/TFMessage"
 _SINGLE_VEHICLE = "/mavros"
 _HALF = sqrt(0.5)
 _NED_IN_ENU = (0.0, _HALF, _HALF, 0.0)
@@ -368,8 +368,8 @@ _FRD_IN_FLU = (0.0, 1.0, 0.0, 0.0)
 
 
 TRANSFORM_TOPICS = (
-    Topic(TF, _TF_MESSAGE, QoS(100), on_demand=True),
-    Topic(TF_STATIC, _TF_MESSAGE, LATCHED),
+    Topic(TF, TF_MESSAGE, QoS(100), on_demand=True),
+    Topic(TF_STATIC, TF_MESSAGE, LATCHED),
 )
 
 
@@ -396,8 +396,8 @@ class TransformPublisher:
             return
         self._static_sent = True
         pairs = ((MAP, f"{MAP}_ned", _NED_IN_ENU), (self._body, f"{self._body}_frd", _FRD_IN_FLU))
-        static = [_transform(at, parent, child, _ros_quaternion(turn)) for parent, child, turn in pairs]
-        self._publish(TF_STATIC, new(_TF_MESSAGE, transforms=static))
+        static = [transform(at, parent, child, ros_quaternion(turn)) for parent, child, turn in pairs]
+        self._publish(TF_STATIC, new(TF_MESSAGE, transforms=static))
 
     def _global(self, origin: frames.LocalFrame, fields: Fields, at: Ns) -> None:
         self._publish_pose(
@@ -410,16 +410,18 @@ class TransformPublisher:
     def _publish_pose(self, enu: frames.Vector, at: Ns) -> None:
         attitude = self._link.last("ATTITUDE")
         if attitude is not None and self._wanted(TF):
-            moving = _transform(at, MAP, self._body, orientation(attitude), enu)
-            self._publish(TF, new(_TF_MESSAGE, transforms=[moving]))
+            moving = transform(at, MAP, self._body, orientation(attitude), enu)
+            self._publish(TF, new(TF_MESSAGE, transforms=[moving]))
 
 
-def _ros_quaternion(quaternion: frames.Quaternion) -> Any:
+def ros_quaternion(quaternion: frames.Quaternion) -> Any:
+    """Return a ``geometry_msgs/msg/Quaternion`` of (w, x, y, z)."""
     w, x, y, z = quaternion
     return _quaternion(x, y, z, w)
 
 
-def _transform(at: Ns, parent: str, child: str, rotation: Any, place: frames.Vector = (0.0, 0.0, 0.0)) -> Any:
+def transform(at: Ns, parent: str, child: str, rotation: Any, place: frames.Vector = (0.0, 0.0, 0.0)) -> Any:
+    """Return a ``geometry_msgs/msg/TransformStamped`` of ROS time *at* in ns; *rotation* is a message."""
     made = new("geometry_msgs/msg/TransformStamped", header=stamped(at, parent), child_frame_id=child)
     made.transform.translation = _vector(*place)
     made.transform.rotation = rotation

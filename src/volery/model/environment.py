@@ -18,10 +18,11 @@ from volery.base.errors import Location, choices
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns
+from volery.model import rules
+from volery.model.added_sensors import ADDED_SENSOR, AddedSensor
 from volery.model.airframes import AIRFRAME, BATTERY, LOAD, MASS, Airframe, Battery
 from volery.model.faults import FAULT, Fault
 from volery.model.fields import (
-    ADDED_SENSOR,
     AUTOPILOT,
     DISTANCE,
     HEADING,
@@ -417,9 +418,9 @@ class Vehicle:
         "Grade of its sensors: `consumer`, or `rtk` with a satellite receiver to 2 cm.",
     ] = "consumer"
     added_sensors: Annotated[
-        tuple[str, ...],
+        tuple[AddedSensor | str, ...],
         ListOf(ADDED_SENSOR, bare=True),
-        "Sensors of installed packages that it carries as well, by their names.",
+        "Sensors that it carries as well: built-in ones, with settings or without, and those of packages.",
     ] = ()
     started: Annotated[
         str, OneOf(STARTS), "`warm`: estimator settled, satellites fixed. `cold`: just switched on."
@@ -493,6 +494,10 @@ class _Vehicle(Record):
         """See ``Syntax``. An airframe must be one that the autopilot flies, with the payload."""
         made: Vehicle = super().read(node, path, reading)
         problems, airframe = reading.problems, made.airframe
+        named = [one if isinstance(one, str) else one.named for one in made.added_sensors]
+        for name in sorted({name for name in named if named.count(name) > 1}):
+            what = f"two sensors are called {name!r}; give each a `name` of its own"
+            problems.add((*path, "added_sensors"), what, rule=rules.DUPLICATE_NAME)
         if made.kind != "multirotor" and airframe is not None:
             here = reading.where((*path, "airframe", "file"))
             problems.add(

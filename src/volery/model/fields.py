@@ -34,7 +34,7 @@ SHORT = "x-short"
 
 _LONGEST_SHOWN = 200
 """Characters of a value in a message."""
-_NAME = r"^[A-Za-z_][A-Za-z0-9_-]*$"
+NAME = r"^[A-Za-z_][A-Za-z0-9_-]*$"
 _UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s|m2|m|deg|coulomb|kg|ohm|v|w|j|b)$")
 
 
@@ -401,7 +401,7 @@ class MapOf(Syntax):
             raise expected("a mapping of keys", node)
         found = {}
         for name, one in node.items.items():
-            if not self.free and re.search(_NAME, name) is None:
+            if not self.free and re.search(NAME, name) is None:
                 what = f"{name!r} is no name: letters, digits, _ and -, starting with a letter"
                 reading.problems.add((*path, name), what, one.where, rules.BAD_NAME)
                 continue
@@ -413,7 +413,7 @@ class MapOf(Syntax):
     def schema(self, definitions: Schema) -> Schema:
         """See ``Syntax``."""
         item = self.item.schema(definitions)
-        below = {"additionalProperties": item} if self.free else {"patternProperties": {_NAME: item}}
+        below = {"additionalProperties": item} if self.free else {"patternProperties": {NAME: item}}
         return {"type": "object", **below, **({} if self.free else {"additionalProperties": False})}
 
 
@@ -657,6 +657,5 @@ HEADING = Angle(360.0, turn=True)
 VEHICLE = Reference("vehicle", lambda reading: reading.names(("environment", "vehicles")))
 PROCESSOR = Reference("processor", lambda reading: reading.names(("platform", "processors")))
 NETWORK = Reference("network", lambda reading: reading.names(("platform", "networks")))
-ADDED_SENSOR = Reference("sensor of an installed package", lambda reading: sorted(reading.vocabulary.sensors))
 AUTOPILOT = Reference("autopilot", lambda reading: sorted(reading.vocabulary.autopilots))
 PROCESSOR_KIND = Reference("processor in the catalogue", lambda reading: reading.vocabulary.processors)

@@ -15,6 +15,7 @@ from volery.base.time import to_seconds
 from volery.model.airframes import FRAMES, Airframe, Propellers
 from volery.model.airframes import Battery as BatteryModel
 from volery.model.environment import Vehicle
+from volery.run.assembly.mounted_sensors import sensors_of
 from volery.simulation.world.body_specs import (
     AIR_DENSITY,
     STANDARD_GRAVITY,
@@ -61,7 +62,7 @@ def body_of(vehicle: Vehicle) -> BodySpec:
         at=(vehicle.at.east_m, vehicle.at.north_m, 0.0),
         heading_deg=vehicle.heading_deg,
         sensors=vehicle.sensors,
-        added_sensors=vehicle.added_sensors,
+        added_sensors=tuple(sensors_of(vehicle)),
     )
     if not isinstance(body, Multirotor) or not vehicle.payload_kg:
         return body

@@ -45,7 +45,7 @@ from volery.run.assembly.component_ends import ComponentEnds
 from volery.run.assembly.computers import Platform, commanded_by, is_node
 from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.assembly.fences import fence_of
-from volery.run.assembly.sensor_node import serve_sensors
+from volery.run.assembly.sensor_node import SensorNode, frames_of
 from volery.run.assembly.vehicle_nodes import (
     ROSCOPTER_NAMES,
     NodeNames,
@@ -60,8 +60,7 @@ from volery.vehicles import Drone, Rover, Vehicle
 from volery.vehicles.driver import drivers
 
 if TYPE_CHECKING:
-    from volery.run.assembly.sensor_node import serve_sensors
-from volery.run.assembly.simulated_fleet import SimulatedFleet
+    from volery.run.assembly.simulated_fleet import SimulatedFleet
 
 
 class UnattendedVehicle:
@@ -465,7 +464,9 @@ class Builder:
         access = graph_access(self._autopilot(name), name)
         ros2 = any(model.component.language == "rclpy" for model in self._system.instances)
         serve_on_graph(self._graph, fleet, name, access, context, NodeNames(self._served[name], ros2))
-        serve_sensors(self._graph, fleet.flights[name], f"/{name}", context)
+        prefix = frames_of(self._system.vehicles).get(name, "")
+        vehicle = next(one for one in self._system.vehicles if one.name == name)
+        SensorNode(self._graph, fleet.flights[name], vehicle, context, prefix).serve()
 
 
 def with_executables(system: System) -> System:

@@ -1,55 +1,137 @@
-"""The node that publishes what the added sensors of a simulated vehicle measure: their drivers on board."""
+"""The node that publishes what the added sensors of a simulated vehicle measure: their drivers on board.
+
+Frames: sensors with a place on the body are below ``base_link`` (``/tf_static``), and odometry moves
+``base_link`` in ``odom`` (``/tf``). Where several vehicles share a graph the names of frames begin with
+``VEHICLE/``.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from volery.base.time import Ns, S
-from volery.bridge.node_interface import stamped
+from volery.base.frames import Quaternion, Vector, attitude_ned_to_enu, frd_to_flu, world_to_body
+from volery.base.time import S
+from volery.bridge.motion_publishers import TF, TF_MESSAGE, TF_STATIC, ros_quaternion, transform
+from volery.bridge.node_interface import BODY, stamped
 from volery.kernel.task import ExecutionContext
-from volery.ros.graph import DEFAULT, Node, Publisher, RosGraph
+from volery.model.added_sensors import Odometry
+from volery.model.environment import Vehicle
+from volery.ros.graph import DEFAULT, LATCHED, Node, QoS, RosGraph
 from volery.ros.messages import new
 
 if TYPE_CHECKING:
-    from volery.simulation.autopilots.flight_stack.flight import Flight
-    from volery.simulation.world.sensors import Sensor
+    from volery.simulation.autopilots.flight_stack.flight import Estimate, Flight
+    from volery.simulation.world.sensors import SampledSensor
 
 NODE = "sensors"
+ODOM = "odom"
+_ODOMETRY = "nav_msgs/msg/Odometry"
 
 
-def serve_sensors(graph: RosGraph, flight: Flight, namespace: str, context: ExecutionContext) -> None:
-    """Publish each sample of a vehicle's added sensors on ``NAMESPACE/NAME``, until the end of the run.
+def frames_of(vehicles: Sequence[Vehicle]) -> dict[str, str]:
+    """Return what the frames of each vehicle begin with: its name if several vehicles have such frames."""
+    framed = [one.name for one in vehicles if any(not isinstance(each, str) for each in one.added_sensors)]
+    return {name: f"{name}/" if len(framed) > 1 else "" for name in framed}
+
+
+class SensorNode(NamedTuple):
+    """The node of one vehicle's sensors.
 
     Args:
         graph: The graph.
         flight: The vehicle's flight.
-        namespace: Namespace of the vehicle, such as ``/drone_1``.
+        vehicle: The vehicle in the model.
         context: What the drivers' work is charged to: the computer on board.
+        prefix: What the names of its frames begin with.
     """
-    published = [sensor for sensor in flight.added_sensors() if sensor.type]
-    if not published:
-        return
-    kernel = graph.kernel
 
-    def run() -> None:
-        node = graph.node(NODE, namespace, context=context)
-        for sensor in published:
-            publisher = node.advertise(sensor.name, sensor.type, DEFAULT)
-            drive = partial(_drive, node, publisher, flight, sensor, graph.epoch)
-            kernel.spawn(drive, f"{context.component} ({sensor.name})", context, kernel.root)
+    graph: RosGraph
+    flight: Flight
+    vehicle: Vehicle
+    context: ExecutionContext
+    prefix: str = ""
 
-    kernel.spawn(run, f"{context.component} (sensors)", context, kernel.root)
+    def serve(self) -> None:
+        """Publish each sample of the vehicle's added sensors below ``/VEHICLE``, until the end of the run."""
+        sensors = self.flight.added_sensors()
+        drives = {one.name: partial(self._drive, sensor=one) for one in sensors if one.publications()}
+        for one in self.vehicle.added_sensors:
+            if isinstance(one, Odometry):
+                drives[one.named] = partial(self._drive_odometry, odometry=one)
+        if not drives:
+            return
+        kernel, context = self.graph.kernel, self.context
+
+        def run() -> None:
+            node = self.graph.node(NODE, f"/{self.vehicle.name}", context=context)
+            self._publish_places(node, sensors)
+            for name, drive in drives.items():
+                kernel.spawn(partial(drive, node), f"{context.component} ({name})", context, kernel.root)
+
+        kernel.spawn(run, f"{context.component} (sensors)", context, kernel.root)
+
+    def _publish_places(self, node: Node, sensors: Sequence[SampledSensor]) -> None:
+        """Publish where the sensors are on the body; late subscriptions receive it from the graph."""
+        at = self.graph.epoch
+        places = [
+            transform(at, f"{self.prefix}{BODY}", f"{self.prefix}{one.frame}", ros_quaternion(turn), place)
+            for one in sensors
+            if one.mounting is not None
+            for place, turn in (one.mounting,)
+        ]
+        if places:
+            node.advertise(TF_STATIC, TF_MESSAGE, LATCHED).publish(new(TF_MESSAGE, transforms=places))
+
+    def _drive(self, node: Node, sensor: SampledSensor) -> None:
+        """Publish the samples of one sensor as they come."""
+        advertised = [(one, node.advertise(one.topic, one.type, DEFAULT)) for one in sensor.publications()]
+        rate = node.rate(sensor.period)
+        while not node.closed:
+            rate.sleep()
+            sample = self.flight.measurement(sensor.name)
+            for publication, publisher in advertised:
+                message = new(publication.type)
+                if hasattr(message, "header"):
+                    message.header = stamped(self.graph.epoch + sample.time, f"{self.prefix}{sensor.frame}")
+                publication.fill(message, sample.values)
+                publisher.publish(message)
+
+    def _drive_odometry(self, node: Node, odometry: Odometry) -> None:
+        """Publish where the vehicle is by its own reckoning, also as a transform."""
+        publisher = node.advertise(odometry.topic("odom"), _ODOMETRY, DEFAULT)
+        transforms = node.advertise(TF, TF_MESSAGE, QoS(100))
+        parent, child = f"{self.prefix}{ODOM}", f"{self.prefix}{BODY}"
+        rate = node.rate(round(S / odometry.rate_hz))
+        while not node.closed:
+            rate.sleep()
+            if odometry.of_autopilot:
+                estimate = self.flight.estimate()
+                if not estimate.position_ok:
+                    continue
+                time, found = estimate.time, _reckoned(estimate)
+            else:
+                time, found = self.flight.measurement(odometry.named)
+            at = self.graph.epoch + time
+            position, attitude, velocity, rates = found
+            turn = ros_quaternion(attitude)
+            message = new(_ODOMETRY, header=stamped(at, parent), child_frame_id=child)
+            pose, twist = message.pose.pose, message.twist.twist
+            pose.position.x, pose.position.y, pose.position.z = position
+            pose.orientation = turn
+            twist.linear.x, twist.linear.y, twist.linear.z = velocity
+            twist.angular.x, twist.angular.y, twist.angular.z = rates
+            publisher.publish(message)
+            moved = transform(at, parent, child, turn, position)
+            transforms.publish(new(TF_MESSAGE, transforms=[moved]))
 
 
-def _drive(node: Node, publisher: Publisher, flight: Flight, sensor: Sensor, epoch: Ns) -> None:
-    """Publish the samples of one sensor as they come."""
-    rate = node.rate(round(S / sensor.rate))
-    while not node.closed:
-        rate.sleep()
-        sample = flight.measurement(sensor.name)
-        message = new(sensor.type)
-        if hasattr(message, "header"):
-            message.header = stamped(epoch + sample.time, sensor.name)
-        sensor.fill(message, sample.values)
-        publisher.publish(message)
+def _reckoned(estimate: Estimate) -> tuple[Vector, Quaternion, Vector, Vector]:
+    """Return position east, north, up of the world's origin, attitude, and velocity and rates of the body."""
+    north, east, down = (
+        here + start for here, start in zip(estimate.position, estimate.origin_ned, strict=True)
+    )
+    velocity = frd_to_flu(world_to_body(estimate.quaternion, estimate.velocity))
+    attitude = attitude_ned_to_enu(estimate.quaternion)
+    return (east, north, -down), attitude, velocity, frd_to_flu(estimate.rates)

@@ -18,7 +18,7 @@ from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.simulation.world.dynamics import CELL_FULL_VOLTS, battery_current
 from volery.simulation.world.environment_models import GUST_EVERY, Wind, magnetic_field
-from volery.simulation.world.sensors import fill_sensor_parameters, sensor_suite
+from volery.simulation.world.sensors import SampledSensor, fill_sensor_parameters, sensor_suite
 from volery.simulation.world.state_layout import (
     MULTIROTOR,
     P_CAPACITY,
@@ -199,7 +199,7 @@ class Multirotor:
         at: Initial position east, north, up about the world's origin [m]; the height is the ground's.
         heading_deg: Initial heading, clockwise from north [degrees].
         sensors: Name of the sensor suite.
-        added_sensors: Names of sensors of the entry point group ``volery.sensors`` that are mounted.
+        added_sensors: Sensors that are mounted; those of the entry points ``volery.sensors`` by their names.
         battery: The battery.
         mass: Mass [kg].
         inertia: Principal moments of inertia about forward, left, up [kg m^2].
@@ -224,7 +224,7 @@ class Multirotor:
     at: Vector = (0.0, 0.0, 0.0)
     heading_deg: float = 0.0
     sensors: str = "consumer"
-    added_sensors: tuple[str, ...] = ()
+    added_sensors: tuple[str | SampledSensor, ...] = ()
     battery: Battery = Battery()
     mass: float = 3.0
     inertia: Vector = (0.040, 0.040, 0.089)
@@ -336,7 +336,7 @@ class Rover:
         at: Initial position east, north, up about the world's origin [m]; the height is the ground's.
         heading_deg: Initial heading, clockwise from north [degrees].
         sensors: Name of the sensor suite.
-        added_sensors: Names of sensors of the entry point group ``volery.sensors`` that are mounted.
+        added_sensors: Sensors that are mounted; those of the entry points ``volery.sensors`` by their names.
         battery: The battery.
         mass: Mass [kg].
         wheelbase: Distance between the axles [m].
@@ -357,7 +357,7 @@ class Rover:
     at: Vector = (0.0, 0.0, 0.0)
     heading_deg: float = 0.0
     sensors: str = "consumer"
-    added_sensors: tuple[str, ...] = ()
+    added_sensors: tuple[str | SampledSensor, ...] = ()
     battery: Battery = Battery(capacity_ah=10.0)
     mass: float = 8.0
     wheelbase: float = 0.4

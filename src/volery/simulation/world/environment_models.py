@@ -116,7 +116,7 @@ def magnetic_field(frame: LocalFrame) -> Vector:
 
 # --- terrain ---
 
-_HALF_CURVATURE = 0.5 / 6_371_008.8  # of the earth's mean radius (IUGG) [1/m]
+HALF_CURVATURE = 0.5 / 6_371_008.8  # of the earth's mean radius (IUGG) [1/m]
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,7 @@ def _relief(heights: Array, grid: Array, east: float, north: float) -> float:
 @numeric
 def ground_height(heights: Array, grid: Array, east: float, north: float) -> float:
     """Return the height of the ground over the plane that touches the globe at the world's origin [m]."""
-    drop = (east * east + north * north) * _HALF_CURVATURE
+    drop = (east * east + north * north) * HALF_CURVATURE
     if heights.size == 1:
         level: float = heights[0, 0] - drop
         return level

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from volery.base.errors import UsageError
 from volery.base.numeric_code import numeric
-from volery.simulation.world.environment_models import Terrain
+from volery.simulation.world.environment_models import HALF_CURVATURE, Terrain, ground_height
 from volery.simulation.world.state_layout import Array
 
 MARGIN = 3.0
@@ -31,6 +31,8 @@ _STEP = 0.5  # [m] what begins less above the ground stands on it: the ground fo
 _BOXED = 32  # edges in a row share a bounding box: a polygon of thousands of corners is searched by boxes
 _ROUNDING = 1.0 + 1e-9  # on a distance: an edge that is as near as another one but for rounding is looked at
 _SPARE = 0.01  # [m] by which a ray passes a box whose edges it cannot meet
+_LEAST_SHARE = 1e-4  # of a ray's reach: it looks for the ground in steps of at least as much
+_HALVINGS = 40  # that find where between two steps a ray meets the ground
 _ON_TOP = 0.02  # [m] a body's centre below a top by less is on the solid, not beside it
 
 # Columns of a solid's row.
@@ -180,7 +182,12 @@ def _arrays(solids: Sequence[Solid]) -> SceneArrays:
                 near[line * columns + column].append(index)
     starts = np.cumsum([len(near) + 1, *map(len, near)])
     cells = np.array([*starts, *(index for one in near for index in one)], dtype=np.int64)
-    return SceneArrays(rows, np.array([*edges, *boxes]), cells, np.array((west, south, side, columns, lines)))
+    return SceneArrays(
+        rows,
+        np.array([*edges, *boxes], dtype=np.float64),
+        cells,
+        np.array((west, south, side, columns, lines)),
+    )
 
 
 @numeric
@@ -396,3 +403,47 @@ def cast_ray(scene: SceneArrays, ray: Ray, reach: float) -> float:
         else:
             line, next_y = line + step_y, next_y + each_y
     return nearest
+
+
+@numeric
+def _clearance(heights: Array, grid: Array, ray: Ray, length: float) -> float:
+    """Return the height of a point of a ray over the ground [m]."""
+    east, north = ray.east + length * ray.to_east, ray.north + length * ray.to_north
+    return ray.up + length * ray.to_up - ground_height(heights, grid, east, north)
+
+
+@numeric
+def _level_distance(above: float, ray: Ray) -> float:
+    """Return how far a ray from *above* level ground [m] goes until it meets it: it curves with the globe."""
+    square = (ray.to_east * ray.to_east + ray.to_north * ray.to_north) * HALF_CURVATURE
+    slope = ray.to_up + 2.0 * HALF_CURVATURE * (ray.east * ray.to_east + ray.north * ray.to_north)
+    root = slope * slope - 4.0 * square * above
+    return 2.0 * above / (sqrt(root) - slope) if slope < 0.0 <= root else inf
+
+
+@numeric
+def ground_distance(heights: Array, grid: Array, ray: Ray, reach: float) -> float:
+    """Return how far a ray goes until it meets the ground [m]; infinity if it does not within *reach*.
+
+    Over posts of heights it looks four times between two of them: a narrower ridge is missed.
+    """
+    above = _clearance(heights, grid, ray, 0.0)
+    if above <= 0.0:
+        return 0.0
+    if heights.size == 1:
+        length = _level_distance(above, ray)
+        return length if length <= reach else inf
+    across = sqrt(ray.to_east * ray.to_east + ray.to_north * ray.to_north)
+    step = max(0.25 * grid[2] / across if across > 0.0 else reach, reach * _LEAST_SHARE)
+    far = 0.0
+    while far < reach:
+        near, far = far, min(far + step, reach)
+        if _clearance(heights, grid, ray, far) <= 0.0:
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (near + far)
+                if _clearance(heights, grid, ray, middle) > 0.0:
+                    near = middle
+                else:
+                    far = middle
+            return far
+    return inf

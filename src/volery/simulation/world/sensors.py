@@ -14,7 +14,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from math import sqrt
 from typing import Any, ClassVar, NamedTuple
 
@@ -26,7 +27,7 @@ from volery.base.frames import Quaternion, Vector
 from volery.base.installed import Registry
 from volery.base.numeric_code import numeric
 from volery.base.seeds import key
-from volery.base.time import Ns
+from volery.base.time import Ns, S
 from volery.simulation.world.arithmetic import gaussian
 from volery.simulation.world.scene import Scene
 from volery.simulation.world.state_layout import (
@@ -301,22 +302,51 @@ class SensorInput(NamedTuple):
     scene: Scene
 
 
-@dataclass(frozen=True)
-class Sensor(ABC):
-    """A sensor that a package adds: derive from it, and name an instance in the group ``volery.sensors``.
+class Mounting(NamedTuple):
+    """Where a sensor is on a body.
 
-    With a ``type`` of messages, each sample is published on the topic ``/VEHICLE/NAME`` by a node on the
-    vehicle's computer, where components read it.
+    Args:
+        at: Its place from the body's centre: forward, left, up [m].
+        turn: Quaternion (w, x, y, z) from its axes to the body's.
+    """
+
+    at: Vector = (0.0, 0.0, 0.0)
+    turn: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+
+class Publication(NamedTuple):
+    """What is published of each sample.
+
+    Args:
+        topic: Name of the topic, below that of the vehicle.
+        type: ROS type of the messages, such as ``sensor_msgs/msg/Range``.
+        fill: ``fill(message, values)`` writes a sample into a new message, whose header is there already.
+    """
+
+    topic: str
+    type: str
+    fill: Callable[[Any, Any], None]
+
+
+Sampler = Callable[[SensorInput, int], Any]
+"""``sampler(state, k)`` returns what a sensor measures at grid step *k*; it is called in their order."""
+
+
+@dataclass(frozen=True)
+class SampledSensor(ABC):
+    """Something on a body that is sampled at a rate. ``Sensor`` is the one for laws written in Python.
 
     Args:
         name: Name by which the sensor is mounted and read.
-        error: Error of each measured component, in the component's unit.
         rate: Samples per second [Hz]; samples lie on the world's grid of 2 ms.
+        mounting: Where it is on the body; ``None``: not stated, and no transform tells of it.
+        topic: Topic of its messages, below that of the vehicle; its name if it is empty.
     """
 
     name: str
-    error: ErrorModel
     rate: float
+    mounting: Mounting | None = field(default=None, kw_only=True)
+    topic: str = field(default="", kw_only=True)
 
     type: ClassVar[str] = ""
     """ROS type of its messages, such as ``sensor_msgs/msg/Range``; empty: no node publishes it."""
@@ -327,6 +357,52 @@ class Sensor(ABC):
                 f"sensor {self.name}: a rate of {self.rate} Hz; give one up to {1.0 / STEP_S:g} Hz"
             )
 
+    @property
+    def every(self) -> int:
+        """Number of grid steps from one sample to the next."""
+        return round(1.0 / (self.rate * STEP_S))
+
+    @property
+    def period(self) -> Ns:
+        """Time from one sample to the next [ns]."""
+        return self.every * round(STEP_S * S)
+
+    @property
+    def frame(self) -> str:
+        """Frame of its messages."""
+        return self.name
+
+    @abstractmethod
+    def sampler(self, noise: np.uint64, scene: Scene) -> Sampler:
+        """Return what takes the samples on one body, with their errors.
+
+        Args:
+            noise: Key of this sensor's noise on this body: a draw is a function of it and the grid step.
+            scene: What stands in the world.
+        """
+
+    def fill(self, message: Any, values: Any) -> None:
+        """Write a reading into a new message of ``type``. Its header is there already."""
+        raise NotImplementedError(f"sensor {self.name}: a sensor with a type of messages fills them")
+
+    def publications(self) -> tuple[Publication, ...]:
+        """Return what is published of each sample."""
+        return (Publication(self.topic or self.name, self.type, self.fill),) if self.type else ()
+
+
+@dataclass(frozen=True)
+class Sensor(SampledSensor):
+    """A sensor that a package adds: derive from it, and name an instance in the group ``volery.sensors``.
+
+    With a ``type`` of messages, each sample is published on the topic ``/VEHICLE/NAME`` by a node on the
+    vehicle's computer, where components read it.
+
+    Args:
+        error: Error of each measured component, in the component's unit.
+    """
+
+    error: ErrorModel
+
     @abstractmethod
     def ideal(self, state: SensorInput) -> tuple[float, ...]:
         """Return the measured components without error: a pure function of *state*."""
@@ -335,35 +411,23 @@ class Sensor(ABC):
         """Return the reading for *values* with errors: override it to saturate or to quantise."""
         return values
 
-    def fill(self, message: Any, values: tuple[float, ...]) -> None:
-        """Write a reading into a new message of ``type``. Its header is there already."""
-        raise NotImplementedError(f"sensor {self.name}: a sensor with a type of messages fills them")
+    def sampler(self, noise: np.uint64, scene: Scene) -> Sampler:
+        """Return what adds white noise and a bias to each component."""
+        return _NoisySampler(self, noise)
 
 
-class Measurement(NamedTuple):
-    """One sample of an added sensor: time of its grid step [ns], and its components."""
+class _NoisySampler:
+    """Takes the samples of one sensor on one body: ideal components with white noise and bias."""
 
-    time: Ns
-    values: tuple[float, ...]
-
-
-class MountedSensor:
-    """One added sensor on one body: takes its samples in order and keeps the last."""
-
-    def __init__(self, sensor: Sensor, seed: int, body: int) -> None:
-        self.sensor = sensor
-        self._key = np.uint64(key(seed, f"world/body/{body}/sensor/{sensor.name}"))
-        self._every = round(1.0 / (sensor.rate * STEP_S))
-        self._decay = sensor.error.decay(self._every * STEP_S)
+    def __init__(self, sensor: Sensor, noise: np.uint64) -> None:
+        self._sensor = sensor
+        self._key = noise
+        self._decay = sensor.error.decay(sensor.every * STEP_S)
         self._bias: list[float] = []
-        self.next_step = 0
-        """Grid step of the next sample."""
-        self.last = Measurement(0, ())
 
-    def sample(self, state: SensorInput) -> None:
-        """Take the sample of ``next_step``, at which *state* is the body's."""
-        k, error = self.next_step, self.sensor.error
-        ideal = self.sensor.ideal(state)
+    def __call__(self, state: SensorInput, k: int) -> tuple[float, ...]:
+        error = self._sensor.error
+        ideal = self._sensor.ideal(state)
         gain = error.bias_sigma * (sqrt(1.0 - self._decay * self._decay) if self._bias else 1.0)
         before = self._bias or [0.0] * len(ideal)
         with np.errstate(over="ignore"):  # hashes wrap around
@@ -373,11 +437,34 @@ class MountedSensor:
             value + bias + error.white_sigma * draw
             for value, bias, draw in zip(ideal, self._bias, draws[1::2], strict=True)
         )
-        self.last = Measurement(state.time, self.sensor.output(noisy))
-        self.next_step = k + self._every
+        return self._sensor.output(noisy)
 
 
-sensors: Registry[SensorSuite | Sensor] = Registry("volery.sensors", "sensor")
+class Measurement(NamedTuple):
+    """One sample of an added sensor: time of its grid step [ns], and its components."""
+
+    time: Ns
+    values: Any
+
+
+class MountedSensor:
+    """One added sensor on one body: takes its samples in order and keeps the last."""
+
+    def __init__(self, sensor: SampledSensor, seed: int, body: int, scene: Scene) -> None:
+        self.sensor = sensor
+        noise = np.uint64(key(seed, f"world/body/{body}/sensor/{sensor.name}"))
+        self._sample = sensor.sampler(noise, scene)
+        self.next_step = 0
+        """Grid step of the next sample."""
+        self.last = Measurement(0, ())
+
+    def sample(self, state: SensorInput) -> None:
+        """Take the sample of ``next_step``, at which *state* is the body's."""
+        self.last = Measurement(state.time, self._sample(state, self.next_step))
+        self.next_step += self.sensor.every
+
+
+sensors: Registry[SensorSuite | SampledSensor] = Registry("volery.sensors", "sensor")
 """Sensor suites and sensors of other packages."""
 
 
@@ -398,7 +485,7 @@ def sensor_suite(name: str) -> SensorSuite:
     return found
 
 
-def added_sensor(name: str) -> Sensor:
+def added_sensor(name: str) -> SampledSensor:
     """Return the sensor that a package registered as *name*.
 
     Raises:
@@ -409,7 +496,7 @@ def added_sensor(name: str) -> Sensor:
         others = f"there is {choices(names)}" if names else "no installed package provides one"
         raise UsageError(f"no sensor named {name!r}{did_you_mean(name, names)}; {others}")
     found = sensors.load(name)
-    if not isinstance(found, Sensor):
+    if not isinstance(found, SampledSensor):
         raise UsageError(f"{name!r} is a suite of sensors: give it as the vehicle's sensors")
     return found
 

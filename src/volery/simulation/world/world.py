@@ -23,7 +23,13 @@ from volery.simulation.world.body_specs import BodySpec, fill_parameters, fill_s
 from volery.simulation.world.body_step import advance_bodies
 from volery.simulation.world.environment_models import Wind
 from volery.simulation.world.scene import Scene
-from volery.simulation.world.sensors import Measurement, MountedSensor, Sensor, SensorInput, added_sensor
+from volery.simulation.world.sensors import (
+    Measurement,
+    MountedSensor,
+    SampledSensor,
+    SensorInput,
+    added_sensor,
+)
 from volery.simulation.world.state_layout import (
     ACTIVE_STEPS,
     OCTETS,
@@ -205,7 +211,12 @@ class World:
         self._advance = advance.bind(*self.arrays)
         self._pending: dict[int, deque[_PendingInput]] = {}
         self._mounted = {
-            body: {name: MountedSensor(added_sensor(name), seed, body) for name in spec.added_sensors}
+            body: {
+                sensor.name: MountedSensor(sensor, seed, body, self.scene)
+                for sensor in (
+                    added_sensor(one) if isinstance(one, str) else one for one in spec.added_sensors
+                )
+            }
             for body, spec in enumerate(self.specs)
             if spec.added_sensors
         }
@@ -296,8 +307,8 @@ class World:
         self.advance_to_now(body)
         return mounted[sensor].last
 
-    def added_sensors(self, body: int) -> tuple[Sensor, ...]:
-        """Return the sensors that packages have added to *body*."""
+    def added_sensors(self, body: int) -> tuple[SampledSensor, ...]:
+        """Return the sensors that are added to *body*."""
         return tuple(mounted.sensor for mounted in self._mounted.get(body, {}).values())
 
     def _catch_up(self, step: int) -> None:

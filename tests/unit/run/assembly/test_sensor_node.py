@@ -1,4 +1,4 @@
-"""A sensor that a package adds is read by components: typed messages on a topic, of the scene."""
+"""Added sensors are read by components: typed messages on topics, of the scene."""
 
 from __future__ import annotations
 
@@ -101,3 +101,70 @@ def test_a_sensor_that_no_package_provides_is_an_error_of_the_model(tmp_path):
     (tmp_path / "model.yaml").write_text(MODEL.format(language="rospy", sensor="ahaed"))
     with pytest.raises(ModelError, match=r"model\.yaml:\d+.*ahaed.*did you mean 'ahead'"):
         simulate(tmp_path / "model.yaml", Options(out=None))
+
+
+MAPPING = {
+    "rospy": """
+import rospy, tf2_ros
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+def scan(message):
+    ranges = message.ranges
+    rospy.loginfo("scan %s %d %.2f %s", message.header.frame_id, len(ranges), ranges[180], ranges[0])
+    if transforms.can_transform("odom", message.header.frame_id, rospy.Time(0)):
+        found = transforms.lookup_transform("odom", message.header.frame_id, rospy.Time(0)).transform
+        rospy.loginfo("tf %.2f %.2f", found.translation.x, found.translation.z)
+def moved(message):
+    place = message.pose.pose.position
+    rospy.loginfo("odom %s %s %.2f", message.header.frame_id, message.child_frame_id, place.x)
+if __name__ == "__main__":
+    rospy.init_node("watch")
+    transforms = tf2_ros.Buffer()
+    listener = tf2_ros.TransformListener(transforms)
+    rospy.Subscriber("/rover_1/scan", LaserScan, scan)
+    rospy.Subscriber("/rover_1/odom", Odometry, moved)
+    rospy.spin()
+""",
+    "rclpy": """
+import rclpy, tf2_ros
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import LaserScan
+def scan(message):
+    ranges, frame = message.ranges, message.header.frame_id
+    node.get_logger().info(f"scan {frame} {len(ranges)} {ranges[180]:.2f} {ranges[0]}")
+    if transforms.can_transform("odom", frame, rclpy.time.Time()):
+        found = transforms.lookup_transform("odom", frame, rclpy.time.Time()).transform.translation
+        node.get_logger().info(f"tf {found.x:.2f} {found.z:.2f}")
+def moved(message):
+    place = message.pose.pose.position
+    node.get_logger().info(f"odom {message.header.frame_id} {message.child_frame_id} {place.x:.2f}")
+if __name__ == "__main__":
+    rclpy.init()
+    node = rclpy.create_node("watch")
+    transforms = tf2_ros.Buffer()
+    listener = tf2_ros.TransformListener(transforms, node)
+    node.create_subscription(LaserScan, "/rover_1/scan", scan, 10)
+    node.create_subscription(Odometry, "/rover_1/odom", moved, 10)
+    rclpy.spin(node)
+""",
+}
+LIDAR = "[{lidar: {beams: 360, range: 30 m, noise: 0 m, at: [0.5, 0, 0.5]}}, {odometry: {drift: 0 deg/min}}]"
+
+
+@pytest.mark.parametrize("language", ["rospy", "rclpy"])
+def test_a_component_reads_scan_odometry_and_transforms(language, tmp_path):
+    (tmp_path / "watch.py").write_text(MAPPING[language])
+    (tmp_path / "model.yaml").write_text(MODEL.format(language=language, sensor=LIDAR))
+    run = simulate(tmp_path / "model.yaml", Options(out=None, log=LogOptions(tmp_path / "log.txt")))
+    assert run.ok, run.record.outcome
+    lines = (tmp_path / "log.txt").read_text().splitlines()
+    heard = [line.split("watch: ")[1].split() for line in lines if "watch: " in line]
+    scans, moves, transforms = (
+        [one[1:] for one in heard if one[0] == kind] for kind in ("scan", "odom", "tf")
+    )
+    assert len(scans) == pytest.approx(19, abs=2)
+    assert {tuple(one) for one in scans} == {("lidar", "360", "19.48", "inf")}  # the tank, 0.5 m nearer
+    assert len(moves) == pytest.approx(59, abs=3)
+    assert {tuple(one) for one in moves} == {("odom", "base_link", "0.00")}
+    assert len(transforms) > 15
+    assert {one[0] for one in transforms} == {"0.50"}

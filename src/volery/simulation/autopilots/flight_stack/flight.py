@@ -48,7 +48,7 @@ from volery.simulation.world.body_specs import BodySpec, Multirotor
 from volery.simulation.world.dynamics import cell_voltage
 from volery.simulation.world.environment_models import Wind
 from volery.simulation.world.scene import Scene
-from volery.simulation.world.sensors import Measurement, Sensor, Sigma, declared_sigma, sensor_suite
+from volery.simulation.world.sensors import Measurement, SampledSensor, Sigma, declared_sigma, sensor_suite
 from volery.simulation.world.state_layout import (
     P_CELLS,
     P_MASS,
@@ -315,8 +315,8 @@ class Flight:
         """Return how the body last hit something that stands in the world; ``None``: it has not."""
         return self._world.last_collision(self._body)
 
-    def added_sensors(self) -> tuple[Sensor, ...]:
-        """Return the sensors that packages have added; read them by ``measurement``."""
+    def added_sensors(self) -> tuple[SampledSensor, ...]:
+        """Return the sensors that are added to the body; read them by ``measurement``."""
         return self._world.added_sensors(self._body)
 
     def truth(self) -> Truth:

@@ -1,0 +1,215 @@
+"""The catalogue of sensors that a model adds to a vehicle: which there are, with which settings. Data only.
+
+One class per kind declares its settings; parser, JSON Schema and reference follow. What a sensor of each kind
+measures is in ``volery.simulation.added_sensors``, and ``volery.run.assembly.mounted_sensors`` makes one of
+the settings.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeVar
+
+from volery.base import units
+from volery.model.fields import (
+    HEADING,
+    LENGTH,
+    NAME,
+    SHARE,
+    TEXT,
+    Key,
+    ListOf,
+    Quantity,
+    Record,
+    Schema,
+    Syntax,
+    Whole,
+    WrongValueError,
+    expected,
+)
+from volery.model.reading import Reading
+from volery.model.text import Node, Path
+
+MOST_BEAMS = 1_000_000
+_RATE = Quantity(units.RATE, above=0, most=500)
+_RANGE = Quantity(units.LENGTH, above=0, most=100_000)
+_NOISE = Quantity(units.LENGTH, least=0)
+_NEAREST = Quantity(units.LENGTH, least=0)
+
+
+class _Point(Syntax):
+    """Three lengths: forward, left and up."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> tuple[float, ...]:
+        """See ``Syntax``. The values are in metres."""
+        found = ListOf(LENGTH).read(_in_metres(node), path, reading)
+        if len(found) != 3:
+            raise WrongValueError(f"three lengths are expected (forward, left, up), not {len(found)}")
+        return found
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": "array", "items": LENGTH.schema(definitions), "minItems": 3, "maxItems": 3}
+
+
+def _in_metres(node: Node) -> Node:
+    if not isinstance(node.value, list):
+        return node
+    bare = [isinstance(one.value, int | float) and not isinstance(one.value, bool) for one in node.value]
+    return Node(
+        [
+            Node(f"{one.value!r} m", one.where) if number else one
+            for one, number in zip(node.value, bare, strict=True)
+        ],
+        node.where,
+    )
+
+
+class _Name(Syntax):
+    """A name of a topic and a frame."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> str:
+        """See ``Syntax``."""
+        name = TEXT.read(node, path, reading)
+        if re.search(NAME, name) is None:
+            raise WrongValueError(f"{name!r} is no name: letters, digits, _ and -, starting with a letter")
+        return name
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": "string", "pattern": NAME}
+
+
+@dataclass(frozen=True, kw_only=True)
+class AddedSensor:
+    """A sensor that a model adds to a vehicle. ``kind`` is the name of the kind."""
+
+    kind = ""
+
+    name: Annotated[
+        str,
+        _Name(),
+        "Its name and that of its frame, where a vehicle has several of a kind: its topics are then below "
+        "`/<vehicle>/<name>/`.",
+    ] = ""
+
+    @property
+    def named(self) -> str:
+        """Its name: by default that of its kind."""
+        return self.name or self.kind
+
+    def topic(self, usual: str) -> str:
+        """Return a topic below the vehicle's, given its usual one."""
+        return f"{self.name}/{usual}" if self.name else usual
+
+
+@dataclass(frozen=True, kw_only=True)
+class MountedSensor(AddedSensor):
+    """A sensor at a place of the body."""
+
+    at: Annotated[
+        tuple[float, ...], _Point(), "Where it is: metres forward, left and up of the body's centre."
+    ] = (0.0, 0.0, 0.0)
+    heading_deg: Annotated[float, HEADING, "Where it looks, clockwise from ahead."] = 0.0
+
+
+ADDED_SENSORS: dict[str, type[AddedSensor]] = {}
+"""The kinds, by name."""
+
+C = TypeVar("C", bound=type[AddedSensor])
+
+
+def added_sensor(kind: str) -> Callable[[C], C]:
+    """Register a class of the catalogue under the name of its *kind*."""
+
+    def register(cls: C) -> C:
+        cls.kind = kind
+        ADDED_SENSORS[kind] = cls
+        return cls
+
+    return register
+
+
+@added_sensor("lidar")
+@dataclass(frozen=True, kw_only=True)
+class Lidar(MountedSensor):
+    """A laser scanner in a plane: `sensor_msgs/LaserScan` on `scan`."""
+
+    beams: Annotated[int, Whole(least=2, most=MOST_BEAMS), "Number of its beams."] = 360
+    field_deg: Annotated[
+        float, Quantity(units.ANGLE, above=0, most=360), "Angle that they cover, half of it to each side."
+    ] = 360.0
+    range_m: Annotated[float, _RANGE, "Longest distance that it measures."] = 12.0
+    nearest_m: Annotated[float, _NEAREST, "Shortest distance that it measures."] = 0.1
+    rate_hz: Annotated[float, _RATE, "Scans a second."] = 10.0
+    noise_m: Annotated[float, _NOISE, "Standard deviation of a distance."] = 0.01
+    lost: Annotated[float, SHARE, "Share of the beams that return nothing though they meet something."] = 0.0
+
+
+@added_sensor("odometry")
+@dataclass(frozen=True, kw_only=True)
+class Odometry(AddedSensor):
+    """Where the vehicle is by its own reckoning: `nav_msgs/Odometry` on `odom`, and on `/tf`.
+
+    Without `drift` and `scale` it is the autopilot's estimate. With one of them it is that of wheels or a
+    camera, which needs no satellites.
+    """
+
+    rate_hz: Annotated[float, _RATE, "Messages a second."] = 30.0
+    drift_deg_s: Annotated[
+        float | None,
+        Key("drift"),
+        Quantity(units.TURN_RATE),
+        "How fast its heading turns away from the true one, anticlockwise.",
+    ] = None
+    scale: Annotated[
+        float | None,
+        Quantity(units.RATIO, above=-1, most=1),
+        "How much too long it takes every way to be; too short if negative.",
+    ] = None
+
+    @property
+    def of_autopilot(self) -> bool:
+        """Whether it is the autopilot's estimate."""
+        return self.drift_deg_s is None and self.scale is None
+
+
+class _AnySensor(Syntax):
+    """A kind of the catalogue, alone or with its settings, or the name of a sensor of a package."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+        """See ``Syntax``."""
+        packages = sorted(reading.vocabulary.sensors)
+        if isinstance(node.value, str):
+            kind, settings, where = node.value, Node({}, node.where), path
+        elif isinstance(node.value, dict) and len(node.items) == 1:
+            ((kind, settings),) = node.items.items()
+            where = (*path, kind)
+        else:
+            raise expected("the name of a sensor, or one name with its settings,", node)
+        if not reading.known(path, kind, "sensor", [*ADDED_SENSORS, *packages]):
+            raise WrongValueError("")
+        if kind not in ADDED_SENSORS:
+            if settings.value:
+                raise WrongValueError(f"{kind} is of a package and takes no settings: write its name alone")
+            return kind
+        if settings.value is None:
+            settings = Node({}, settings.where)
+        return Record(ADDED_SENSORS[kind]).read(settings, where, reading)
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        kinds = {
+            kind: {"anyOf": [Record(cls).schema(definitions), {"type": "null"}]}
+            for kind, cls in ADDED_SENSORS.items()
+        }
+        mapping = {
+            "type": "object", "properties": kinds, "minProperties": 1, "maxProperties": 1,
+            "additionalProperties": False,
+        }  # fmt: skip
+        return {"anyOf": [{"type": "string"}, mapping]}
+
+
+ADDED_SENSOR = _AnySensor()
