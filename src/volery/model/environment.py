@@ -49,6 +49,7 @@ from volery.model.fields import (
     WrongValueError,
     read_child,
 )
+from volery.model.floor_plan import FLOOR_PLAN, FloorPlan
 from volery.model.prices import PRICE, Price
 from volery.model.reading import Reading
 from volery.model.resources import POWER
@@ -580,6 +581,11 @@ class Environment:
         PRISMS,
         "What stands in the world and can be hit: buildings, walls, bridges (with a floor).",
     ] = ()
+    floor_plan: Annotated[
+        FloorPlan | None,
+        FLOOR_PLAN,
+        "Walls from a picture, beside the buildings; its axes are east and north.",
+    ] = None
     wind: Annotated[Wind, Shorter(Record(Wind), key="speed"), "Wind over all of the world."] = Wind()
     vehicles: Annotated[
         tuple[Vehicle, ...], MapOf(_Vehicle(Vehicle), values_only=True), "Drones and rovers, by name."
@@ -595,6 +601,18 @@ class Environment:
     faults: Annotated[
         tuple[Fault, ...], MapOf(FAULT, values_only=True), "What breaks, and when. See the list of faults."
     ] = ()
+
+    @property
+    def solids(self) -> tuple[Prism, ...]:
+        """Return the buildings and the walls of the floor plan."""
+        plan = self.floor_plan
+        if plan is None:
+            return self.buildings
+        walls = (
+            Prism(f"{plan.name}_{number}", corners, 0.0, plan.height_m)
+            for number, corners in enumerate(plan.walls, 1)
+        )
+        return *self.buildings, *walls
 
     def places_with(self, role: str) -> tuple[Place, ...]:
         """Return the places of one role, in the order of the model."""

@@ -162,7 +162,7 @@ def scenery_of(environment: Environment) -> Scenery:
         corridors=tuple(_lines(environment.corridors)),
         areas=(
             *(_area(zone, "no-fly") for zone in environment.no_fly_zones),
-            *(_area(building, "building") for building in environment.buildings),
+            *(_area(building, "building") for building in environment.solids),
         ),
     )
 

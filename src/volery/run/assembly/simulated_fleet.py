@@ -237,7 +237,7 @@ def _ids(names: Sequence[str], stated: Mapping[str, int]) -> dict[str, int]:
 
 def surroundings_of(environment: Environment) -> Surroundings:
     """Return the world of a model's environment."""
-    scene = Scene(_solids(environment.buildings), _solids(environment.no_fly_zones))
+    scene = Scene(_solids(environment.solids), _solids(environment.no_fly_zones))
     return Surroundings(environment.origin, environment.wind, scene)
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from rigs.hovering_autopilot import HoveringFamily
 from volery import Options, simulate
@@ -13,8 +15,14 @@ from volery.base.frames import LocalFrame
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
 from volery.model.environment import Place, Vehicle, Wind
-from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings
+from volery.model.system_loader import load
+from volery.run.assembly.model_checks import vocabulary
+from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings, surroundings_of
+from volery.simulation.added_sensors.beams import Ranging
+from volery.simulation.added_sensors.lidar import Lidar
 from volery.simulation.autopilots.fleet_autopilot import firmwares
+from volery.simulation.world.scene import Cylinder, contact
+from volery.simulation.world.sensors import SensorInput
 
 
 @pytest.fixture
@@ -68,3 +76,29 @@ def test_those_that_were_made_end_where_a_later_one_is_refused(hovering):
     with pytest.raises(UsageError, match="hovering autopilots do not drive"):
         _fleet("multirotor", "rover")
     assert [one.closed for one in hovering.made] == [1]
+
+
+def test_beams_and_bodies_meet_the_walls_of_a_floor_plan(tmp_path):
+    random = np.random.default_rng(5)
+    cells = random.random((60, 80)) < 0.03
+    cells[[0, -1], :] = cells[:, [0, -1]] = True
+    cells[25:35, 35:45] = False
+    Image.fromarray(np.where(cells[::-1], 0, 254).astype(np.uint8)).save(tmp_path / "hall.png")
+    (tmp_path / "hall.yaml").write_text("image: hall.png\nresolution: 0.2\norigin: [-8.0, -6.0, 0]\n")
+    text = MODEL.replace("hovering", "ardupilot").replace("  vehicles", "  floor_plan: hall.yaml\n  vehicles")
+    (tmp_path / "model.yaml").write_text(text)
+    scene = surroundings_of(load(tmp_path, vocabulary()).environment).scene
+    lidar = Lidar("lidar", 10.0, Ranging(0.0, 30.0), 90, 2.0 * np.pi)
+    angles = np.arctan2(lidar.beams()[:, 1], lidar.beams()[:, 0])
+    still = (0.0, 0.0, 0.0)
+    state = SensorInput(0, (0.031, 0.057, 1.0), still, (1.0, 0.0, 0.0, 0.0), still, still, still, 0.0, scene)
+    found = lidar.sampler(np.uint64(0), scene)(state, 0)
+    along = np.arange(0.0, 12.0, 0.001)
+    for angle, distance in zip(angles, found, strict=True):
+        rows = ((along * np.sin(angle) + 6.057) / 0.2).astype(int)
+        columns = ((along * np.cos(angle) + 8.031) / 0.2).astype(int)
+        first = along[cells[np.clip(rows, 0, 59), np.clip(columns, 0, 79)].argmax()]
+        assert distance == pytest.approx(first, abs=0.01)
+    west, *_ = contact(scene.arrays, Cylinder(-7.6, 0.1, 0.9, 1.0, 1.1, 0.3))
+    assert scene.solids[west].name.startswith("hall_")
+    assert contact(scene.arrays, Cylinder(0.0, 0.0, 0.9, 1.0, 1.1, 0.3))[0] == -1
