@@ -55,17 +55,17 @@ def _compose(digest: str) -> Callable[..., int]:
     def cast_beams(  # noqa: PLR0913, PLR0917  # arrays of the scene, of the fan and of the sensor
         solids: Array, edges: Array, cells: NDArray[np.int64], lattice: Array, outlines: Array,
         heights: Array, grid: Array,
-        rays: Array, places: NDArray[np.int64], starts: NDArray[np.int64],
+        rays: Array, order: NDArray[np.int64], starts: NDArray[np.int64],
         beams: Array, limits: Array, pose: Array, keys: NDArray[np.uint64], step: NDArray[np.int64],
         readings: Array,
     ) -> int:  # fmt: skip
-        scene, fan = SceneArrays(solids, edges, cells, lattice), RayFan(rays, places, starts)
+        scene, fan = SceneArrays(solids, edges, cells, lattice), RayFan(rays, order, starts)
         cast_fan(fan, Around(scene, outlines, heights, grid), beams, pose, limits[_MOST])
         each = beams.shape[0] // readings.shape[0]
         for reading in range(readings.shape[0]):
             nearest = inf
             for beam in range(reading * each, (reading + 1) * each):
-                nearest = min(nearest, rays[places[beam], LENGTH])
+                nearest = min(nearest, rays[beam, LENGTH])
             readings[reading] = _reading(nearest, limits, keys[0], reading, step[0])
         return 1 if digest else 0
 
@@ -107,22 +107,24 @@ class Ranging:
             raise UsageError(f"{self}: give a standard deviation of at least 0 and a share from 0 to 1")
 
 
-class _BeamSampler:
+class BeamSampler:
     """Takes the samples of one beam sensor on one body."""
 
     def __init__(self, sensor: BeamSensor, noise: np.uint64, scene: Scene) -> None:
         beams = sensor.beams()
         self._mounting = sensor.mounting or Mounting()
         self._pose, self._step = np.zeros(12), np.zeros(1, dtype=np.int64)
-        self._readings = np.zeros(len(beams) // sensor.beams_each)
+        self.readings = np.zeros(len(beams) // sensor.beams_each)
+        """The readings of the last sample [m]."""
         ranging = sensor.ranging
         limits = np.zeros(_LIMITS)
         limits[:] = ranging.least, ranging.most, ranging.sigma, ranging.lost
         heights, grid = scene.terrain.arrays()
         keys = np.array([noise], dtype=np.uint64)
-        ends = beams, limits, self._pose, keys, self._step, self._readings
+        ends = beams, limits, self._pose, keys, self._step, self.readings
         where = *scene.arrays, outlines_of(scene), heights, grid
-        self._cast = cast_beams.bind(*where, *new_fan(len(beams)), *ends)
+        self.cast = cast_beams.bind(*where, *new_fan(len(beams)), *ends)
+        """Takes the last sample once more."""
 
     def __call__(self, state: SensorInput, k: int) -> Array:
         """Return a new array of readings [m]."""
@@ -132,8 +134,8 @@ class _BeamSampler:
         axes = [body_to_world(turn, axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
         self._pose[3:] = np.array(axes).T.reshape(-1)
         self._step[0] = k
-        self._cast()
-        return self._readings.copy()
+        self.cast()
+        return self.readings.copy()
 
 
 @dataclass(frozen=True)
@@ -153,6 +155,6 @@ class BeamSensor(SampledSensor):
     def beams(self) -> Array:
         """Return unit vectors forward, left, up of the sensor (beams, 3)."""
 
-    def sampler(self, noise: np.uint64, scene: Scene) -> _BeamSampler:
+    def sampler(self, noise: np.uint64, scene: Scene) -> BeamSampler:
         """See ``SampledSensor``."""
-        return _BeamSampler(self, noise, scene)
+        return BeamSampler(self, noise, scene)

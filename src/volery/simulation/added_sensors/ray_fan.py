@@ -35,18 +35,18 @@ _SECTORS = 1024  # into which directions are sorted, at most
 _SLACK = 1e-9  # of a side's length: no ray slips through between two sides
 
 # Columns of a ray.
-TO_EAST, TO_NORTH, TO_UP, LENGTH, COLUMNS = range(5)
+TO_EAST, TO_NORTH, TO_UP, LENGTH, SECTOR, COLUMNS = range(6)
 
 
 class RayFan(NamedTuple):
-    """The rays of one sample, sorted; ``begin_fan`` fills it.
+    """The rays of one sample; ``cast_fan`` fills it.
 
-    ``rays`` (rays, 4): unit vector east, north, up, and how far it goes; ``places`` (rays): the row of each
-    beam; ``starts`` (sectors + 1): the first row of each sector.
+    ``rays`` (rays, 5): unit vector east, north, up, how far it goes, and its sector; ``order`` (rays): their
+    rows, sorted by sectors; ``starts`` (sectors + 1): where in ``order`` each sector begins.
     """
 
     rays: Array
-    places: NDArray[np.int64]
+    order: NDArray[np.int64]
     starts: NDArray[np.int64]
 
 
@@ -105,72 +105,94 @@ def _sector(x: float, y: float, sectors: int) -> int:
 @numeric
 def _begin(fan: RayFan, beams: Array, pose: Array, reach: float) -> None:
     """Turn *beams* into the world and sort them by counting."""
-    rays, places, starts = fan
+    rays, order, starts = fan
     sectors = starts.shape[0] - 1
     for sector in range(sectors + 1):
         starts[sector] = 0
     for beam in range(beams.shape[0]):
         x, y, z = beams[beam, 0], beams[beam, 1], beams[beam, 2]
-        sector = _sector(
-            pose[3] * x + pose[4] * y + pose[5] * z, pose[6] * x + pose[7] * y + pose[8] * z, sectors
-        )
-        places[beam] = sector
+        east, north = pose[3] * x + pose[4] * y + pose[5] * z, pose[6] * x + pose[7] * y + pose[8] * z
+        sector = _sector(east, north, sectors)
+        rays[beam, TO_EAST], rays[beam, TO_NORTH] = east, north
+        rays[beam, TO_UP] = pose[9] * x + pose[10] * y + pose[11] * z
+        rays[beam, LENGTH], rays[beam, SECTOR] = reach, sector
         starts[sector] += 1
     for sector in range(sectors):
         starts[sector + 1] += starts[sector]
-    for beam in range(beams.shape[0]):
-        x, y, z = beams[beam, 0], beams[beam, 1], beams[beam, 2]
-        starts[places[beam]] -= 1
-        place = starts[places[beam]]
-        places[beam] = place
-        rays[place, TO_EAST] = pose[3] * x + pose[4] * y + pose[5] * z
-        rays[place, TO_NORTH] = pose[6] * x + pose[7] * y + pose[8] * z
-        rays[place, TO_UP] = pose[9] * x + pose[10] * y + pose[11] * z
-        rays[place, LENGTH] = reach
+    for beam in range(beams.shape[0] - 1, -1, -1):
+        sector = int(rays[beam, SECTOR])
+        starts[sector] -= 1
+        order[starts[sector]] = beam
 
 
 @numeric
-def _meet_side(rays: Array, rows: tuple[int, int], side: Corners, low: float, high: float) -> None:
+def _meet_side(
+    rays: Array, order: NDArray[np.int64], rows: tuple[int, int], side: Corners, band: tuple[float, float]
+) -> None:
     """End rays where they meet a side that is between two heights over their start, if it is nearer."""
     x, y = side.right_east, side.right_north
     dx, dy = side.left_east - x, side.left_north - y
     twice = x * dy - y * dx
     for at in range(rows[0], rows[1]):
-        east, north = rays[at, TO_EAST], rays[at, TO_NORTH]
+        ray = order[at]
+        east, north = rays[ray, TO_EAST], rays[ray, TO_NORTH]
         across = east * dy - north * dx
         along = x * north - y * east
         if across > 0.0 and -_SLACK * across <= along <= across * (1.0 + _SLACK):
             length = twice / across
-            if length < rays[at, LENGTH] and low <= length * rays[at, TO_UP] <= high:
-                rays[at, LENGTH] = length
+            if length < rays[ray, LENGTH] and band[0] <= length * rays[ray, TO_UP] <= band[1]:
+                rays[ray, LENGTH] = length
 
 
 @numeric
-def _meet_level(
-    rays: Array, rows: tuple[int, int], scene: SceneArrays, solid: int, level: float, pose: Array
+def _meet_sides(
+    fan: RayFan, outlines: Array, edges: tuple[int, int], pose: Array, band: tuple[float, float]
 ) -> None:
+    """End the rays that meet the sides of a solid: those that are turned to their start."""
+    rays, order, starts = fan
+    east, north, sectors = pose[0], pose[1], starts.shape[0] - 1
+    for edge in range(edges[0], edges[1]):
+        right_east, right_north = outlines[edge, 0] - east, outlines[edge, 1] - north
+        left_east, left_north = outlines[edge, 2] - east, outlines[edge, 3] - north
+        if right_east * left_north > right_north * left_east:
+            side = Corners(right_east, right_north, left_east, left_north)
+            first, last = _sector(right_east, right_north, sectors), _sector(left_east, left_north, sectors)
+            if first <= last:
+                _meet_side(rays, order, (starts[first], starts[last + 1]), side, band)
+            else:
+                _meet_side(rays, order, (starts[first], starts[sectors]), side, band)
+                _meet_side(rays, order, (0, starts[last + 1]), side, band)
+
+
+@numeric
+def _meet_level(fan: RayFan, scene: SceneArrays, solid: int, level: float, pose: Array) -> None:
     """End rays where they meet the top or the underside of a solid, if it is nearer."""
+    rays, order, starts = fan
+    row, sectors = scene.solids[solid], starts.shape[0] - 1
+    west, south, east, north = (
+        row[WEST] - pose[0],
+        row[SOUTH] - pose[1],
+        row[EAST] - pose[0],
+        row[NORTH] - pose[1],
+    )
+    first, last = 0, sectors - 1
+    if west > 0.0 or south > 0.0 or east < 0.0 or north < 0.0:
+        side = _widest(west, south, east, north)
+        first = _sector(side.right_east, side.right_north, sectors)
+        last = _sector(side.left_east, side.left_north, sectors)
+    count = starts[last + 1] - starts[first]
+    if first > last:
+        count += starts[sectors]
     height = level - pose[2]
-    for at in range(rows[0], rows[1]):
-        rise = rays[at, TO_UP]
+    for number in range(count):
+        ray = order[(starts[first] + number) % rays.shape[0]]
+        rise = rays[ray, TO_UP]
         if rise * height > 0.0:
             length = height / rise
-            if length < rays[at, LENGTH] and is_over(
-                scene, solid, pose[0] + length * rays[at, TO_EAST], pose[1] + length * rays[at, TO_NORTH]
+            if length < rays[ray, LENGTH] and is_over(
+                scene, solid, pose[0] + length * rays[ray, TO_EAST], pose[1] + length * rays[ray, TO_NORTH]
             ):
-                rays[at, LENGTH] = length
-
-
-@numeric
-def _rows_between(fan: RayFan, side: Corners) -> tuple[int, int, int]:
-    """Return the rows of rays between two corners: those before the first, and the second to the third."""
-    starts = fan.starts
-    sectors = starts.shape[0] - 1
-    first = _sector(side.right_east, side.right_north, sectors)
-    last = _sector(side.left_east, side.left_north, sectors)
-    if first <= last:
-        return 0, starts[first], starts[last + 1]
-    return starts[last + 1], starts[first], starts[sectors]
+                rays[ray, LENGTH] = length
 
 
 @numeric
@@ -186,45 +208,22 @@ def _widest(west: float, south: float, east: float, north: float) -> Corners:
 
 
 @numeric
-def _meet_solid(
-    fan: RayFan, scene: SceneArrays, outlines: Array, solid: int, pose: Array, reach: float
-) -> bool:
-    """End the rays that meet a solid; return whether they begin inside of it."""
-    row = scene.solids[solid]
-    east, north, up = pose[0], pose[1], pose[2]
-    west, south = row[WEST] - east, row[SOUTH] - north
-    to_east, to_north = row[EAST] - east, row[NORTH] - north
-    beside, beyond = max(west, -to_east, 0.0), max(south, -to_north, 0.0)
-    low, high = row[FLOOR] - up, row[CEILING] - up
-    apart = max(low, -high, 0.0)
-    if beside * beside + beyond * beyond + apart * apart > reach * reach:
-        return False
-    if apart == 0.0 and is_over(scene, solid, east, north):
-        return True
-    for edge in range(int(row[FIRST_EDGE]), int(row[END_EDGE])):
-        side = Corners(
-            outlines[edge, 0] - east,
-            outlines[edge, 1] - north,
-            outlines[edge, 2] - east,
-            outlines[edge, 3] - north,
-        )
-        if side.right_east * side.left_north > side.right_north * side.left_east:  # turned to the point
-            head, first, end = _rows_between(fan, side)
-            _meet_side(fan.rays, (0, head), side, low, high)
-            _meet_side(fan.rays, (first, end), side, low, high)
-    if apart > 0.0:
-        level = row[FLOOR] if low > 0.0 else row[CEILING]
-        head, first, end = 0, 0, fan.rays.shape[0]
-        if beside > 0.0 or beyond > 0.0:
-            head, first, end = _rows_between(fan, _widest(west, south, to_east, to_north))
-        _meet_level(fan.rays, (0, head), scene, solid, level, pose)
-        _meet_level(fan.rays, (first, end), scene, solid, level, pose)
-    return False
+def _meet_ground(rays: Array, around: Around, pose: Array, reach: float) -> None:
+    """End the rays that meet the ground; a ray that has met nothing within *reach* becomes infinite."""
+    level = around.heights.size == 1
+    above = pose[2] - around.heights[0, 0]  # over level ground, which is nowhere higher
+    for at in range(rays.shape[0]):
+        length = rays[at, LENGTH]
+        if not level or above + length * rays[at, TO_UP] <= 0.0:
+            ray = Ray(pose[0], pose[1], pose[2], rays[at, TO_EAST], rays[at, TO_NORTH], rays[at, TO_UP])
+            rays[at, LENGTH] = min(length, ground_distance(around.heights, around.grid, ray, length))
+        if rays[at, LENGTH] >= reach:
+            rays[at, LENGTH] = inf
 
 
 @numeric
 def cast_fan(fan: RayFan, around: Around, beams: Array, pose: Array, reach: float) -> None:
-    """Cast all rays of a fan; ``fan.rays[fan.places[i], LENGTH]`` is then how far beam *i* goes.
+    """Cast all rays of a fan; ``fan.rays[i, LENGTH]`` is then how far beam *i* goes.
 
     Args:
         fan: Where the rays are kept.
@@ -234,13 +233,22 @@ def cast_fan(fan: RayFan, around: Around, beams: Array, pose: Array, reach: floa
         reach: Length after which a ray ends [m]; a ray that meets nothing has infinite length.
     """
     _begin(fan, beams, pose, reach)
-    rays = fan.rays
-    for solid in range(around.scene.solids.shape[0]):
-        if _meet_solid(fan, around.scene, around.outlines, solid, pose, reach):
+    rays, scene = fan.rays, around.scene
+    solids, outlines = scene.solids, around.outlines
+    east, north, up = pose[0], pose[1], pose[2]
+    for solid in range(solids.shape[0]):
+        beside = max(solids[solid, WEST] - east, east - solids[solid, EAST], 0.0)
+        beyond = max(solids[solid, SOUTH] - north, north - solids[solid, NORTH], 0.0)
+        low, high = solids[solid, FLOOR] - up, solids[solid, CEILING] - up
+        apart = max(low, -high, 0.0)
+        if beside * beside + beyond * beyond + apart * apart > reach * reach:
+            continue
+        if beside + beyond + apart == 0.0 and is_over(scene, solid, east, north):
             for at in range(rays.shape[0]):
                 rays[at, LENGTH] = 0.0
             return
-    for at in range(rays.shape[0]):
-        ray = Ray(pose[0], pose[1], pose[2], rays[at, TO_EAST], rays[at, TO_NORTH], rays[at, TO_UP])
-        ground = ground_distance(around.heights, around.grid, ray, rays[at, LENGTH])
-        rays[at, LENGTH] = min(ground, rays[at, LENGTH] if rays[at, LENGTH] < reach else inf)
+        edges = int(solids[solid, FIRST_EDGE]), int(solids[solid, END_EDGE])
+        _meet_sides(fan, outlines, edges, pose, (low, high))
+        if apart > 0.0:
+            _meet_level(fan, scene, solid, up + (low if low > 0.0 else high), pose)
+    _meet_ground(rays, around, pose, reach)
