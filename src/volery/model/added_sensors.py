@@ -19,6 +19,7 @@ from volery.model.fields import (
     NAME,
     SHARE,
     TEXT,
+    Angle,
     Key,
     ListOf,
     Quantity,
@@ -35,6 +36,8 @@ from volery.model.text import Node, Path
 MOST_BEAMS = 1_000_000
 _RATE = Quantity(units.RATE, above=0, most=500)
 _RANGE = Quantity(units.LENGTH, above=0, most=100_000)
+_PITCH = Angle(90.0)
+_CONE = Quantity(units.ANGLE, above=0, most=120)
 _NOISE = Quantity(units.LENGTH, least=0)
 _NEAREST = Quantity(units.LENGTH, least=0)
 
@@ -113,6 +116,18 @@ class MountedSensor(AddedSensor):
         tuple[float, ...], _Point(), "Where it is: metres forward, left and up of the body's centre."
     ] = (0.0, 0.0, 0.0)
     heading_deg: Annotated[float, HEADING, "Where it looks, clockwise from ahead."] = 0.0
+    pitch_deg: Annotated[float, _PITCH, "How far it looks down: 90 deg is straight down, -90 deg up."] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class RangingSensor(MountedSensor):
+    """A sensor of distances."""
+
+    range_m: Annotated[float, _RANGE, "Longest distance that it measures."] = 12.0
+    nearest_m: Annotated[float, _NEAREST, "Shortest distance that it measures."] = 0.1
+    rate_hz: Annotated[float, _RATE, "Samples a second."] = 10.0
+    noise_m: Annotated[float, _NOISE, "Standard deviation of a distance."] = 0.01
+    lost: Annotated[float, SHARE, "Share of the readings that find nothing though something is there."] = 0.0
 
 
 ADDED_SENSORS: dict[str, type[AddedSensor]] = {}
@@ -134,18 +149,67 @@ def added_sensor(kind: str) -> Callable[[C], C]:
 
 @added_sensor("lidar")
 @dataclass(frozen=True, kw_only=True)
-class Lidar(MountedSensor):
+class Lidar(RangingSensor):
     """A laser scanner in a plane: `sensor_msgs/LaserScan` on `scan`."""
 
     beams: Annotated[int, Whole(least=2, most=MOST_BEAMS), "Number of its beams."] = 360
     field_deg: Annotated[
         float, Quantity(units.ANGLE, above=0, most=360), "Angle that they cover, half of it to each side."
     ] = 360.0
-    range_m: Annotated[float, _RANGE, "Longest distance that it measures."] = 12.0
-    nearest_m: Annotated[float, _NEAREST, "Shortest distance that it measures."] = 0.1
-    rate_hz: Annotated[float, _RATE, "Scans a second."] = 10.0
-    noise_m: Annotated[float, _NOISE, "Standard deviation of a distance."] = 0.01
-    lost: Annotated[float, SHARE, "Share of the beams that return nothing though they meet something."] = 0.0
+
+
+@added_sensor("lidar3d")
+@dataclass(frozen=True, kw_only=True)
+class RingLidar(RangingSensor):
+    """A laser scanner with several rings, one above the other: `sensor_msgs/PointCloud2` on `points`."""
+
+    rings: Annotated[int, Whole(least=1, most=256), "Number of its rings."] = 16
+    columns: Annotated[int, Whole(least=2, most=4096), "Number of beams of a ring."] = 900
+    lowest_deg: Annotated[float, _PITCH, "Elevation of the lowest ring."] = -15.0
+    highest_deg: Annotated[float, _PITCH, "Elevation of the highest ring."] = 15.0
+    range_m: Annotated[float, _RANGE, "Longest distance that it measures."] = 100.0
+
+
+@added_sensor("depth_camera")
+@dataclass(frozen=True, kw_only=True)
+class DepthCamera(RangingSensor):
+    """A depth camera: `sensor_msgs/Image` of 32FC1 on `depth/image_rect`, and `depth/camera_info`."""
+
+    width: Annotated[int, Whole(least=2, most=2048), "Pixels in a row."] = 160
+    height: Annotated[int, Whole(least=1, most=2048), "Rows."] = 120
+    field_deg: Annotated[
+        float, Quantity(units.ANGLE, above=0, most=170), "Angle from the first column to the last."
+    ] = 90.0
+
+
+@added_sensor("range_finder")
+@dataclass(frozen=True, kw_only=True)
+class RangeFinder(RangingSensor):
+    """A laser range finder, which looks down unless it is turned: `sensor_msgs/Range` on `range`."""
+
+    field_deg: Annotated[float, _CONE, "Angle of its cone; it reads the nearest return within."] = 2.0
+    pitch_deg: Annotated[float, _PITCH, "How far it looks down: 90 deg is straight down, 0 deg ahead."] = 90.0
+    range_m: Annotated[float, _RANGE, "Longest distance that it measures."] = 30.0
+    rate_hz: Annotated[float, _RATE, "Samples a second."] = 20.0
+
+
+@added_sensor("sonar")
+@dataclass(frozen=True, kw_only=True)
+class Sonar(RangingSensor):
+    """An ultrasonic range finder, which looks ahead: `sensor_msgs/Range` on `sonar`."""
+
+    field_deg: Annotated[float, _CONE, "Angle of its cone; it reads the nearest return within."] = 30.0
+    range_m: Annotated[float, _RANGE, "Longest distance that it measures."] = 5.0
+    nearest_m: Annotated[float, _NEAREST, "Shortest distance that it measures."] = 0.2
+    noise_m: Annotated[float, _NOISE, "Standard deviation of a distance."] = 0.02
+
+
+@added_sensor("imu_external")
+@dataclass(frozen=True, kw_only=True)
+class ExternalImu(AddedSensor):
+    """A second inertial sensor, of the grade `consumer`: `sensor_msgs/Imu` on `imu_external`."""
+
+    rate_hz: Annotated[float, _RATE, "Samples a second."] = 200.0
 
 
 @added_sensor("odometry")

@@ -7,12 +7,15 @@ from math import pi, radians
 from typing import Any
 
 from volery.base.errors import ModelError, UsageError
-from volery.base.frames import euler_to_quaternion
+from volery.base.frames import euler_to_quaternion, multiply
 from volery.model import added_sensors as model
 from volery.model.environment import Vehicle
 from volery.simulation.added_sensors.beams import Ranging
+from volery.simulation.added_sensors.cone_ranger import INFRARED, ULTRASOUND, ConeRanger
 from volery.simulation.added_sensors.dead_reckoning import DeadReckoning
-from volery.simulation.added_sensors.lidar import Lidar
+from volery.simulation.added_sensors.depth_camera import OPTICAL, DepthCamera
+from volery.simulation.added_sensors.external_imu import ExternalImu
+from volery.simulation.added_sensors.lidar import Lidar, RingLidar
 from volery.simulation.world.sensors import Mounting, SampledSensor
 
 
@@ -35,19 +38,48 @@ def sensors_of(vehicle: Vehicle) -> Iterator[SampledSensor | str]:
 
 def _mounting(one: model.MountedSensor) -> Mounting:
     forward, left, up = one.at
-    return Mounting((forward, left, up), euler_to_quaternion(0.0, 0.0, -radians(one.heading_deg)))
+    turn = euler_to_quaternion(0.0, radians(one.pitch_deg), -radians(one.heading_deg))
+    return Mounting((forward, left, up), turn)
+
+
+def _ranging(one: model.RangingSensor) -> Ranging:
+    return Ranging(one.nearest_m, one.range_m, one.noise_m, one.lost)
 
 
 def _lidar(one: model.Lidar) -> Lidar:
+    field = 2.0 * pi if one.field_deg == 360.0 else radians(one.field_deg)
     return Lidar(
-        one.named,
-        one.rate_hz,
-        Ranging(one.nearest_m, one.range_m, one.noise_m, one.lost),
-        one.beams,
-        2.0 * pi if one.field_deg == 360.0 else radians(one.field_deg),
-        topic=one.topic("scan"),
-        mounting=_mounting(one),
-    )
+        one.named, one.rate_hz, _ranging(one), one.beams, field,
+        topic=one.topic("scan"), mounting=_mounting(one),
+    )  # fmt: skip
+
+
+def _ring_lidar(one: model.RingLidar) -> RingLidar:
+    angles = radians(one.lowest_deg), radians(one.highest_deg)
+    return RingLidar(
+        one.named, one.rate_hz, _ranging(one), one.rings, one.columns, *angles,
+        topic=one.topic("points"), mounting=_mounting(one),
+    )  # fmt: skip
+
+
+def _depth_camera(one: model.DepthCamera) -> DepthCamera:
+    at, turn = _mounting(one)
+    return DepthCamera(
+        one.named, one.rate_hz, _ranging(one), one.width, one.height, radians(one.field_deg),
+        topic=one.name, mounting=Mounting(at, multiply(turn, OPTICAL)),
+    )  # fmt: skip
+
+
+def _cone(one: model.RangeFinder | model.Sonar) -> ConeRanger:
+    radiation, usual = (ULTRASOUND, "sonar") if isinstance(one, model.Sonar) else (INFRARED, "range")
+    return ConeRanger(
+        one.named, one.rate_hz, _ranging(one), radians(one.field_deg), radiation,
+        topic=one.topic(usual), mounting=_mounting(one),
+    )  # fmt: skip
+
+
+def _external_imu(one: model.ExternalImu) -> ExternalImu:
+    return ExternalImu(one.named, one.rate_hz, topic=one.topic("imu_external"), mounting=Mounting())
 
 
 def _odometry(one: model.Odometry) -> DeadReckoning:
@@ -56,5 +88,10 @@ def _odometry(one: model.Odometry) -> DeadReckoning:
 
 _MAKERS: dict[type[model.AddedSensor], Callable[[Any], SampledSensor]] = {
     model.Lidar: _lidar,
+    model.RingLidar: _ring_lidar,
+    model.DepthCamera: _depth_camera,
+    model.RangeFinder: _cone,
+    model.Sonar: _cone,
+    model.ExternalImu: _external_imu,
     model.Odometry: _odometry,
 }

@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf, isfinite
 from pathlib import Path
 
@@ -111,7 +112,7 @@ class BeamSampler:
     """Takes the samples of one beam sensor on one body."""
 
     def __init__(self, sensor: BeamSensor, noise: np.uint64, scene: Scene) -> None:
-        beams = sensor.beams()
+        beams = sensor.directions
         self._mounting = sensor.mounting or Mounting()
         self._pose, self._step = np.zeros(12), np.zeros(1, dtype=np.int64)
         self.readings = np.zeros(len(beams) // sensor.beams_each)
@@ -148,12 +149,19 @@ class BeamSensor(SampledSensor):
 
     ranging: Ranging
 
-    beams_each = 1
-    """Number of successive beams whose nearest return is one reading."""
+    @property
+    def beams_each(self) -> int:
+        """Number of successive beams whose nearest return is one reading."""
+        return 1
 
     @abstractmethod
     def beams(self) -> Array:
         """Return unit vectors forward, left, up of the sensor (beams, 3)."""
+
+    @cached_property
+    def directions(self) -> Array:
+        """The result of ``beams``, made once."""
+        return self.beams()
 
     def sampler(self, noise: np.uint64, scene: Scene) -> BeamSampler:
         """See ``SampledSensor``."""

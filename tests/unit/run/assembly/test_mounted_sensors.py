@@ -8,7 +8,15 @@ import pytest
 
 from volery.base.errors import ModelError
 from volery.base.frames import body_to_world
-from volery.model.added_sensors import Lidar, Odometry
+from volery.model.added_sensors import (
+    DepthCamera,
+    ExternalImu,
+    Lidar,
+    Odometry,
+    RangeFinder,
+    RingLidar,
+    Sonar,
+)
 from volery.model.environment import Place, Vehicle
 from volery.run.assembly.mounted_sensors import sensors_of
 from volery.run.assembly.sensor_node import frames_of
@@ -34,6 +42,34 @@ def test_a_lidar_is_mounted_where_the_model_says():
     assert ahead == pytest.approx((0.0, -1.0, 0.0))  # to the right
     assert (lidar.first, lidar.between) == pytest.approx((-pi / 4, radians(1.0)))
     assert np.allclose(np.linalg.norm(lidar.beams(), axis=1), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("settings", "topics", "ahead"),
+    [
+        (RingLidar(), ["points"], (1.0, 0.0, 0.0)),
+        (RangeFinder(), ["range"], (0.0, 0.0, -1.0)),
+        (RangeFinder(name="low", pitch_deg=0.0, heading_deg=180.0), ["low/range"], (-1.0, 0.0, 0.0)),
+        (Sonar(name="left", heading_deg=270.0), ["left/sonar"], (0.0, 1.0, 0.0)),
+        (ExternalImu(), ["imu_external"], (1.0, 0.0, 0.0)),
+    ],
+)
+def test_where_sensors_look_and_publish(settings, topics, ahead):
+    (sensor,) = made(settings)
+    assert [one.topic for one in sensor.publications()] == topics
+    assert (sensor.name, sensor.rate) == (settings.named, settings.rate_hz)
+    assert body_to_world(sensor.mounting.turn, (1.0, 0.0, 0.0)) == pytest.approx(ahead)
+
+
+def test_a_depth_camera_is_turned_from_its_optical_frame():
+    (camera,) = made(DepthCamera(name="below", pitch_deg=90.0, at=(0.0, 0.0, -0.1)))
+    assert [one.topic for one in camera.publications()] == [
+        "below/depth/image_rect",
+        "below/depth/camera_info",
+    ]
+    assert camera.frame == "below_optical_frame"
+    assert body_to_world(camera.mounting.turn, (0.0, 0.0, 1.0)) == pytest.approx((0.0, 0.0, -1.0))
+    assert body_to_world(camera.mounting.turn, (0.0, -1.0, 0.0)) == pytest.approx((1.0, 0.0, 0.0))
 
 
 def test_the_estimate_of_the_autopilot_is_no_sensor_of_the_world():

@@ -13,6 +13,8 @@ from volery.base.frames import body_to_world
 from volery.run.event_log import LogOptions
 from volery.simulation.world import sensors
 from volery.simulation.world.sensors import ErrorModel, Sensor
+from volery.trace.events import Omitted
+from volery.trace.reader import read
 
 MODEL = """
 volery: 1
@@ -168,3 +170,42 @@ def test_a_component_reads_scan_odometry_and_transforms(language, tmp_path):
     assert {tuple(one) for one in moves} == {("odom", "base_link", "0.00")}
     assert len(transforms) > 15
     assert {one[0] for one in transforms} == {"0.50"}
+
+
+ALL = """
+import rospy
+from sensor_msgs.msg import CameraInfo, Image, Imu, PointCloud2, Range
+def hear(message, topic):
+    size = len(message.data) if hasattr(message, "data") else 0
+    rospy.loginfo("%s %s %d", topic, message.header.frame_id, size)
+if __name__ == "__main__":
+    rospy.init_node("watch")
+    kinds = {"points": PointCloud2, "depth/image_rect": Image, "depth/camera_info": CameraInfo,
+             "range": Range, "front/sonar": Range, "imu_external": Imu}
+    for topic, kind in kinds.items():
+        rospy.Subscriber("/rover_1/" + topic, kind, hear, topic)
+    rospy.spin()
+"""
+
+
+def test_a_component_reads_clouds_depths_ranges_and_rates(tmp_path):
+    (tmp_path / "watch.py").write_text(ALL)
+    sensors = "[lidar3d, depth_camera, range_finder, {sonar: {name: front}}, imu_external]"
+    (tmp_path / "model.yaml").write_text(MODEL.format(language="rospy", sensor=sensors))
+    run = simulate(
+        tmp_path / "model.yaml", Options(out=tmp_path / "run", log=LogOptions(tmp_path / "log.txt"))
+    )
+    assert run.ok, run.record.outcome
+    lines = (tmp_path / "log.txt").read_text().splitlines()
+    heard = {tuple(line.split("watch: ")[1].split()) for line in lines if "watch: " in line}
+    assert heard == {
+        ("points", "lidar3d", str(16 * 900 * 16)),
+        ("depth/image_rect", "depth_camera_optical_frame", str(4 * 160 * 120)),
+        ("depth/camera_info", "depth_camera_optical_frame", "0"),
+        ("range", "range_finder", "0"),
+        ("front/sonar", "front", "0"),
+        ("imu_external", "imu_external", "0"),
+    }
+    events = read(tmp_path / "run" / "trace.mcap").events
+    omitted = {one.topic for one in events if isinstance(one, Omitted)}
+    assert omitted == {"/rover_1/points", "/rover_1/depth/image_rect"}
