@@ -379,6 +379,7 @@ class TransformPublisher:
     def __init__(self, context: InterfaceContext) -> None:
         self._link, self._origin = context.link, context.origin
         self._publish, self._wanted = context.publish, context.wanted
+        self._moving = context.pose_transform
         namespace = context.node.namespace
         prefix = "" if namespace == _SINGLE_VEHICLE else f"{namespace.strip('/')}/".lstrip("/")
         self._body = f"{prefix}{BODY}"
@@ -386,6 +387,8 @@ class TransformPublisher:
 
     def translators(self) -> Mapping[str, Translator]:
         """Return the translators by message name."""
+        if not self._moving:
+            return {"HEARTBEAT": self._publish_static}
         if self._origin is None:
             return {"HEARTBEAT": self._publish_static, "LOCAL_POSITION_NED": self._local}
         return {"HEARTBEAT": self._publish_static, "GLOBAL_POSITION_INT": partial(self._global, self._origin)}

@@ -81,6 +81,7 @@ class InterfaceContext:
         control: Whether roscopter's ``send_rc`` is offered.
         origin: Origin of the frame ``map``; None is the autopilot's own origin.
         parameter_services: Whether parameters are offered by the services of ROS 2, as MAVROS 2 does.
+        pose_transform: Whether the pose is published on ``/tf``.
     """
 
     node: Node
@@ -92,6 +93,7 @@ class InterfaceContext:
     control: bool = False
     origin: LocalFrame | None = None
     parameter_services: bool = False
+    pose_transform: bool = True
 
 
 @dataclass(frozen=True)

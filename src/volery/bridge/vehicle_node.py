@@ -67,6 +67,7 @@ class VehicleNodeOptions:
         origin: Origin of the frame ``map``; None is the autopilot's own origin.
         parameter_services: Whether parameters are offered by the services of ROS 2, as MAVROS 2 does.
         best_effort: Whether sensors are published best effort, as MAVROS 2 does.
+        pose_transform: Whether the pose is published on ``/tf``; not where odometry moves the same frame.
     """
 
     names: NamingScheme = MAVROS
@@ -81,6 +82,7 @@ class VehicleNodeOptions:
     origin: LocalFrame | None = None
     parameter_services: bool = False
     best_effort: bool = False
+    pose_transform: bool = True
 
 
 class VehicleNode:
@@ -140,6 +142,7 @@ class VehicleNode:
                 options.control,
                 options.origin,
                 options.parameter_services,
+                options.pose_transform,
             )
         )
         self.link.publish_only(interface.translators)

@@ -221,7 +221,7 @@ class Odometry(AddedSensor):
     camera, which needs no satellites.
     """
 
-    rate_hz: Annotated[float, _RATE, "Messages a second."] = 30.0
+    rate_hz: Annotated[float, _RATE, "Messages a second."] = 50.0
     drift_deg_s: Annotated[
         float | None,
         Key("drift"),

@@ -437,6 +437,9 @@ class Builder:
                 if vehicle.name not in commanded:
                     self._add_unattended(vehicle.name, INTERFACES[vehicle.kind])
                 yield partial(self._serve, self._fleet, vehicle.name, vehicle.processor)
+            elif vehicle.added_sensors:
+                context = ExecutionContext(node_name(vehicle.name), None)
+                yield self._sensor_node(self._fleet, vehicle.name, context).serve
 
     def _add_unattended(self, name: str, interface: str) -> None:
         opened: Callable[[Node], Vehicle] = partial(self._open, name=name, interface=interface)
@@ -463,10 +466,15 @@ class Builder:
         )
         access = graph_access(self._autopilot(name), name)
         ros2 = any(model.component.language == "rclpy" for model in self._system.instances)
-        serve_on_graph(self._graph, fleet, name, access, context, NodeNames(self._served[name], ros2))
-        prefix = frames_of(self._system.vehicles).get(name, "")
+        sensors = self._sensor_node(fleet, name, context)
+        names = NodeNames(self._served[name], ros2, not sensors.moves_frames)
+        serve_on_graph(self._graph, fleet, name, access, context, names)
+        sensors.serve()
+
+    def _sensor_node(self, fleet: SimulatedFleet, name: str, context: ExecutionContext) -> SensorNode:
         vehicle = next(one for one in self._system.vehicles if one.name == name)
-        SensorNode(self._graph, fleet.flights[name], vehicle, context, prefix).serve()
+        prefix = frames_of(self._system.vehicles).get(name, "")
+        return SensorNode(self._graph, fleet.flights[name], vehicle, context, prefix)
 
 
 def with_executables(system: System) -> System:

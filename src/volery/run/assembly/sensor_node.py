@@ -53,6 +53,11 @@ class SensorNode(NamedTuple):
     context: ExecutionContext
     prefix: str = ""
 
+    @property
+    def moves_frames(self) -> bool:
+        """Whether it publishes where ``base_link`` is."""
+        return any(isinstance(one, Odometry) for one in self.vehicle.added_sensors)
+
     def serve(self) -> None:
         """Publish each sample of the vehicle's added sensors below ``/VEHICLE``, until the end of the run."""
         sensors = self.flight.added_sensors()
@@ -100,10 +105,12 @@ class SensorNode(NamedTuple):
 
     def _drive_odometry(self, node: Node, odometry: Odometry) -> None:
         """Publish where the vehicle is by its own reckoning, also as a transform."""
+        from volery.simulation.world.world import STEP  # noqa: PLC0415  # a real vehicle has no simulation
+
         publisher = node.advertise(odometry.topic("odom"), _ODOMETRY, DEFAULT)
         transforms = node.advertise(TF, TF_MESSAGE, QoS(100))
         parent, child = f"{self.prefix}{ODOM}", f"{self.prefix}{BODY}"
-        rate = node.rate(round(S / odometry.rate_hz))
+        rate = node.rate(STEP * round(S / STEP / odometry.rate_hz))
         while not node.closed:
             rate.sleep()
             if odometry.of_autopilot:

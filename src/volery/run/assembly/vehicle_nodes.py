@@ -125,10 +125,11 @@ def private_graph(kernel: Kernel, wire: GraphWire, *, as_bytes: bool) -> Embedde
 
 
 class NodeNames(NamedTuple):
-    """Whose names a vehicle's node has, ``mavros`` by default, and whether as in ROS 2."""
+    """Whose names a vehicle's node has, ``mavros`` by default, whether as in ROS 2, and with ``/tf``."""
 
     whose: str = ""
     ros2: bool = False
+    pose_transform: bool = True
 
 
 _DEFAULT_NAMES = NodeNames()
@@ -142,7 +143,7 @@ def _mavros(
 ) -> object:
     from volery.bridge import ROSCOPTER, VehicleNodeOptions, serve_vehicle  # loads all messages
 
-    options = VehicleNodeOptions(origin=origin, best_effort=names.ros2)
+    options = VehicleNodeOptions(origin=origin, best_effort=names.ros2, pose_transform=names.pose_transform)
     if names.whose == ROSCOPTER_NAMES:
         options = VehicleNodeOptions(names=ROSCOPTER, control=True)
     return serve_vehicle(graph, link, vehicle, context, options)

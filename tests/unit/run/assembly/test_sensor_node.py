@@ -166,7 +166,7 @@ def test_a_component_reads_scan_odometry_and_transforms(language, tmp_path):
     )
     assert len(scans) == pytest.approx(19, abs=2)
     assert {tuple(one) for one in scans} == {("lidar", "360", "19.48", "inf")}  # the tank, 0.5 m nearer
-    assert len(moves) == pytest.approx(59, abs=3)
+    assert len(moves) == pytest.approx(99, abs=3)
     assert {tuple(one) for one in moves} == {("odom", "base_link", "0.00")}
     assert len(transforms) > 15
     assert {one[0] for one in transforms} == {"0.50"}
@@ -209,3 +209,41 @@ def test_a_component_reads_clouds_depths_ranges_and_rates(tmp_path):
     events = read(tmp_path / "run" / "trace.mcap").events
     omitted = {one.topic for one in events if isinstance(one, Omitted)}
     assert omitted == {"/rover_1/points", "/rover_1/depth/image_rect"}
+
+
+TREE = """
+import rospy
+from tf2_msgs.msg import TFMessage
+def hear(message):
+    for one in message.transforms:
+        rospy.loginfo("%s %s", one.header.frame_id, one.child_frame_id)
+if __name__ == "__main__":
+    rospy.init_node("watch")
+    rospy.Subscriber("/tf", TFMessage, hear)
+    rospy.Subscriber("/tf_static", TFMessage, hear)
+    rospy.spin()
+"""
+
+
+@pytest.mark.parametrize("allocated", [True, False])
+def test_each_frame_has_one_parent(allocated, tmp_path):
+    (tmp_path / "watch.py").write_text(TREE)
+    text = MODEL.format(language="rospy", sensor="[lidar, odometry]")
+    rover = next(line for line in text.splitlines() if "rover_1: {kind" in line)
+    text = text.replace(
+        rover, f"{rover}\n{rover.replace('rover_1', 'rover_2').replace('at: here', 'at: there')}"
+    )
+    text = text.replace(
+        "north: 0 m}}\n  buildings", "north: 0 m}, there: {east: 0 m, north: 5 m}}\n  buildings"
+    )
+    if not allocated:
+        text = text.replace(", rover_1: onboard", "")
+    (tmp_path / "model.yaml").write_text(text)
+    run = simulate(tmp_path / "model.yaml", Options(out=None, log=LogOptions(tmp_path / "log.txt")))
+    assert run.ok, run.record.outcome
+    lines = (tmp_path / "log.txt").read_text().splitlines()
+    links = {tuple(line.split("watch: ")[1].split()) for line in lines if "watch: " in line}
+    for rover in ("rover_1", "rover_2"):
+        assert (f"{rover}/odom", f"{rover}/base_link") in links
+        assert (f"{rover}/base_link", f"{rover}/lidar") in links
+    assert len({child for _, child in links}) == len(links)
