@@ -19,7 +19,7 @@ from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns
 from volery.model import rules
-from volery.model.added_sensors import ADDED_SENSOR, AddedSensor
+from volery.model.added_sensors import ADDED_SENSOR, AddedSensor, Odometry
 from volery.model.airframes import AIRFRAME, BATTERY, LOAD, MASS, Airframe, Battery
 from volery.model.faults import FAULT, Fault
 from volery.model.fields import (
@@ -499,6 +499,8 @@ class _Vehicle(Record):
         for name in sorted({name for name in named if named.count(name) > 1}):
             what = f"two sensors are called {name!r}; give each a `name` of its own"
             problems.add((*path, "added_sensors"), what, rule=rules.DUPLICATE_NAME)
+        if sum(isinstance(one, Odometry) for one in made.added_sensors) > 1:
+            problems.add((*path, "added_sensors"), "it has two odometries; only one can move base_link")
         if made.kind != "multirotor" and airframe is not None:
             here = reading.where((*path, "airframe", "file"))
             problems.add(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from math import isfinite
 from pathlib import Path as FilePath
 from typing import Annotated
@@ -120,11 +121,13 @@ def _walls(plan: _MapFile, picture: FilePath) -> Iterator[Corners]:
         raise ValueError(f"no cell of {picture.name} is occupied: are negate and occupied_thresh right?")
     west, south, yaw = plan.origin
     sine, cosine = sine_cosine(yaw)
-    found = list(cover(occupied[::-1]))  # the first row of a picture is the northern one
+    found = list(
+        islice(cover(occupied[::-1]), MOST_WALLS + 1)
+    )  # the first row of a picture is the northern one
     if len(found) > MOST_WALLS:
         raise ValueError(
-            f"{len(found)} rectangles cover what is occupied in {picture.name}, {MOST_WALLS} at most make "
-            "sense: remove its speckles, or give a coarser picture"
+            f"more than {MOST_WALLS} rectangles cover what is occupied in {picture.name}: remove its "
+            "speckles, or give a coarser picture"
         )
     for left, bottom, right, top in found:
         scaled = [
@@ -138,7 +141,6 @@ def _read_shades(picture: FilePath) -> NDArray[np.float64]:
     """Return the shades of a picture (rows, columns), 0 black to 255 white; what is transparent is white."""
     from PIL import Image  # noqa: PLC0415  # only a model with a floor plan needs it
 
-    Image.MAX_IMAGE_PIXELS = None  # the limit is the next one
     try:
         with Image.open(picture) as image:
             if image.width * image.height > MOST_CELLS:
@@ -150,6 +152,8 @@ def _read_shades(picture: FilePath) -> NDArray[np.float64]:
                 white = Image.new("RGBA", image.size, "white")
                 return np.asarray(Image.alpha_composite(white, image.convert("RGBA")).convert("L"), float)
             return np.asarray(image.convert("L"), dtype=np.float64)
+    except Image.DecompressionBombError:
+        raise ValueError(f"{picture.name} has more than {MOST_CELLS} cells; give a coarser one") from None
     except OSError as error:
         what = "there is no such picture" if not picture.exists() else "this is no picture (PGM, PNG)"
         raise ValueError(f"{picture.name}: {what}") from error

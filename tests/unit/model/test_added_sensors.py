@@ -51,6 +51,7 @@ def test_settings_are_read_with_their_units(workshop):
         ("[{lidar: {rate: 1000 Hz}}]", "at most 500"),
         ("[{lidar: {}, odometry: {}}]", "one name with its settings"),
         ("[3]", "the name of a sensor"),
+        ("[odometry, {odometry: {name: wheels, scale: 2 %}}]", "only one can move base_link"),
         ("[lidar, lidar]", "two sensors are called 'lidar'; give each a `name` of its own"),
     ],
 )

@@ -113,11 +113,12 @@ class SensorNode(NamedTuple):
         rate = node.rate(STEP * round(S / STEP / odometry.rate_hz))
         while not node.closed:
             rate.sleep()
+            sigmas = (0.0, 0.0, 0.0, 0.0)
             if odometry.of_autopilot:
                 estimate = self.flight.estimate()
                 if not estimate.position_ok:
                     continue
-                time, found = estimate.time, _reckoned(estimate)
+                time, found, sigmas = estimate.time, _reckoned(estimate), estimate.sigmas
             else:
                 time, found = self.flight.measurement(odometry.named)
             at = self.graph.epoch + time
@@ -129,6 +130,8 @@ class SensorNode(NamedTuple):
             pose.orientation = turn
             twist.linear.x, twist.linear.y, twist.linear.z = velocity
             twist.angular.x, twist.angular.y, twist.angular.z = rates
+            for part, flat, upright in ((message.pose, *sigmas[:2]), (message.twist, *sigmas[2:])):
+                part.covariance[[0, 7, 14]] = flat * flat, flat * flat, upright * upright
             publisher.publish(message)
             moved = transform(at, parent, child, turn, position)
             transforms.publish(new(TF_MESSAGE, transforms=[moved]))

@@ -211,6 +211,31 @@ def test_a_component_reads_clouds_depths_ranges_and_rates(tmp_path):
     assert omitted == {"/rover_1/points", "/rover_1/depth/image_rect"}
 
 
+ESTIMATE = """
+import rospy
+from nav_msgs.msg import Odometry
+def hear(message):
+    place, sigmas = message.pose.pose.position, message.pose.covariance
+    rospy.loginfo("%.1f %.1f %s %s", place.x, place.y, 0 < sigmas[0] == sigmas[7] < 1, sigmas[14] > 0)
+if __name__ == "__main__":
+    rospy.init_node("watch")
+    rospy.Subscriber("/rover_1/odom", Odometry, hear)
+    rospy.spin()
+"""
+
+
+def test_the_estimate_of_the_autopilot_is_about_the_origin_of_the_model(tmp_path):
+    (tmp_path / "watch.py").write_text(ESTIMATE)
+    text = MODEL.format(language="rospy", sensor="odometry, sensors: rtk")
+    text = text.replace("here: {east: 0 m, north: 0 m}", "here: {east: 40 m, north: -30 m}")
+    (tmp_path / "model.yaml").write_text(text)
+    run = simulate(tmp_path / "model.yaml", Options(out=None, log=LogOptions(tmp_path / "log.txt")))
+    assert run.ok, run.record.outcome
+    lines = (tmp_path / "log.txt").read_text().splitlines()
+    heard = {tuple(line.split("watch: ")[1].split()) for line in lines if "watch: " in line}
+    assert heard == {("40.0", "-30.0", "True", "True")}
+
+
 TREE = """
 import rospy
 from tf2_msgs.msg import TFMessage
