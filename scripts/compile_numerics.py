@@ -24,6 +24,9 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "src"))
 import llvmlite.binding as llvm
 from numba import carray, cfunc, types  # type: ignore[attr-defined]  # numba does not declare carray
 
+from volery.autonomy.avoidance import judge_candidates
+from volery.autonomy.grid_path import spread_ways
+from volery.autonomy.occupancy_grid import mark_beams
 from volery.base.numeric_code import NumericCode, parsed
 from volery.cost.native.core_model import execute_blocks
 from volery.simulation.added_sensors.beams import cast_beams
@@ -32,7 +35,10 @@ from volery.simulation.autopilots.px4.loop_step import fly_px4_loops
 from volery.simulation.world.body_step import advance_bodies
 from volery.simulation.world.rasteriser import draw_picture
 
-ENTRY_POINTS = (advance_flights, advance_bodies, fly_px4_loops, cast_beams, draw_picture, execute_blocks)
+ENTRY_POINTS = (
+    *(advance_flights, advance_bodies, fly_px4_loops, cast_beams, draw_picture, execute_blocks),
+    *(judge_candidates, mark_beams, spread_ways),
+)
 
 ERROR_PATHS = """
 /* What numba's code calls where it raises an error; none does, since a division by zero gives an infinity. */

@@ -75,6 +75,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "report": ("jinja2",),
     "control": ("matplotlib", "pyulog"),
     "explore": ("scipy", "optuna", "SALib", "pandas", "pyarrow", "matplotlib"),
+    "autonomy": ("scipy",),
     "vision": ("cv2",),
     "dask": ("distributed",),
     "ray": ("ray",),
