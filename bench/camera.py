@@ -18,8 +18,8 @@ import mujoco
 import numpy as np
 
 from volery.autonomy.markers import CameraModel, MarkerFinder, marker_cells
-from volery.simulation.world.rasteriser import DUSK_LUX, Lens, Marker, Rasteriser, View
-from volery.simulation.world.scene import Solid
+from volery.simulation.world.rasteriser import Lens, Rasteriser, View
+from volery.simulation.world.scene import DUSK_LUX, Marker, Solid
 
 BOXES = 240  # of ten triangles each
 HEIGHT = 12.0

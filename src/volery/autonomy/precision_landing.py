@@ -54,6 +54,9 @@ class LandingRules:
     Args:
         gain: Horizontal velocity for each metre of offset [1/s]; an autopilot that follows velocities slowly
             needs less.
+        trim_gain: Velocity that a metre of offset adds in a second [1/s^2]: it makes up for an error of the
+            vehicle's own velocity.
+        most_trim: Greatest such velocity, east and north [m/s].
         most_sideways: Greatest horizontal speed [m/s].
         descent_gain: Descent for each metre of height [1/s].
         most_descent: Greatest descent [m/s].
@@ -72,12 +75,14 @@ class LandingRules:
     """
 
     gain: float = 0.8
+    trim_gain: float = 0.15
+    most_trim: float = 0.3
     most_sideways: float = 1.5
     descent_gain: float = 0.35
     most_descent: float = 1.2
     least_descent: float = 0.3
     cone: float = 0.15
-    centred: float = 0.08
+    centred: float = 0.07
     blind_below: float = 0.9
     land_below: float = 0.45
     blink: float = 0.7
@@ -129,6 +134,7 @@ class Landing:
         trail: Times [ns] and places of the last second.
         marker: Estimated place of the marker in the same frame [m]; ``None`` before it is seen.
         variance: Of each component of it [m^2].
+        trim: Velocity east and north that holds it above the marker [m/s].
         seen: Time of the last picture with the marker [ns].
         refused: Sights in a row that contradict the estimate.
         lost: How often the marker was lost and looked for.
@@ -144,6 +150,7 @@ class Landing:
     trail: tuple[tuple[Ns, Vector], ...] = ()
     marker: Vector | None = None
     variance: Vector = (0.0, 0.0, 0.0)
+    trim: tuple[float, float] = (0.0, 0.0)
     seen: Ns = 0
     refused: int = 0
     lost: int = 0
@@ -163,6 +170,7 @@ TILT_SIGMA = 0.006
 _GATE = 25.0  # square of the standard deviations by which a sight may be off
 _SLACK = 0.0025  # [m^2] added to it
 _REFUSALS = 4  # sights in a row after which they are believed
+_TRIMS_WITHIN = 0.5  # [m] of the marker
 _KEPT: Ns = 1_000_000_000  # [ns] of the trail
 
 
@@ -210,6 +218,7 @@ def step(
         velocity: Estimated velocity of the vehicle [m/s].
         sight: A marker that was not passed before; ``None``: no new one.
     """
+    landing = _trimmed(landing, rules, to_seconds(now - landing.now) if landing.begun >= 0 else 0.0)
     landing = _moved(landing, now, velocity)
     if sight is not None:
         landing = _measured(landing, sight)
@@ -231,6 +240,18 @@ def _moved(landing: Landing, now: Ns, velocity: Vector) -> Landing:
     trail = (*(one for one in landing.trail if one[0] >= now - _KEPT), (now, (x, y, z)))
     east, north, up = (one + WANDERS * seconds for one in landing.variance)
     return replace(landing, now=now, travelled=(x, y, z), trail=trail, variance=(east, north, up))
+
+
+def _trimmed(landing: Landing, rules: LandingRules, seconds: float) -> Landing:
+    """Add up the offset of a vehicle that is near the marker."""
+    offset = landing.offset
+    if landing.phase is not Phase.DESCEND or offset is None or hypot(offset[0], offset[1]) > _TRIMS_WITHIN:
+        return landing
+    east, north = (
+        min(max(trim + rules.trim_gain * off * seconds, -rules.most_trim), rules.most_trim)
+        for trim, off in zip(landing.trim, offset[:2], strict=True)
+    )
+    return replace(landing, trim=(east, north))
 
 
 def _place_at(landing: Landing, at: Ns) -> Vector:
@@ -322,4 +343,4 @@ def _velocity(landing: Landing, rules: LandingRules) -> Vector:
         up = rules.climb
     elif landing.phase is Phase.COMMIT or (landing.phase is Phase.DESCEND and away < _within(rules, height)):
         up = -min(rules.most_descent, max(rules.least_descent, rules.descent_gain * height))
-    return share * offset[0], share * offset[1], up
+    return share * offset[0] + landing.trim[0], share * offset[1] + landing.trim[1], up

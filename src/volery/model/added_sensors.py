@@ -13,12 +13,16 @@ from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
 from volery.base import units
+from volery.base.time import Ns
 from volery.model.fields import (
     HEADING,
     LENGTH,
     NAME,
+    NUMBER,
+    PERIOD,
     SHARE,
     TEXT,
+    TIME,
     Angle,
     Key,
     ListOf,
@@ -210,6 +214,45 @@ class ExternalImu(AddedSensor):
     """A second inertial sensor, of the grade `consumer`: `sensor_msgs/Imu` on `imu_external`."""
 
     rate_hz: Annotated[float, _RATE, "Samples a second."] = 200.0
+
+
+class _Factors(Syntax):
+    """Up to five factors of a lens."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> tuple[float, ...]:
+        """See ``Syntax``. Factors that are not given are 0."""
+        found: tuple[float, ...] = ListOf(NUMBER).read(node, path, reading)
+        if len(found) > 5:
+            raise WrongValueError(f"at most five factors are expected (k1, k2, p1, p2, k3), not {len(found)}")
+        return (*found, *[0.0] * (5 - len(found)))
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": "array", "items": NUMBER.schema(definitions), "maxItems": 5}
+
+
+@added_sensor("camera")
+@dataclass(frozen=True, kw_only=True)
+class Camera(MountedSensor):
+    """A grey camera: `sensor_msgs/Image` (mono8) on `camera/image_raw`, with its `camera/camera_info`."""
+
+    width: Annotated[int, Whole(least=16, most=4096), "Columns of a picture."] = 320
+    height: Annotated[int, Whole(least=16, most=4096), "Rows of a picture."] = 240
+    field_deg: Annotated[
+        float,
+        Quantity(units.ANGLE, above=0, most=150),
+        "Angle between left and right edge of a picture.",
+    ] = 67.0
+    distortion: Annotated[
+        tuple[float, ...], _Factors(), "Factors k1, k2, p1, p2, k3 of the lens, as in `plumb_bob`."
+    ] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    rate_hz: Annotated[float, _RATE, "Pictures a second."] = 10.0
+    latency_ns: Annotated[Ns, TIME, "Time from an exposure to its message, less than the period."] = (
+        30_000_000
+    )
+    exposure_ns: Annotated[
+        Ns, PERIOD, "Longest exposure; in less light the picture is amplified, with its noise."
+    ] = 8_000_000
 
 
 @added_sensor("odometry")

@@ -125,7 +125,7 @@ class EnvironmentText(Environment):
     ] = ()
 
 
-GEOGRAPHY = ("origin", "terrain", "places", "roads", "corridors", "no_fly_zones", "buildings")
+GEOGRAPHY = ("origin", "terrain", "places", "roads", "corridors", "no_fly_zones", "buildings", "markers")
 """The keys of the environment that a world file may hold."""
 
 

@@ -13,6 +13,7 @@ from itertools import pairwise
 from math import hypot, inf, pi
 from typing import Annotated, Any
 
+from volery.base import units
 from volery.base.elementary import cos, sin
 from volery.base.errors import Location, choices
 from volery.base.frames import LocalFrame
@@ -40,6 +41,7 @@ from volery.model.fields import (
     ListOf,
     MapOf,
     OneOf,
+    Quantity,
     Record,
     Schema,
     Shared,
@@ -62,6 +64,9 @@ VEHICLE_KINDS = ("multirotor", "rover")
 VEHICLE_NAMES = ("mavros", "roscopter", "pprzros")
 SENSOR_SETS = ("consumer", "rtk", "sih")
 STARTS = ("warm", "cold")
+LIGHTS = ("day", "dusk", "night")
+MARKERS = {"36h11": 587, "16h5": 30, "aruco_4x4": 50, "aruco_5x5": 100, "aruco_6x6": 250}
+"""How many markers there are of each family."""
 
 CIRCLE_CORNERS = 32
 FARTHEST_M = 100_000.0
@@ -381,6 +386,31 @@ def _circle(centre: Place, radius: float) -> tuple[tuple[float, float], ...]:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Marker:
+    """A square marker that lies level on the ground, or on the building at its place, for cameras to see."""
+
+    name: str
+    at: Annotated[Place, PLACE, "Where its centre is."]
+    size_m: Annotated[float, Quantity(units.LENGTH, above=0), "Side of its black square."]
+    number: Annotated[int, Key("id"), Whole(least=0), "Its number in the family."]
+    family: Annotated[
+        str, OneOf(MARKERS), "Family: `36h11` and `16h5` are AprilTags, the others ArUco markers."
+    ] = "36h11"
+    yaw_deg: Annotated[float, HEADING, "Where its upper edge points, clockwise from north."] = 0.0
+
+
+class _Marker(Record):
+    """A marker. Its family must have its number."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> Any:
+        """See ``Syntax``."""
+        made: Marker = super().read(node, path, reading)
+        if made.number >= MARKERS[made.family]:
+            raise WrongValueError(f"{made.family} has the numbers 0 to {MARKERS[made.family] - 1}")
+        return made
+
+
 WAYS = _Resolved(Record(WaysText), _ways)
 PRISMS = MapOf(_Resolved(Record(PrismText), _prism), values_only=True)
 
@@ -588,6 +618,14 @@ class Environment:
         FLOOR_PLAN,
         "Walls from a picture, beside the buildings; its axes are east and north.",
     ] = None
+    markers: Annotated[
+        tuple[Marker, ...], MapOf(_Marker(Marker), values_only=True), "Markers that cameras see, by name."
+    ] = ()
+    light: Annotated[
+        str,
+        OneOf(LIGHTS),
+        "For cameras: an overcast `day`, `dusk` or a lit street, a `night` without lamps.",
+    ] = "day"
     wind: Annotated[Wind, Shorter(Record(Wind), key="speed"), "Wind over all of the world."] = Wind()
     vehicles: Annotated[
         tuple[Vehicle, ...], MapOf(_Vehicle(Vehicle), values_only=True), "Drones and rovers, by name."

@@ -11,7 +11,8 @@ import pytest
 from volery.autonomy.markers import CameraModel, MarkerFinder, camera_of, marker_cells, picture_of
 from volery.base.errors import UsageError
 from volery.ros.messages import new
-from volery.simulation.world.rasteriser import DAY_LUX, DUSK_LUX, Lens, Marker, Rasteriser, View
+from volery.simulation.world.rasteriser import Lens, Rasteriser, View
+from volery.simulation.world.scene import DAY_LUX, DUSK_LUX, Marker
 
 DOWN = np.diag((1.0, -1.0, -1.0))
 LENS = Lens(distortion=(-0.2, 0.05, 0.001, -0.001, 0.0))

@@ -1,9 +1,11 @@
 """Sensors that a model adds: alone, with settings, several of a kind; what is wrong names its line."""
 
+from dataclasses import replace
+
 import pytest
 
 from volery.base.errors import ModelError
-from volery.model.added_sensors import Lidar, Odometry
+from volery.model.added_sensors import Camera, Lidar, Odometry
 
 ROVER = "sensors: rtk, started: cold"
 
@@ -38,6 +40,14 @@ def test_settings_are_read_with_their_units(workshop):
     assert not odometry.of_autopilot
 
 
+def test_a_camera_has_its_lens_and_its_place(workshop):
+    (camera,) = sensors_of(
+        workshop, "[{camera: {pitch: 90 deg, distortion: [-0.2, 0.05], latency: 20 ms, at: [0, 0, -5 cm]}}]"
+    )
+    made = Camera(pitch_deg=90.0, distortion=(-0.2, 0.05, 0.0, 0.0, 0.0), at=(0.0, 0.0, -0.05))
+    assert camera == replace(made, latency_ns=20_000_000)
+
+
 @pytest.mark.parametrize(
     ("written", "said"),
     [
@@ -50,6 +60,8 @@ def test_settings_are_read_with_their_units(workshop):
         ("[{lidar: {name: a b}}]", "'a b' is no name"),
         ("[{lidar: {rate: 1000 Hz}}]", "at most 500"),
         ("[{lidar: {}, odometry: {}}]", "one name with its settings"),
+        ("[{camera: {distortion: [1, 2, 3, 4, 5, 6]}}]", "at most five factors"),
+        ("[{camera: {pitch: 100 deg}}]", "90"),
         ("[3]", "the name of a sensor"),
         ("[odometry, {odometry: {name: wheels, scale: 2 %}}]", "only one can move base_link"),
         ("[lidar, lidar]", "two sensors are called 'lidar'; give each a `name` of its own"),

@@ -6,16 +6,20 @@ from collections.abc import Callable, Iterator
 from math import pi, radians
 from typing import Any
 
+from volery.base.elementary import tan
 from volery.base.errors import ModelError, UsageError
 from volery.base.frames import euler_to_quaternion, multiply
+from volery.base.time import to_seconds
 from volery.model import added_sensors as model
 from volery.model.environment import Vehicle
 from volery.simulation.added_sensors.beams import Ranging
+from volery.simulation.added_sensors.camera import Camera
 from volery.simulation.added_sensors.cone_ranger import INFRARED, ULTRASOUND, ConeRanger
 from volery.simulation.added_sensors.dead_reckoning import DeadReckoning
 from volery.simulation.added_sensors.depth_camera import OPTICAL, DepthCamera
 from volery.simulation.added_sensors.external_imu import ExternalImu
 from volery.simulation.added_sensors.lidar import Lidar, RingLidar
+from volery.simulation.world.rasteriser import Exposure, Lens
 from volery.simulation.world.sensors import Mounting, SampledSensor
 
 
@@ -82,11 +86,26 @@ def _external_imu(one: model.ExternalImu) -> ExternalImu:
     return ExternalImu(one.named, one.rate_hz, topic=one.topic("imu_external"), mounting=Mounting())
 
 
+def _camera(one: model.Camera) -> Camera:
+    at, turn = _mounting(one)
+    focal = 0.5 * one.width / tan(0.5 * radians(one.field_deg))
+    k1, k2, p1, p2, k3 = one.distortion
+    return Camera(
+        one.named,
+        one.rate_hz,
+        Lens(one.width, one.height, focal, (k1, k2, p1, p2, k3)),
+        Exposure(to_seconds(one.exposure_ns)),
+        one.latency_ns,
+        mounting=Mounting(at, multiply(turn, OPTICAL)),
+    )
+
+
 def _odometry(one: model.Odometry) -> DeadReckoning:
     return DeadReckoning(one.named, one.rate_hz, one.drift_deg_s or 0.0, one.scale or 0.0)
 
 
 _MAKERS: dict[type[model.AddedSensor], Callable[[Any], SampledSensor]] = {
+    model.Camera: _camera,
     model.Lidar: _lidar,
     model.RingLidar: _ring_lidar,
     model.DepthCamera: _depth_camera,

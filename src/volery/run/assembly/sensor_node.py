@@ -16,6 +16,7 @@ from volery.base.time import S
 from volery.bridge.motion_publishers import TF, TF_MESSAGE, TF_STATIC, ros_quaternion, transform
 from volery.bridge.node_interface import BODY, stamped
 from volery.kernel.task import ExecutionContext
+from volery.kernel.waiting import sleep
 from volery.model.added_sensors import Odometry
 from volery.model.environment import Vehicle
 from volery.ros.graph import DEFAULT, LATCHED, Node, QoS, RosGraph
@@ -96,6 +97,8 @@ class SensorNode(NamedTuple):
         while not node.closed:
             rate.sleep()
             sample = self.flight.measurement(sensor.name)
+            if sensor.latency:
+                sleep(self.graph.kernel, sensor.latency)
             for publication, publisher in advertised:
                 message = new(publication.type)
                 if hasattr(message, "header"):

@@ -15,6 +15,7 @@ from typing import NamedTuple
 from volery.base.elementary import cos, sin
 from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame
+from volery.base.installed import require_extra
 from volery.base.position import AMSL, Position
 from volery.base.seeds import stream
 from volery.base.time import Ns
@@ -23,6 +24,7 @@ from volery.links.in_process_link import in_process_pair
 from volery.links.link import Codec, Link
 from volery.links.wire_faults import FaultyLink, WireFaults, faulty_pair
 from volery.model.environment import Environment, Prism
+from volery.model.environment import Marker as MarkerModel
 from volery.model.environment import Vehicle as VehicleModel
 from volery.model.environment import Wind as WindModel
 from volery.run.assembly.bodies import body_of
@@ -31,12 +33,16 @@ from volery.run.result import SAMPLING_PERIOD, VehicleProgress
 from volery.simulation.autopilots.fleet_autopilot import AutopilotFamily, FleetAutopilot, firmwares
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
 from volery.simulation.world.environment_models import Wind
-from volery.simulation.world.scene import Scene, Solid
+from volery.simulation.world.scene import DAY_LUX, DUSK_LUX, Marker, Scene, Solid
 from volery.simulation.world.world import World
 from volery.trace.events import Collision, ignore
 
 FOUNDATION = 100.0
 """Depth [m] to which a solid on the ground goes on below it: the ground follows the globe."""
+
+
+LUX = {"day": DAY_LUX, "dusk": DUSK_LUX, "night": 0.3}
+"""Illuminance of the model's kinds of light."""
 
 
 class Surroundings(NamedTuple):
@@ -237,12 +243,33 @@ def _ids(names: Sequence[str], stated: Mapping[str, int]) -> dict[str, int]:
 
 def surroundings_of(environment: Environment) -> Surroundings:
     """Return the world of a model's environment."""
-    scene = Scene(_solids(environment.solids), _solids(environment.no_fly_zones))
+    solids, no_fly = _solids(environment.solids), _solids(environment.no_fly_zones)
+    markers = _markers(environment.markers, Scene(solids))
+    scene = Scene(solids, no_fly, markers=markers, lux=LUX[environment.light])
     return Surroundings(environment.origin, environment.wind, scene)
 
 
 def _solids(prisms: Sequence[Prism]) -> list[Solid]:
     return [Solid(one.name, one.corners, one.floor_m or -FOUNDATION, one.ceiling_m) for one in prisms]
+
+
+def _markers(markers: Sequence[MarkerModel], scene: Scene) -> list[Marker]:
+    """Return the markers, each on what stands at its place."""
+    if not markers:
+        return []
+    require_extra("vision", "markers in a model")
+    from volery.autonomy.markers import marker_cells  # noqa: PLC0415  # needs an extra
+
+    return [
+        Marker(
+            one.name,
+            marker_cells(one.family, one.number),
+            (one.at.east_m, one.at.north_m, scene.standing_height(one.at.east_m, one.at.north_m)),
+            one.size_m,
+            radians(one.yaw_deg),
+        )
+        for one in markers
+    ]
 
 
 def wind_of(model: WindModel) -> Wind:

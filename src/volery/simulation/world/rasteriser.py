@@ -30,13 +30,10 @@ from volery.base.errors import UsageError
 from volery.base.frames import Vector
 from volery.base.numeric_code import NumericCode, numeric
 from volery.simulation.world.arithmetic import clip, gaussian, random_word
-from volery.simulation.world.scene import Solid
+from volery.simulation.world.scene import DAY_LUX, Marker, Solid
 from volery.simulation.world.state_layout import Array
 
 Picture = NDArray[np.uint8]
-
-DAY_LUX, DUSK_LUX = 10_000.0, 50.0
-"""Overcast day; end of civil twilight, or a lit street."""
 
 _ARITHMETIC = Path(__file__).with_name("arithmetic.py")
 _NEAR = 0.02  # [m] what is nearer in front of the camera is not drawn
@@ -59,24 +56,6 @@ _REFLECTANCE, _LEVEL, _TRIANGLE = 9, 10, 11
 _COS, _SIN, _SIDE, _CELLS, _FIRST_CELL, _MARKER = 3, 4, 5, 6, 7, 8
 _VELOCITY, _RATES = 0, 3
 _FOCAL, _CENTRE_X, _CENTRE_Y, _HEIGHT, _TIME, _GAIN, _SIGNAL, _SETTINGS = range(8)
-
-
-class Marker(NamedTuple):
-    """A square fiducial marker that lies level, in a white margin of a quarter of its side.
-
-    Args:
-        name: Name for messages.
-        cells: Its cells (n, n) from the upper left, black border included: 0 black, 1 white.
-        at: Its centre east, north, up about the world's origin [m].
-        size: Side of the black square [m].
-        yaw: Direction of its upper edge, clockwise from north [rad].
-    """
-
-    name: str
-    cells: NDArray[np.uint8]
-    at: Vector
-    size: float
-    yaw: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.base.errors import UsageError
+from volery.base.frames import Vector
 from volery.base.numeric_code import numeric
 from volery.simulation.world.environment_models import HALF_CURVATURE, Terrain, ground_height
 from volery.simulation.world.state_layout import Array
 
+DAY_LUX, DUSK_LUX = 10_000.0, 50.0
+"""Illuminance of an overcast day; of the end of civil twilight, or of a lit street."""
 MARGIN = 3.0
 """A solid is listed in the cells within this distance [m]: at least the reach of any body."""
 _CELLS = 256  # along the longer side of the lattice, at most
@@ -55,6 +58,24 @@ class Solid(NamedTuple):
     corners: tuple[tuple[float, float], ...]
     floor: float = 0.0
     ceiling: float = inf
+
+
+class Marker(NamedTuple):
+    """A square fiducial marker that lies level, in a white margin of a quarter of its side.
+
+    Args:
+        name: Name for messages.
+        cells: Its cells (n, n) from the upper left, black border included: 0 black, 1 white.
+        at: Its centre east, north, up about the world's origin [m].
+        size: Side of the black square [m].
+        yaw: Direction of its upper edge, clockwise from north [rad].
+    """
+
+    name: str
+    cells: NDArray[np.uint8]
+    at: Vector
+    size: float
+    yaw: float = 0.0
 
 
 class Cylinder(NamedTuple):
@@ -102,13 +123,20 @@ class Scene:
         solids: What stands in the world.
         no_fly: Volumes that vehicles should not enter.
         terrain: The ground.
+        markers: What lies on the ground and on roofs for cameras to see.
+        lux: Illuminance.
 
     Raises:
         UsageError: A polygon has fewer than three corners, or a ceiling is not above its floor.
     """
 
     def __init__(
-        self, solids: Sequence[Solid] = (), no_fly: Sequence[Solid] = (), terrain: Terrain | None = None
+        self,
+        solids: Sequence[Solid] = (),
+        no_fly: Sequence[Solid] = (),
+        terrain: Terrain | None = None,
+        markers: Sequence[Marker] = (),
+        lux: float = DAY_LUX,
     ) -> None:
         for solid in (*solids, *no_fly):
             if len(solid.corners) < 3 or not solid.floor < solid.ceiling:
@@ -116,6 +144,8 @@ class Scene:
         self.solids = tuple(solids)
         self.no_fly = tuple(no_fly)
         self.terrain = terrain or Terrain()
+        self.markers = tuple(markers)
+        self.lux = lux
         self.arrays = _arrays(self.solids)
 
     def cast(self, origins: Array, directions: Array, reach: float) -> Array:

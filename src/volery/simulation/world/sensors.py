@@ -368,6 +368,11 @@ class SampledSensor(ABC):
         return self.every * round(STEP_S * S)
 
     @property
+    def latency(self) -> Ns:
+        """Time from a sample to its message [ns], less than its period."""
+        return 0
+
+    @property
     def frame(self) -> str:
         """Frame of its messages."""
         return self.name

@@ -9,6 +9,7 @@ import pytest
 from volery.base.errors import ModelError
 from volery.base.frames import body_to_world
 from volery.model.added_sensors import (
+    Camera,
     DepthCamera,
     ExternalImu,
     Lidar,
@@ -70,6 +71,17 @@ def test_a_depth_camera_is_turned_from_its_optical_frame():
     assert camera.frame == "below_optical_frame"
     assert body_to_world(camera.mounting.turn, (0.0, 0.0, 1.0)) == pytest.approx((0.0, 0.0, -1.0))
     assert body_to_world(camera.mounting.turn, (0.0, -1.0, 0.0)) == pytest.approx((1.0, 0.0, 0.0))
+
+
+def test_a_camera_looks_where_the_model_says():
+    (camera,) = made(Camera(pitch_deg=90.0, heading_deg=90.0, field_deg=90.0, at=(0.1, 0.0, -0.1)))
+    assert camera.lens.focal == pytest.approx(160.0)
+    assert camera.mounting.at == (0.1, 0.0, -0.1)
+    assert body_to_world(camera.mounting.turn, (0.0, 0.0, 1.0)) == pytest.approx((0.0, 0.0, -1.0))
+    upper_edge = body_to_world(camera.mounting.turn, (0.0, -1.0, 0.0))
+    assert upper_edge == pytest.approx((0.0, -1.0, 0.0))  # to the right
+    with pytest.raises(ModelError, match=r"added_sensors\.camera.*less than the period of 20 ms"):
+        made(Camera(rate_hz=50.0))
 
 
 def test_the_estimate_of_the_autopilot_is_no_sensor_of_the_world():

@@ -6,17 +6,8 @@ import numpy as np
 import pytest
 
 from volery.base.errors import UsageError
-from volery.simulation.world.rasteriser import (
-    DAY_LUX,
-    DUSK_LUX,
-    Exposure,
-    Lens,
-    Marker,
-    Picture,
-    Rasteriser,
-    View,
-)
-from volery.simulation.world.scene import Scene, Solid
+from volery.simulation.world.rasteriser import Exposure, Lens, Picture, Rasteriser, View
+from volery.simulation.world.scene import DAY_LUX, DUSK_LUX, Marker, Scene, Solid
 
 DOWN = np.array([(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)])
 """Right is east, down in the picture is south, ahead is down."""
