@@ -27,6 +27,7 @@ from numba import carray, cfunc, types  # type: ignore[attr-defined]  # numba do
 from volery.autonomy.avoidance import judge_candidates
 from volery.autonomy.grid_path import spread_ways
 from volery.autonomy.occupancy_grid import mark_beams
+from volery.autonomy.scan_matching import align_lines, bound_blocks, search_blocks, spread_likelihood
 from volery.base.numeric_code import NumericCode, parsed
 from volery.cost.native.core_model import execute_blocks
 from volery.simulation.added_sensors.beams import cast_beams
@@ -37,7 +38,7 @@ from volery.simulation.world.rasteriser import draw_picture
 
 ENTRY_POINTS = (
     *(advance_flights, advance_bodies, fly_px4_loops, cast_beams, draw_picture, execute_blocks),
-    *(judge_candidates, mark_beams, spread_ways),
+    *(judge_candidates, mark_beams, spread_ways, spread_likelihood, bound_blocks, search_blocks, align_lines),
 )
 
 ERROR_PATHS = """
