@@ -272,3 +272,16 @@ def test_each_frame_has_one_parent(allocated, tmp_path):
         assert (f"{rover}/odom", f"{rover}/base_link") in links
         assert (f"{rover}/base_link", f"{rover}/lidar") in links
     assert len({child for _, child in links}) == len(links)
+
+
+def test_the_same_seed_gives_the_same_scans_byte_for_byte(tmp_path):
+    (tmp_path / "watch.py").write_text(WATCH["rospy"])
+    sensor = "[{lidar: {lost: 5 %}}, {odometry: {drift: 2 deg/min, scale: 3 %}}, depth_camera]"
+    (tmp_path / "model.yaml").write_text(MODEL.format(language="rospy", sensor=sensor))
+    traces = []
+    for seed in (1, 1, 2):
+        options = Options(out=tmp_path / "run", seed=seed, record="/rover_1/depth/image_rect")
+        assert simulate(tmp_path / "model.yaml", options).ok
+        traces.append((tmp_path / "run" / "trace.mcap").read_bytes())
+    assert traces[0] == traces[1]
+    assert traces[0] != traces[2]
