@@ -97,8 +97,9 @@ class SensorNode(NamedTuple):
         while not node.closed:
             rate.sleep()
             sample = self.flight.measurement(sensor.name)
-            if sensor.latency:
-                sleep(self.graph.kernel, sensor.latency)
+            remaining = sample.time + sensor.latency - self.graph.kernel.now()
+            if remaining > 0:
+                sleep(self.graph.kernel, remaining)
             for publication, publisher in advertised:
                 message = new(publication.type)
                 if hasattr(message, "header"):

@@ -105,6 +105,39 @@ def test_a_sensor_that_no_package_provides_is_an_error_of_the_model(tmp_path):
         simulate(tmp_path / "model.yaml", Options(out=None))
 
 
+PICTURES = """
+import rospy
+from sensor_msgs.msg import CameraInfo, Image
+def hear(message):
+    late = rospy.Time.now() - message.header.stamp
+    rospy.loginfo("%s %d %d", message.header.frame_id, len(message.data), late.to_nsec() // 10**6)
+if __name__ == "__main__":
+    rospy.init_node("watch")
+    rospy.Subscriber("/rover_1/camera/image_raw", Image, hear)
+    known = lambda info: rospy.loginfo("K %.1f", info.K[0])
+    rospy.Subscriber("/rover_1/camera/camera_info", CameraInfo, known)
+    rospy.spin()
+"""
+
+
+def test_pictures_come_late_and_are_stamped_with_their_exposure(tmp_path):
+    (tmp_path / "watch.py").write_text(PICTURES)
+    camera = "[{camera: {width: 64, height: 48, field: 90 deg, latency: 40 ms}}]"
+    (tmp_path / "model.yaml").write_text(MODEL.format(language="rospy", sensor=camera))
+    log = LogOptions(tmp_path / "log.txt")
+    assert simulate(tmp_path / "model.yaml", Options(log=log)).ok
+    heard = [
+        line.split("watch: ")[1]
+        for line in (tmp_path / "log.txt").read_text().splitlines()
+        if "watch: " in line
+    ]
+    assert "K 32.0" in heard
+    frame, size, late = next(one for one in heard if not one.startswith("K")).split()
+    assert (frame, int(size)) == ("camera_optical_frame", 64 * 48)
+    assert 40 <= int(late) < 45
+    assert 15 <= sum(not one.startswith("K") for one in heard) <= 20
+
+
 MAPPING = {
     "rospy": """
 import rospy, tf2_ros
