@@ -201,6 +201,10 @@ class Navigator:
         room = float(ways.clearance[to])
         if room < self.least:
             return f"no way: the goal is {room:.1f} m from an obstacle, and paths keep {self.least:.1f} m"
+        here = float(ways.clearance[ways.start])
+        if ways.cost[to] == np.inf and here < self.least:  # in a gap too narrow to be chosen: out of it
+            side = self.grid.resolution
+            ways = WaysFrom(ways.clearance, side, ways.start, max(here, (1.0 + _ROUNDING) * side))
         cells = ways.straightened(ways.to(to))
         if not len(cells):
             return f"no way to ({goal[0]:.1f}, {goal[1]:.1f}) m is {self.least:.1f} m from all obstacles"

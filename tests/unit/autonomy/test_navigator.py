@@ -95,6 +95,17 @@ def test_it_says_when_there_is_no_way_and_stays() -> None:
     assert navigator.arrived
 
 
+def test_it_leaves_a_gap_that_is_too_narrow_to_be_chosen() -> None:
+    gap = 2.0 * DRONE.room + 0.12
+    walls = np.array(
+        [*closed(0.0, 0.0, 20.0, 12.0), *closed(4.0, 0.0, 8.0, 6.0), *closed(4.0, 6.0 + gap, 8.0, 12.0)]
+    )
+    navigator = Navigator(DRONE, (15.0, 6.0))
+    assert 2.0 * navigator.least > gap
+    fly(navigator, walls, Pose2(6.0, 6.0 + 0.5 * gap), 30.0)
+    assert navigator.arrived
+
+
 def test_it_brakes_when_the_lidar_is_silent_and_goes_on_afterwards() -> None:
     navigator, pose = Navigator(DRONE, (18.0, 10.0)), Pose2(7.0, 10.0)
     assert not navigator.update(0, pose, None, NOWHERE).any()
