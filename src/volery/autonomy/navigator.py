@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from math import isfinite, sqrt
+from math import ceil, isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_closing
 
 from volery.autonomy.avoidance import Motion, safe_velocity
-from volery.autonomy.grid_path import WaysFrom, clearance_of
+from volery.autonomy.grid_path import COMFORT, WaysFrom, clearance_of
 from volery.autonomy.laser_scan import LaserScan2
 from volery.autonomy.occupancy_grid import OccupancyGrid
 from volery.autonomy.planar_pose import Array, Pose2
@@ -30,6 +30,7 @@ _AROUND = 5.0  # [m] by which a path may leave what is mapped
 _SPARE = 0.1  # [m] that a path keeps beyond what a safe velocity needs
 _ROUNDING = 1e-9  # of a cell
 _DEVIATION = 0.4  # [m] of the vehicle from a corner of the path: with it the speed in corners rises
+_LOYAL = 1.2  # times the cost of the best path, up to which a vehicle stays on its path
 _EASY = 0.85  # of the acceleration is planned with: the rest keeps the vehicle on the path
 
 
@@ -110,6 +111,7 @@ class Navigator:
             raise UsageError(f"a goal at {goal}; give finite metres")
         if goal != self._goal:
             self._goal, self._planned, self.arrived, self.no_way = goal, None, False, ""
+            self.way = np.zeros((0, 2))
 
     def update(self, time: Ns, pose: Pose2, scan: LaserScan2 | None, velocity: Array) -> Array:
         """Return the velocity to command.
@@ -195,9 +197,12 @@ class Navigator:
 
     def _plan(self, place: Array, goal: tuple[float, float]) -> str:
         """Plan the path to the goal; return why there is none."""
-        self.way, self._speeds = np.zeros((0, 2)), []
         ways, window = self.ways_from(place, goal)
         to = window.cell(*goal)
+        kept = self._cost_of_way(place, ways, window)
+        if kept < np.inf and kept <= _LOYAL * ways.cost[to]:
+            return ""
+        self.way, self._speeds = np.zeros((0, 2)), []
         room = float(ways.clearance[to])
         if room < self.least:
             return f"no way: the goal is {room:.1f} m from an obstacle, and paths keep {self.least:.1f} m"
@@ -242,8 +247,8 @@ class Navigator:
         closed: NDArray[np.bool_] = binary_closing(grid.free, np.ones((3, 3), dtype=bool))
         return closed & ~grid.occupied
 
-    def _wanted(self, place: Array, velocity: Array) -> Array:
-        """Return the velocity towards a point ahead on the path, as fast as corners and goal allow."""
+    def _progress(self, place: Array) -> tuple[int, float, Array]:
+        """Return the nearest leg of the path, how far along the path that is, and where its legs end [m]."""
         sides = np.diff(self.way, axis=0)
         lengths = np.sqrt((sides * sides).sum(axis=1))
         share = np.clip(((place - self.way[:-1]) * sides).sum(axis=1) / (lengths * lengths), 0.0, 1.0)
@@ -251,6 +256,35 @@ class Navigator:
         at = int((off * off).sum(axis=1).argmin())
         ends = np.cumsum(lengths)
         along = float(ends[at] - (1.0 - share[at]) * lengths[at])
+        return at, along, ends
+
+    def _cost_of_way(self, place: Array, ways: WaysFrom, window: Window) -> float:
+        """Return the cost of what is left of the path, as of ``WaysFrom``; infinity if it comes too near.
+
+        It may be nearer by a cell than a new one: else ways would change with each cell that a scan corrects.
+        """
+        if not len(self.way):
+            return np.inf
+        _, along, ends = self._progress(place)
+        count = ceil(2.0 * (ends[-1] - along) / window.side) + 1
+        lengths = np.linspace(along, ends[-1], count)
+        places = [np.interp(lengths, [0.0, *ends], self.way[:, axis]) for axis in (1, 0)]
+        corner = (window.south, window.west)
+        cells = [
+            np.clip((value - low) / window.side, 0, size - 1).astype(int)
+            for value, low, size in zip(places, corner, ways.clearance.shape, strict=True)
+        ]
+        rooms = ways.clearance[tuple(cells)]
+        if rooms.min() < self.least - window.side:
+            return np.inf
+        weights = 1.0 + 2.0 * np.maximum(0.0, 1.0 - rooms / COMFORT)
+        return float(weights.mean() * (ends[-1] - along))
+
+    def _wanted(self, place: Array, velocity: Array) -> Array:
+        """Return the velocity towards a point ahead on the path, as fast as corners and goal allow."""
+        at, along, ends = self._progress(place)
+        sides = np.diff(self.way, axis=0)
+        lengths = np.diff(ends, prepend=0.0)
         present = sqrt(float((velocity * velocity).sum()))
         speed = self.motion.fastest
         for end, corner in zip(ends[at:], self._speeds[at + 1 :], strict=True):
