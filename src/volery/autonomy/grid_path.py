@@ -59,13 +59,13 @@ class WaysFrom:
         """Cost of the way to each cell: metres, each near an obstacle counted up to three times."""
         self._from = np.full(clearance.shape, -1, dtype=np.int64)
         if self._holds(start):
-            shape = (1,) * (3 - clearance.ndim) + clearance.shape
+            where = (*(1, 1, *clearance.shape)[-3:], *(0, 0, *start)[-3:])
             spread_ways.bind(
-                self.clearance.reshape(shape),
+                self.clearance.reshape(-1),
                 np.array((resolution, least, COMFORT)),
-                np.array((0, 0, *start)[-3:], dtype=np.int64),
-                self.cost.reshape(shape),
-                self._from.reshape(shape),
+                np.array(where, dtype=np.int64),
+                self.cost.reshape(-1),
+                self._from.reshape(-1),
                 np.zeros(clearance.size, dtype=np.int64),
                 np.zeros(clearance.size, dtype=np.int64),
             )()
@@ -148,18 +148,17 @@ def _drop_first(
 
 def _compose(digest: str) -> Callable[..., int]:
     def spread_ways(  # noqa: PLR0917  # a kernel: one loop, its arrays
-        clearance: NDArray[np.float64],
+        room: NDArray[np.float64],
         scales: NDArray[np.float64],
-        start: NDArray[np.int64],
-        costs: NDArray[np.float64],
+        where: NDArray[np.int64],
+        cost: NDArray[np.float64],
         came: NDArray[np.int64],
         heap: NDArray[np.int64],
         place: NDArray[np.int64],
     ) -> int:
-        layers, rows, columns = clearance.shape
+        layers, rows, columns = where[0], where[1], where[2]
         resolution, least, comfort = scales[0], scales[1], scales[2]
-        room, cost, origin = clearance.reshape(-1), costs.reshape(-1), came.reshape(-1)
-        first = (start[0] * rows + start[1]) * columns + start[2]
+        first = (where[3] * rows + where[4]) * columns + where[5]
         cost[first] = 0.0
         heap[0], place[first], count = first, 1, 1
         while count > 0:
@@ -181,7 +180,7 @@ def _compose(digest: str) -> Callable[..., int]:
                             1.0 + 2.0 * max(0.0, 1.0 - room[to] / comfort)
                         )
                         if further < cost[to]:
-                            cost[to], origin[to] = further, at
+                            cost[to], came[to] = further, at
                             if place[to] == 0:
                                 count += 1
                                 _raise_entry(heap, place, cost, count - 1, to)
@@ -196,13 +195,6 @@ spread_ways = NumericCode(
     "spread_ways",
     _compose,
     (Path(__file__),),
-    (
-        "float64[:,:,::1]",
-        "float64[::1]",
-        "int64[::1]",
-        "float64[:,:,::1]",
-        "int64[:,:,::1]",
-        *["int64[::1]"] * 2,
-    ),
+    ("float64[::1]", "float64[::1]", "int64[::1]", "float64[::1]", *["int64[::1]"] * 3),
 )
 """Spread the cost of the cheapest ways over a grid."""
