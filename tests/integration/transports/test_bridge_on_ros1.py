@@ -135,33 +135,33 @@ def test_a_vehicle_behind_mavros(
         assert not drone.armed
 
 
-def armed_by_tools(debian: Run, namespace: str) -> str:
-    """The state after it was armed by Debian's tools."""
+def armed_by_tools(debian: Run, start: Start, types: str, namespace: str) -> str:
+    """The mode in which it is armed by Debian's tools: for seconds, as an autopilot on the ground disarms."""
+    watched = start("env", types, "PYTHONUNBUFFERED=1", "rostopic", "echo", f"{namespace}/state")
+    assert "header" in watched.stdout.readline()
     said = debian("rosservice", "call", f"{namespace}/cmd/arming", "value: true")
     assert "success: True" in said, said
-    return str(
-        until(
-            lambda: re.search(
-                r"armed: True(?s:.*)mode: .*", debian("rostopic", "echo", "-n1", f"{namespace}/state")
-            ),
-            "to be armed",
-        )[0]
-    )
+    while "armed: True" not in watched.stdout.readline():
+        assert watched.poll() is None
+    while not (line := watched.stdout.readline()).startswith("mode:"):
+        assert watched.poll() is None
+    return str(line)
 
 
-def test_a_paparazzi_goes_by_the_names_of_mavros(debian: Run, start: Start) -> None:
+def test_a_paparazzi_goes_by_the_names_of_mavros(debian: Run, start: Start, types: str) -> None:
     bridged(start, "sim:paparazzi?start=warm", "--names", "mavros", "--namespace", "/paparazzi")
     before = debian("rostopic", "echo", "-n1", "/paparazzi/state")
     assert "connected: True" in before
     assert "armed: False" in before
-    assert 'mode: "NAV"' in armed_by_tools(debian, "/paparazzi")
+    assert 'mode: "NAV"' in armed_by_tools(debian, start, types, "/paparazzi")
 
 
-def test_a_dji_on_the_graph_gets_other_names_there(debian: Run, start: Start) -> None:
+def test_a_dji_on_the_graph_gets_other_names_there(debian: Run, start: Start, types: str) -> None:
     served = start(*COMMAND, "vehicle", "serve", "dji", "--graph", "ros1", "--speed", "4")
-    assert "serving dji on ros1" in served.stdout.readline()
+    while "serving dji on ros1" not in served.stdout.readline():
+        assert served.poll() is None
     bridged(start, "dji+ros1:///dji_sdk", "--names", "mavros", "--namespace", "/dji")
-    state = armed_by_tools(debian, "/dji")
+    state = armed_by_tools(debian, start, types, "/dji")
     assert 'mode: "P_GPS"' in state or 'mode: "ENGINE_START"' in state  # for 2 s after the motors start
 
 
