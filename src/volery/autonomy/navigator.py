@@ -68,7 +68,8 @@ class Navigator:
 
         navigator = Navigator(Motion(radius=0.35, speed=3.0, acceleration=3.0, sight=20.0), goal=(30.0, 4.0))
         while not navigator.arrived:
-            drone.set_velocity(*navigator.update(now, pose, scan, velocity))
+            east, north = navigator.update(now, pose, scan, velocity)
+            drone.set_velocity(north, east)
     """
 
     def __init__(
