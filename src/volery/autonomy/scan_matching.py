@@ -20,17 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.autonomy.planar_pose import Array, Pose2
-from volery.base.elementary import exp, sine_cosine
+from volery.base.elementary import sine_cosine
 from volery.base.numeric_code import NumericCode, numeric
 
 RESOLUTION = 0.05
 """Side of a cell of the likelihood field [m]."""
-BLUR = 0.08
-"""Standard deviation [m] of the likelihood field: noise of a beam and of its direction at some metres."""
 LEVELS = 6
 """Levels of the field: blocks of 1 to 32 cells."""
 
-_REACH = 0.2  # [m] a point farther from all lines than this has no likelihood
+_REACH = 0.17  # [m] from a point to where it has no likelihood: noise of a beam and of its direction
 _SIDE = 0.25  # [m] side of the cells in which the nearest line is looked for
 _DISTANCES = (0.5, 0.5, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.15, 0.15, 0.1, 0.1, 0.1, 0.1, 0.1)
 """Farthest line [m] that a point is paired with, for each iteration of the alignment."""
@@ -292,8 +290,9 @@ def _compose_spread(digest: str) -> Callable[..., int]:
                 for cell in range(max(column - around, 0), min(column + around, columns - 1) + 1):
                     off_x, off_y = (cell + 0.5 - x) * RESOLUTION, (line + 0.5 - y) * RESOLUTION
                     square = off_x * off_x + off_y * off_y
-                    if square < _REACH * _REACH:
-                        field[line, cell] = max(field[line, cell], exp(-0.5 * square / (BLUR * BLUR)))
+                    near = 1.0 - square / (_REACH * _REACH)
+                    if near > 0.0:  # the biweight kernel: nearly normal, with an end
+                        field[line, cell] = max(field[line, cell], near * near)
         return 1 if digest else 0
 
     return spread_likelihood

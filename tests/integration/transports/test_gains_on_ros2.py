@@ -22,7 +22,7 @@ def test_a_gain_that_rclpy_sets_is_used_in_flight(tmp_path: Path) -> None:
     out = tmp_path / "run"
     python, environment = python_of("jazzy"), surroundings()
     arguments = ["control", "go", "rotation", "--graph", "ros2", "--angle", "0", "--angle", "30"]
-    arguments += ["--hold", "20"]  # in which the gain is set
+    arguments += ["--hold", "60"]  # in which the gain is set
     arguments += ["--on", "sim:ardupilot?start=warm", "--speed", "3", "--out", str(out)]
     told = {"env": environment, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     tune = [python, str(HERE / "rclpy_parameters.py"), "/volery_go", "yaw.kp", "1.5"]

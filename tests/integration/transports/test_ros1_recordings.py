@@ -149,7 +149,8 @@ def test_the_graph_of_a_roscore(roscore: Any, start: Start, volery: Volery, tmp_
     assert {"/listener", "/rosout", "/talker"} <= set(picture["nodes"])
     assert not any("volery" in one for one in picture["nodes"])
     chatter, repeated = topics["/chatter"], topics["/heard"]
-    assert (chatter["publishers"], chatter["subscribers"]) == (["/talker"], ["/listener"])
+    assert "/talker" in chatter["publishers"], "one of another test may be ending"
+    assert chatter["subscribers"] == ["/listener"]
     assert (repeated["type"], repeated["publishers"]) == (STRING, ["/listener"])
     assert chatter["rate"] > 0  # how many: tests/unit/ros/graph/test_snapshot.py
     assert topics["/rosout"]["type"] == message_class("rosgraph_msgs/msg/Log").__msgtype__

@@ -14,6 +14,7 @@ from copy import copy
 from functools import cache
 from hashlib import md5
 from operator import attrgetter
+from threading import RLock
 from typing import Any, NamedTuple
 
 from volery.base.errors import UsageError
@@ -244,15 +245,20 @@ def _noetic() -> rosbags.Typestore:
     return rosbags.get_typestore(rosbags.Stores.ROS1_NOETIC)
 
 
+_registering = RLock()
+"""A store of rosbags takes types of one thread at a time; on a real graph each task is a thread."""
+
+
 def definition_store(full: str) -> rosbags.Typestore:
     """Return Noetic's store with type `full`; a type that Noetic lacks has the fields of ROS 2 there."""
     ours, noetic = store(), _noetic()
-    if full not in noetic.fielddefs:
-        for _, what in ours.fielddefs[full][1]:
-            inner = _nested(what)
-            if inner and inner not in _TIMES:
-                definition_store(inner)
-        noetic.register({full: ours.fielddefs[full]})
+    with _registering:
+        if full not in noetic.fielddefs:
+            for _, what in ours.fielddefs[full][1]:
+                inner = _nested(what)
+                if inner and inner not in _TIMES:
+                    definition_store(inner)
+            noetic.register({full: ours.fielddefs[full]})
     return noetic
 
 

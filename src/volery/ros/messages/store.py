@@ -377,7 +377,7 @@ def _stated(what: Any) -> str:
 
 def types() -> list[str]:
     """Return the names of all message types, sorted."""
-    return sorted(name for name in store().fielddefs if name.split("/")[1] == "msg")
+    return sorted(name for name in list(store().fielddefs) if name.split("/")[1] == "msg")
 
 
 def type_hash(name: str) -> bytes:
@@ -388,14 +388,14 @@ def type_hash(name: str) -> bytes:
 def service_types() -> list[str]:
     """Return the names of all service types without those of actions, sorted."""
     ending = "_Request"
-    names = (name for name in store().fielddefs if name.endswith(ending) and "/srv/" in name)
+    names = (name for name in list(store().fielddefs) if name.endswith(ending) and "/srv/" in name)
     return sorted(name.removesuffix(ending) for name in names)
 
 
 def action_types() -> list[str]:
     """Return the names of all action types, sorted."""
     ending = "_FeedbackMessage"
-    return sorted(name.removesuffix(ending) for name in store().fielddefs if name.endswith(ending))
+    return sorted(name.removesuffix(ending) for name in list(store().fielddefs) if name.endswith(ending))
 
 
 def _full(name: str, kind: str) -> str:

@@ -139,10 +139,10 @@ class TransportGraph:
 
     def notice(self) -> None:
         """Note for ``unserved`` which topics of this process have another side now, else what is there."""
-        for node in self._nodes.values():
+        for node in list(self._nodes.values()):  # of other threads, too
             node.notice()
         wants, now = self._graph.wants, self.kernel.now()
-        if all(one.met for one in wants.entries.values() if one.node in self._nodes):
+        if all(one.met for one in list(wants.entries.values()) if one.node in self._nodes):
             return
         for topic in self.topics():
             for kind, nodes in ((PUBLISHED, topic.publishers), (SUBSCRIBED, topic.subscribers)):
