@@ -24,10 +24,11 @@ BY_FILE := --dist loadfile --no-loadscope-reorder --durations=5
 
 test: $(VENV)/test.stamp caches ## all tests, against real sockets, clients and a browser
 	@status=0; \
-	echo "real ROS, of whose time most is waiting, in two processes beside all others; its result comes last"; \
-	$(BIN)/pytest -n 2 $(BY_FILE) tests/integration/transports >$(VENV)/transports.log 2>&1 & transports=$$!; \
-	$(BIN)/pytest -n auto $(BY_FILE) -m "not long and not optional" --ignore tests/integration/transports \
-		|| status=1; \
+	$(BIN)/pytest -n auto $(BY_FILE) -m "not integration and not optional and not long" || status=1; \
+	echo "real ROS, of whose time most is waiting, beside the other integration tests; its result comes last"; \
+	$(BIN)/pytest --durations=5 -m "not long" tests/integration/transports >$(VENV)/transports.log 2>&1 & transports=$$!; \
+	$(BIN)/pytest -n auto $(BY_FILE) -m "integration and not long" tests/integration \
+		--ignore tests/integration/transports || status=1; \
 	wait $$transports || status=1; \
 	cat $(VENV)/transports.log; \
 	exit $$status

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from volery.trace.events import ControlSample, Text
+from volery.trace.events import ControlSample
 from volery.trace.reader import read
 
 from .conftest import HERE, python_of, surroundings
@@ -22,7 +22,7 @@ def test_a_gain_that_rclpy_sets_is_used_in_flight(tmp_path: Path) -> None:
     out = tmp_path / "run"
     python, environment = python_of("jazzy"), surroundings()
     arguments = ["control", "go", "rotation", "--graph", "ros2", "--angle", "0", "--angle", "30"]
-    arguments += ["--hold", "60"]  # in which the gain is set
+    arguments += ["--hold", "20"]  # in which the gain is set
     arguments += ["--on", "sim:ardupilot?start=warm", "--speed", "3", "--out", str(out)]
     told = {"env": environment, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     tune = [python, str(HERE / "rclpy_parameters.py"), "/volery_go", "yaw.kp", "1.5"]
@@ -39,7 +39,6 @@ def test_a_gain_that_rclpy_sets_is_used_in_flight(tmp_path: Path) -> None:
             process.kill()
             process.communicate()
     events = list(read(out / "trace.mcap").events)
-    assert any("are in use" in one.text for one in events if isinstance(one, Text))
     turn = [
         one for one in events if isinstance(one, ControlSample) and one.loop == "yaw" and one.goal == 30.0
     ]
