@@ -339,7 +339,7 @@ class SampledSensor(ABC):
     Args:
         name: Name by which the sensor is mounted and read.
         rate: Samples per second [Hz]; samples lie on the world's grid of 2 ms.
-        mounting: Where it is on the body; ``None``: not stated, and no transform tells of it.
+        mounting: Where it is on the body; ``None``: not stated, and no transform is published.
         topic: Topic of its messages, below that of the vehicle; its name if it is empty.
     """
 
