@@ -9,9 +9,11 @@ arrives. So an engine that repeats a task whose worker was lost gives the same r
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import suppress
+from threading import current_thread, main_thread
 from typing import Any, Final
 
 from volery.base.errors import UsageError, VoleryError
@@ -119,6 +121,7 @@ class RayExecutor(Executor):
         import ray  # noqa: PLC0415  # optional
 
         self._ray = ray
+        ends = signal.getsignal(signal.SIGTERM)
         try:
             if address:
                 ray.init(address, log_to_driver=False, configure_logging=False)
@@ -126,6 +129,9 @@ class RayExecutor(Executor):
                 ray.init("local", _node_ip_address="127.0.0.1", include_dashboard=False, log_to_driver=False)
         except (OSError, ConnectionError, RuntimeError, ValueError) as error:
             raise UsageError(f"no cluster of Ray answers at {address}: {error}") from error
+        finally:
+            if current_thread() is main_thread():  # there Ray has put a handler of its own, and leaves it
+                signal.signal(signal.SIGTERM, ends)
         self.workers = workers or int(ray.cluster_resources().get("CPU", 1))
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any) -> Future[Any]:

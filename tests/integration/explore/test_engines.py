@@ -348,8 +348,10 @@ def ray_settings(tmp_path, monkeypatch):
 
 def test_ray_makes_the_same_rows(undisturbed, tmp_path, ray_settings):
     made, table = undisturbed
+    before = signal.getsignal(signal.SIGTERM)
     campaign = volery.explore(made, tmp_path / "out", SPACE, seeds=SEEDS, on="ray", workers=2)
     assert same_rows(campaign.table(), table)
+    assert signal.getsignal(signal.SIGTERM) == before, "Ray's handler is gone with it"
 
 
 @pytest.mark.long
