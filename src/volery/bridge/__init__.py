@@ -1,4 +1,4 @@
-"""A vehicle as a ROS node under the names of MAVROS, roscopter or pprzros.
+"""A vehicle as a ROS node under the names of MAVROS, roscopter, pprzros or its autopilot's own.
 
 The package knows the graph, messages and links. It translates between ROS messages and frames as those
 programs do, and does no more: it does not wait for the effect of a command and repeats no command.
@@ -7,7 +7,7 @@ know worlds, simulated autopilots or any one driver.
 """
 
 from volery.bridge.mavlink_adapter import MavlinkAdapter
-from volery.bridge.naming_schemes import MAVROS, ROSCOPTER
+from volery.bridge.naming_schemes import MAVLINK_SCHEMES, MAVROS, ROSCOPTER
 from volery.bridge.node_interface import NamingScheme
 from volery.bridge.vehicle_node import (
     PprzrosNode,
@@ -18,6 +18,7 @@ from volery.bridge.vehicle_node import (
 )
 
 __all__ = [
+    "MAVLINK_SCHEMES",
     "MAVROS",
     "ROSCOPTER",
     "MavlinkAdapter",

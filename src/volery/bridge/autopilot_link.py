@@ -14,15 +14,17 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Iterable, Mapping
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Any, NamedTuple, Self
 
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal
+from volery.links import mavlink_messages
 from volery.links.frame import Frame
 from volery.links.link import Link
-from volery.links.pprzlink_messages import message_type
+from volery.links.mavlink_messages import message_type
+from volery.links.pprzlink_messages import message_type as pprzlink_message_type
 from volery.ros.messages.dji_constants import DisplayMode
 
 COPTER = {
@@ -44,7 +46,7 @@ _PX4_MODES = (
 )  # fmt: skip
 PX4 = {sub << 24 | main << 16: name for main, sub, name in _PX4_MODES}
 """The modes of PX4 are the same for all vehicle types."""
-PAPARAZZI = dict(enumerate(message_type("ROTORCRAFT_STATUS").words("ap_mode")))
+PAPARAZZI = dict(enumerate(pprzlink_message_type("ROTORCRAFT_STATUS").words("ap_mode")))
 DJI = {mode.value: mode.name for mode in DisplayMode}
 
 GENERIC_ID, ARDUPILOT_ID, PAPARAZZI_ID, PX4_ID = 0, 3, 9, 12
@@ -93,7 +95,10 @@ def mode_names(autopilot: AutopilotType) -> list[str]:
 INVALID_AUTOPILOT = 8
 """MAV_AUTOPILOT of ground stations and companion computers."""
 _KEPT_ALL = frozenset(
-    {"STATUSTEXT", "MISSION_ITEM_REACHED", "HEARTBEAT", "PARAM_VALUE", "LOG_ENTRY", "LOG_DATA"}
+    {
+        *("STATUSTEXT", "MISSION_ITEM_REACHED", "HEARTBEAT", "PARAM_VALUE", "LOG_ENTRY", "LOG_DATA"),
+        "COMMAND_ACK",
+    }
 )
 """Messages that are published one by one; of all others only the latest is published."""
 
@@ -234,10 +239,11 @@ class AutopilotLink:
         system, component = self.target
         if name == "MANUAL_CONTROL":  # the only message that addresses a system but no component
             self.send(name, {"target": system, **fields})
-        elif name in ("STATUSTEXT", "GPS_RTCM_DATA"):  # have no addressee
-            self.send(name, fields)
         else:
-            self.send(name, {"target_system": system, "target_component": component, **fields})
+            to = {"target_system": system, "target_component": component}
+            # some have no addressee, or only a system
+            known = mavlink_messages.message_type(name).field_names
+            self.send(name, {one: value for one, value in to.items() if one in known} | fields)
 
 
 # -- telemetry streams
@@ -291,10 +297,19 @@ class StreamRequests:
         link: Link to the autopilot.
         rates: Rates in Hz by MAV_DATA_STREAM.
         home: Whether to request the home position and the landed state as well.
+        messages: Rates in Hz of single messages, by name.
     """
 
-    def __init__(self, link: AutopilotLink, rates: Mapping[int, int], *, home: bool) -> None:
+    def __init__(
+        self,
+        link: AutopilotLink,
+        rates: Mapping[int, int],
+        *,
+        home: bool,
+        messages: Mapping[str, float] = MappingProxyType({}),
+    ) -> None:
         self._link, self._rates, self._home = link, rates, home
+        self._messages = messages
         self._next: Ns = 0
 
     def check(self, now: Ns) -> None:
@@ -312,6 +327,10 @@ class StreamRequests:
                 self._request_messages(stream, rate)
             else:
                 request_stream(self._link, stream, rate)
+        for name, hertz in self._messages.items():
+            received = self._link.latest.get(name)
+            if received is None or now - received.at > max(MISSING_AFTER, round(2 * S / hertz)):
+                self._command(SET_MESSAGE_INTERVAL, message_type(name).id, 1e6 / hertz)
         if self._home:
             if "EXTENDED_SYS_STATE" not in self._link.latest:
                 self._command(SET_MESSAGE_INTERVAL, EXTENDED_SYS_STATE, 1e6)

@@ -36,7 +36,7 @@ from volery.ros.messages import message_class, new, service
 ACK_TIMEOUT: Ns = 5 * S
 ACCEPTED, FAILED, IN_PROGRESS = 0, 4, 5
 CUSTOM_MODE_ENABLED = 1
-LAND, TAKEOFF, SET_HOME, ARM_DISARM, SET_MESSAGE_INTERVAL = 21, 22, 179, 400, 511
+LAND, TAKEOFF, SET_HOME, ARM_DISARM, GET_HOME, SET_MESSAGE_INTERVAL = 21, 22, 179, 400, 410, 511
 _INT_FIELDS = ("frame", "command", "current", "autocontinue", "param1", "param2", "param3", "param4", *"xyz")
 
 
@@ -57,6 +57,7 @@ class CommandServices:
             "cmd/command": ("mavros_msgs/srv/CommandLong", self.command),
             "cmd/command_int": ("mavros_msgs/srv/CommandInt", self.command_int),
             "cmd/set_home": ("mavros_msgs/srv/CommandHome", self.set_home),
+            "home_position/req_update": ("std_srvs/srv/Trigger", self.request_home),
             "set_stream_rate": ("mavros_msgs/srv/StreamRate", self.set_stream_rate),
             "set_message_interval": ("mavros_msgs/srv/MessageInterval", self.set_message_interval),
         }
@@ -75,20 +76,30 @@ class CommandServices:
         padded = [*parameters, *[0.0] * (7 - len(parameters))]
         fields: dict[str, Any] = {"command": command, "confirmation": confirmation}
         fields.update({f"param{number}": value for number, value in enumerate(padded, start=1)})
+        result = self.request("COMMAND_LONG", fields)
+        return result == ACCEPTED, FAILED if result is None else result
+
+    def request(self, message: str, fields: Fields) -> int | None:
+        """Send a COMMAND_LONG or COMMAND_INT and wait for its acknowledgement.
+
+        Returns:
+            The MAV_RESULT, or None without an acknowledgement within ``ACK_TIMEOUT``.
+        """
+        command = fields["command"]
         with self._one_at_a_time, self._link.subscribe("COMMAND_ACK") as acknowledgements:
-            self._link.send_to_autopilot("COMMAND_LONG", fields)
+            self._link.send_to_autopilot(message, fields)
             kernel = self._link.kernel
             until = kernel.now() + ACK_TIMEOUT  # other commands are acknowledged meanwhile
             while True:
                 answer = acknowledgements.next(max(0, until - kernel.now()))
                 if answer is None:
                     self._warn(f"command {command}: no acknowledgement within {ACK_TIMEOUT // S} s")
-                    return False, FAILED
-                result = answer.fields["result"]
+                    return None
+                result: int = answer.fields["result"]
                 if answer.fields["command"] != command:
                     continue
                 if result != IN_PROGRESS:
-                    return result == ACCEPTED, result
+                    return result
                 until = kernel.now() + ACK_TIMEOUT
 
     def set_mode(self, request: Any) -> Any:
@@ -148,6 +159,11 @@ class CommandServices:
         answer = self.send_command(SET_HOME, current, 0.0, 0.0, request.yaw, *place)
         return service("mavros_msgs/srv/CommandHome").response(*answer)
 
+    def request_home(self, request: Any) -> Any:
+        """Handle ``home_position/req_update``: the autopilot sends its home position."""
+        accepted, _ = self.send_command(GET_HOME)
+        return service("std_srvs/srv/Trigger").response(accepted, "")
+
     def set_stream_rate(self, request: Any) -> Any:
         """Handle ``set_stream_rate``, which MAVLink does not acknowledge."""
         rate = request.message_rate if request.on_off else 0
@@ -166,6 +182,8 @@ BODY_FRAMES = frozenset({8, 9})
 LOCAL_NED, GLOBAL_INT = 1, 5
 POSITION_AND_YAW = 8 | 16 | 32 | 64 | 128 | 256 | 2048
 VELOCITY_AND_YAW_RATE = 1 | 2 | 4 | 64 | 128 | 256 | 1024
+ACCELERATION_ONLY = 1 | 2 | 4 | 8 | 16 | 32 | 1024 | 2048
+ATTITUDE_RATES_IGNORED, ATTITUDE_IGNORED = 1 | 2 | 4, 128
 
 
 def subscriptions(geoid: Geoid) -> tuple[Subscription, ...]:
@@ -174,7 +192,12 @@ def subscriptions(geoid: Geoid) -> tuple[Subscription, ...]:
     def position_global(message: Any, now: Ns) -> OutgoingMessage:
         return _position_global(message, now, geoid)
 
+    attitudes = ThrustPairs()
     return (
+        Subscription("setpoint_accel/accel", "geometry_msgs/msg/Vector3Stamped", acceleration),
+        Subscription("setpoint_attitude/attitude", "geometry_msgs/msg/PoseStamped", attitudes.attitude),
+        Subscription("setpoint_attitude/cmd_vel", "geometry_msgs/msg/TwistStamped", attitudes.rates),
+        Subscription("setpoint_attitude/thrust", "mavros_msgs/msg/Thrust", attitudes.thrust),
         Subscription("setpoint_raw/local", "mavros_msgs/msg/PositionTarget", raw_local),
         Subscription("setpoint_raw/global", "mavros_msgs/msg/GlobalPositionTarget", raw_global),
         Subscription("setpoint_position/local", "geometry_msgs/msg/PoseStamped", position_local),
@@ -299,6 +322,53 @@ def velocity_unstamped(message: Any, now: Ns) -> OutgoingMessage:
         "vz": vz,
         "yaw_rate": -message.angular.z,
     }
+
+
+def acceleration(message: Any, now: Ns) -> OutgoingMessage:
+    """Translate ``setpoint_accel/accel``: ENU in m/s^2."""
+    return "SET_POSITION_TARGET_LOCAL_NED", {
+        "time_boot_ms": now // MS,
+        "coordinate_frame": LOCAL_NED,
+        "type_mask": ACCELERATION_ONLY,
+        **_motion((0.0, 0.0, 0.0), frames.enu_to_ned(_vector(message.vector))),
+    }
+
+
+class ThrustPairs:
+    """Translates ``setpoint_attitude``: a thrust and an attitude, or body rates, are sent as one.
+
+    MAVROS takes pairs of about the same stamp. Here a message waits for the next of the other topic.
+    """
+
+    def __init__(self) -> None:
+        self._thrust: float | None = None
+        self._turn: Fields | None = None
+
+    def attitude(self, message: Any, now: Ns) -> list[OutgoingMessage]:
+        """Take the attitude of the FLU body in ENU."""
+        turned = message.pose.orientation
+        q = frames.attitude_enu_to_ned((turned.w, turned.x, turned.y, turned.z))
+        self._turn = {"type_mask": ATTITUDE_RATES_IGNORED, "q": list(q)}
+        return self._pair(now)
+
+    def rates(self, message: Any, now: Ns) -> list[OutgoingMessage]:
+        """Take body rates in FLU, rad/s."""
+        roll, pitch, yaw = frames.flu_to_frd(_vector(message.twist.angular))
+        rates = {"body_roll_rate": roll, "body_pitch_rate": pitch, "body_yaw_rate": yaw}
+        self._turn = {"type_mask": ATTITUDE_IGNORED, "q": [1.0, 0.0, 0.0, 0.0], **rates}
+        return self._pair(now)
+
+    def thrust(self, message: Any, now: Ns) -> list[OutgoingMessage]:
+        """Take a thrust 0..1."""
+        self._thrust = message.thrust
+        return self._pair(now)
+
+    def _pair(self, now: Ns) -> list[OutgoingMessage]:
+        if self._thrust is None or self._turn is None:
+            return []
+        fields = {"time_boot_ms": now // MS, **self._turn, "thrust": self._thrust}
+        self._thrust = self._turn = None
+        return [("SET_ATTITUDE_TARGET", fields)]
 
 
 def rc_override(message: Any, now: Ns) -> OutgoingMessage:

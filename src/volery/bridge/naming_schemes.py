@@ -1,4 +1,4 @@
-"""The naming schemes of MAVROS and of roscopter: their topics and services with the same types and units.
+"""The naming schemes of MAVROS, of roscopter and of autopilots themselves: topics, services, types and units.
 
 Differences from MAVROS: publishers are reliable, as in ROS 1; the node sends with the system id of a ground
 station, which is the only one from which ArduPilot accepts manual control; the node requests the streams that
@@ -17,6 +17,9 @@ from functools import partial
 from typing import Any
 
 from volery.base.time import Ns
+from volery.bridge.ardupilot_interface import OLDEST as OLDEST_ARDUPILOT
+from volery.bridge.ardupilot_interface import RATES as ARDUPILOT_RATES
+from volery.bridge.ardupilot_interface import ArduPilotInterface
 from volery.bridge.autopilot_link import (
     ALL,
     EXTENDED_STATUS,
@@ -67,14 +70,20 @@ from volery.bridge.plan_services import (
     MissionServices,
     PlanServices,
 )
+from volery.bridge.position_estimates import estimate_subscriptions
+from volery.bridge.px4_commands import PX4Commands
+from volery.bridge.px4_telemetry import RATES as PX4_RATES
+from volery.bridge.px4_telemetry import ControlMode, PX4Telemetry
 from volery.bridge.status_publishers import (
     DIAGNOSTIC_TOPICS,
     STATUS_TOPICS,
     DiagnosticsPublisher,
     StatusPublisher,
 )
+from volery.bridge.trajectory_setpoints import TRAJECTORY_TOPICS, TrajectorySetpoints
 from volery.links.mavlink_messages import entry_name
 from volery.ros.messages import new, service
+from volery.ros.messages.package_versions import use_version, versions_of
 
 MAVROS_STREAMS: Mapping[int, int] = {
     RAW_SENSORS: 1,
@@ -90,6 +99,7 @@ MAVROS_TOPICS = (
     *POSE_TOPICS,
     *IMU_TOPICS,
     *TARGET_TOPICS,
+    *TRAJECTORY_TOPICS,
     *PLAN_TOPICS,
     *PARAMETER_TOPICS,
     *PAYLOAD_TOPICS,
@@ -104,6 +114,7 @@ def mavros_interface(context: InterfaceContext) -> NodeInterface:
     missions, parameters, logs = MissionServices(context), ParameterServices(context), LogServices(context)
     lists = (missions, PlanServices(context, GEOFENCE), PlanServices(context, RALLY_POINTS))
     poses, diagnostics = PosePublisher(context), DiagnosticsPublisher(context)
+    trajectories = TrajectorySetpoints(context)
     others = (ImuPublisher(context), TargetPublisher(context), TransformPublisher(context))
     parts = (status, poses, *others, missions, parameters, logs, diagnostics)
 
@@ -112,20 +123,27 @@ def mavros_interface(context: InterfaceContext) -> NodeInterface:
         diagnostics.disconnected(stamp)
 
     def due(now: Ns) -> Callable[[], None] | None:
-        jobs = (one.due(now) for one in lists)
+        jobs = (one.due(now) for one in (trajectories, *lists))
         return next((job for job in jobs if job is not None), None)
 
     raw = () if context.parameter_services else (raw_subscription(context.node.namespace),)
     return NodeInterface(
         topics=MAVROS_TOPICS,
         translators=merge_translators(*(part.translators() for part in parts)),
-        subscriptions=(*subscriptions(context.geoid), *payload_subscriptions(), *raw),
+        subscriptions=(
+            *subscriptions(context.geoid),
+            *trajectories.subscriptions(),
+            *estimate_subscriptions(context.geoid),
+            *payload_subscriptions(),
+            *raw,
+        ),
         due=due,
         services={
             **commands.services(),
             **parameters.services(),
             **logs.services(),
             **mount_services(commands),
+            **trajectories.services(),
             **{name: one for part in lists for name, one in part.services().items()},
         },
         disconnected=disconnected,
@@ -269,3 +287,65 @@ def roscopter_interface(context: InterfaceContext) -> NodeInterface:
 
 
 ROSCOPTER = NamingScheme("roscopter", roscopter_interface, {ALL: 10}, home=False)
+
+
+def px4_interface(version: str, context: InterfaceContext) -> NodeInterface:
+    """Return the interface of a PX4 of *version* under the names of its uXRCE-DDS client."""
+    offboard = ControlMode()
+    telemetry = PX4Telemetry(context, offboard, version)
+    commands = PX4Commands(context, offboard, telemetry, CommandServices(context))
+    return NodeInterface(
+        topics=telemetry.topics(),
+        translators=merge_translators(telemetry.translators()),
+        subscriptions=commands.subscriptions(),
+        services=commands.handlers(),
+        disconnected=_ignore_disconnection,
+    )
+
+
+def _px4(version: str) -> NamingScheme:
+    return NamingScheme(
+        "px4",
+        partial(px4_interface, version),
+        streams={},
+        home=False,
+        messages=PX4_RATES,
+        as_received=True,
+        prepare=partial(use_version, "px4_msgs", version),
+    )
+
+
+def ardupilot_interface(version: str, context: InterfaceContext) -> NodeInterface:
+    """Return the interface of an ArduPilot of *version* under the names of its DDS client."""
+    made = ArduPilotInterface(context, version)
+    return NodeInterface(
+        topics=made.topics(),
+        translators=merge_translators(made.translators()),
+        subscriptions=made.subscriptions(),
+        services=made.services(),
+        disconnected=_ignore_disconnection,
+    )
+
+
+def _ardupilot(version: str) -> NamingScheme:
+    return NamingScheme(
+        "ap",
+        partial(ardupilot_interface, version),
+        streams={},
+        home=False,
+        messages=ARDUPILOT_RATES,
+        as_received=True,
+    )
+
+
+_NEWEST, *_OLDER = versions_of("px4_msgs")
+
+MAVLINK_SCHEMES: Mapping[str, NamingScheme] = {
+    "mavros": MAVROS,
+    "roscopter": ROSCOPTER,
+    "px4": _px4(_NEWEST),
+    **{f"px4-{version}": _px4(version) for version in _OLDER},
+    "ardupilot": _ardupilot("4.8"),
+    f"ardupilot-{OLDEST_ARDUPILOT}": _ardupilot(OLDEST_ARDUPILOT),
+}
+"""All schemes of vehicles that speak MAVLink, by the names that models and options have for them."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from volery.base.frames import LocalFrame
@@ -82,6 +82,7 @@ class InterfaceContext:
         origin: Origin of the frame ``map``; None is the autopilot's own origin.
         parameter_services: Whether parameters are offered by the services of ROS 2, as MAVROS 2 does.
         pose_transform: Whether the pose is published on ``/tf``.
+        epoch: ROS time at the kernel's zero, ns.
     """
 
     node: Node
@@ -94,6 +95,7 @@ class InterfaceContext:
     origin: LocalFrame | None = None
     parameter_services: bool = False
     pose_transform: bool = True
+    epoch: Ns = 0
 
 
 @dataclass(frozen=True)
@@ -106,6 +108,9 @@ class NamingScheme:
         streams: Rates in Hz of the telemetry streams that the interface needs, by MAV_DATA_STREAM.
         home: Whether the interface needs the home position and the landed state.
         sensors: Beginnings of the topics that have the QoS of sensors in ROS 2.
+        messages: Rates in Hz of single messages that the interface needs as well, by name.
+        as_received: Whether frames are published as they arrive, whatever period a node is given.
+        prepare: Called once before a node is made, in the order in which nodes are.
     """
 
     node: str
@@ -113,6 +118,9 @@ class NamingScheme:
     streams: Mapping[int, int]
     home: bool
     sensors: tuple[str, ...] = ()
+    messages: Mapping[str, float] = field(default_factory=dict)
+    as_received: bool = False
+    prepare: Callable[[], None] = lambda: None
 
 
 def stamped(at: Ns, frame_id: str = "") -> Any:

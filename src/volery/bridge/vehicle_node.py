@@ -16,7 +16,7 @@ cannot be sent is dropped with a warning.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -56,8 +56,7 @@ class VehicleNodeOptions:
     Args:
         names: Naming scheme.
         period: Period of the loop in ns; None publishes frames as they arrive.
-        streams: Rates in Hz of the requested telemetry streams by MAV_DATA_STREAM; None uses those of the
-            scheme.
+        rate: Rate in Hz of the requested telemetry; None requests what the scheme does, 0 nothing.
         silent: Time in ns without a heartbeat after which the autopilot counts as disconnected.
         system: Own MAVLink system id.
         component: Own MAVLink component id.
@@ -67,12 +66,13 @@ class VehicleNodeOptions:
         origin: Origin of the frame ``map``; None is the autopilot's own origin.
         parameter_services: Whether parameters are offered by the services of ROS 2, as MAVROS 2 does.
         best_effort: Whether sensors are published best effort, as MAVROS 2 does.
+        remaps: Names of topics and services, and their replacements.
         pose_transform: Whether the pose is published on ``/tf``; not where odometry moves the same frame.
     """
 
     names: NamingScheme = MAVROS
     period: Ns | None = 100 * MS
-    streams: Mapping[int, int] | None = None
+    rate: int | None = None
     silent: Ns = 10 * S
     system: int = 255
     component: int = 191
@@ -82,6 +82,7 @@ class VehicleNodeOptions:
     origin: LocalFrame | None = None
     parameter_services: bool = False
     best_effort: bool = False
+    remaps: Mapping[str, str] = field(default_factory=dict)
     pose_transform: bool = True
 
 
@@ -94,8 +95,8 @@ class VehicleNode:
         self._graph, self._kernel = graph, graph.kernel
         self.namespace, self.options = namespace, options
         self.link = AutopilotLink(graph.kernel, link, options.system, options.component, options.vehicle)
-        rates = options.names.streams if options.streams is None else options.streams
-        self._streams = StreamRequests(self.link, rates, home=options.names.home and bool(rates))
+        options.names.prepare()
+        self._streams = _stream_requests(self.link, options)
         self._publishers: dict[str, Publisher] = {}
         self._on_demand: set[str] = set()
         self._warned: set[str] = set()
@@ -129,7 +130,7 @@ class VehicleNode:
 
     def _run(self, context: ExecutionContext, scope: Scope) -> None:
         options = self.options
-        node = self._graph.node(options.names.node, self.namespace, context=context)
+        node = self._graph.node(options.names.node, self.namespace, remaps=options.remaps, context=context)
         helper = replace(context, deadline=None, period=None, on_release=None)
         interface = options.names.make_interface(
             InterfaceContext(
@@ -143,13 +144,15 @@ class VehicleNode:
                 options.origin,
                 options.parameter_services,
                 options.pose_transform,
+                self._graph.epoch,
             )
         )
         self.link.publish_only(interface.translators)
         self._advertise(node, interface)
         self._subscribe(node, interface, helper, scope)
         self._serve(node, interface, helper, scope)
-        rate = None if options.period is None else node.rate(options.period)
+        period = None if options.names.as_received else options.period
+        rate = None if period is None else node.rate(period)
         while not node.closed:
             self._cycle(node, interface)
             job = interface.due(self._kernel.now())
@@ -311,6 +314,19 @@ class VehicleNode:
         self.link.send("HEARTBEAT", fields)
 
 
+def _stream_requests(link: AutopilotLink, options: VehicleNodeOptions) -> StreamRequests:
+    """Return the requests of the scheme, at the stated rate and, for single messages, at most at that."""
+    names, rate = options.names, options.rate
+    if rate == 0:
+        return StreamRequests(link, {}, home=False)
+    streams, messages = names.streams, names.messages
+    if rate is not None:
+        streams = dict.fromkeys(streams, rate)
+        fastest = max(messages.values(), default=0.0)
+        messages = {name: rate if hertz == fastest else min(hertz, rate) for name, hertz in messages.items()}
+    return StreamRequests(link, streams, home=names.home, messages=messages)
+
+
 def serve_vehicle(
     graph: RosGraph,
     link: Link,
@@ -318,7 +334,10 @@ def serve_vehicle(
     context: ExecutionContext,
     options: VehicleNodeOptions = VehicleNodeOptions(),
 ) -> VehicleNode:
-    """Serve the autopilot behind *link* under ``/name`` until the end of the run, executing in *context*."""
+    """Serve the autopilot behind *link* under ``/name`` until the end of the run, executing in *context*.
+
+    An empty name is that of the root, ``/``.
+    """
     served = VehicleNode(graph, link, f"/{name}", options)
     served.start(context, graph.kernel.root)
     return served

@@ -14,6 +14,7 @@ from volery.components.instance import ComponentContext, Instance
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
 from volery.kernel.task import Task
+from volery.ros.graph import Node
 from volery.trace.events import Charge, Milestone, Text
 
 SEVERITIES = {"error": 3, "warning": 4, "info": 6, "debug": 7}
@@ -118,6 +119,21 @@ def note(kind: str, subject: str, state: str, detail: str = "") -> None:
         words[name] = str(word).encode(errors="backslashreplace").decode()  # surrogates are no UTF-8
     with kernel:
         kernel.record(Milestone(kernel.now(), task.context.component, **words))
+
+
+def node() -> Node:
+    """Return the component's node on the ROS graph of the run: the interface ``volery.ros.graph.Node``.
+
+    It joins with the first call, under the component's name. Files for rospy and rclpy have a node by their
+    library.
+
+    Raises:
+        UsageError: The caller is no component in Python of the application.
+    """
+    instance = component_of(caller("volery.node()")[1])
+    if instance is None or instance.join_graph is None:
+        raise UsageError("volery.node() works in a component with `language: python`")
+    return instance.join_graph()
 
 
 def log(text: str, severity: str = "info") -> None:

@@ -21,6 +21,7 @@ from volery.cost import FREE, STEPS_PER_NS, Cost, Pricing
 from volery.kernel.api import Kernel
 from volery.kernel.task import Cancelled, ComputeResource, ExecutionContext, Scope, Task
 from volery.kernel.waiting import Lock, Signal, executing_in
+from volery.ros.graph import Node
 from volery.trace.events import Charge, Failure
 
 COMPONENT_MARK = "__volery_user__"
@@ -109,6 +110,7 @@ class Instance:
         self.operations = operations
         self.object: object | None = None  # until its constructor has returned
         self.scope: Scope | None = None
+        self.join_graph: Callable[[], Node] | None = None  # returns its node, if it may have one
         self.on_failure: OnFailure = lambda name, error: None
         self.on_thread_failure: OnFailure = lambda name, error: None
         self.threads: list[Joinable] = []  # those that the end of a script waits for

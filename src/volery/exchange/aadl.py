@@ -15,6 +15,7 @@ from volery.base.files import one_line
 from volery.base.time import Ns
 from volery.base.units import QuantityError
 from volery.exchange.notes import (
+    Note,
     Unmapped,
     connections,
     default_allocation,
@@ -22,7 +23,6 @@ from volery.exchange.notes import (
     note_rest,
     without_provenance,
 )
-from volery.exchange.uml.context import Note
 
 _MANY = "[]"
 _MAPPED = ("volery", "name", "description", "interfaces", "components", "application", "environment")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from dataclasses import replace as changed
 from functools import partial
 from pathlib import Path, PurePath
@@ -12,11 +14,14 @@ from typing import Any
 from volery.base.errors import Location, ModelError, UsageError, choices
 from volery.base.files import read_bytes, write_text
 from volery.exchange.aadl import aadl_text
+from volery.exchange.launch.launch_model import Computer, launch_tree, read_launch
+from volery.exchange.launch.launch_reading import Packages
+from volery.exchange.launch.launch_text import launch_ending, launch_text
+from volery.exchange.notes import Note
 from volery.exchange.sysml import sysml_text
 from volery.exchange.uml.components_view import Rebase
-from volery.exchange.uml.context import Note
 from volery.exchange.uml.uml_model import Imported, export_uml, import_uml, located
-from volery.exchange.uml.xmi import MOST_BYTES
+from volery.exchange.xml_text import MOST_BYTES
 from volery.model.assembly import model_file, read_tree
 from volery.model.builder import ModelBuilder
 from volery.model.reading import Vocabulary
@@ -25,7 +30,12 @@ from volery.model.system_loader import load
 from volery.model.text import CollectedModelError
 from volery.model.writing import model_text
 
-FORMATS = {".uml": "UML with MARTE and S3D", ".aadl": "AADL", ".sysml": "SysML v2"}
+FORMATS = {
+    ".uml": "UML with MARTE and S3D",
+    ".aadl": "AADL",
+    ".sysml": "SysML v2",
+    ".launch": "ROS 1; also .launch.xml and .launch.py of ROS 2",
+}
 """Formats of an export by the ending of the file."""
 
 OF_THE_TEXT = frozenset(code for code in RULES if code < MISSING_FILE.code) - {MISSING_KEY.code}
@@ -115,11 +125,21 @@ def _moved_changes(variant: Any, rebase: Rebase) -> Any:
     changes = variant.get("set") if isinstance(variant, dict) else None
     if not isinstance(changes, dict):
         return variant
-    moved = {key: rebase(one) for key, one in changes.items() if key == _WORLD and isinstance(one, str)}
-    return variant | {"set": changes | moved}
+    moved = {key: _moved_value(key, value, rebase) for key, value in changes.items()}
+    return variant | {"set": moved}
 
 
-_WORLD = "environment.world"
+def _moved_value(key: str, value: Any, rebase: Rebase) -> Any:
+    """Return what a change sets, with the path of a world or of a component's file as another needs it."""
+    if isinstance(value, str) and (key == "environment.world" or _PATH.fullmatch(key)):
+        return rebase(value)
+    if isinstance(value, dict) and _COMPONENT.fullmatch(key) and isinstance(value.get("path"), str):
+        return value | {"path": rebase(value["path"])}
+    return value
+
+
+_COMPONENT = re.compile(r"components\.[^.]+")
+_PATH = re.compile(r"components\.[^.]+\.path")
 
 
 def _outside(tree: Mapping[str, Any]) -> list[str]:
@@ -173,7 +193,54 @@ def import_model(
     return imported
 
 
-def export_model(model: Path, target: Path, vocabulary: Vocabulary) -> tuple[Note, ...]:
+@dataclass(frozen=True)
+class ImportedLaunch:
+    """The model of a launch file, and notes on what has no place in it."""
+
+    tree: dict[str, Any]
+    notes: tuple[Note, ...]
+
+
+def is_launch_file(source: Path) -> bool:
+    """Return whether a file is a launch file of ROS, by its ending, or for XML by its root element."""
+    if source.suffix == ".xml":
+        try:
+            return b"<launch" in read_bytes(source, MOST_BYTES)[:_HEAD]
+        except OSError:
+            return False
+    return source.suffix in (".launch", ".py", ".yaml", ".yml")
+
+
+_HEAD = 1 << 14
+"""Bytes of a file that its root element begins in."""
+
+
+def import_launch(
+    source: Path,
+    out: Path,
+    given: Mapping[str, str],
+    packages: Packages,
+    computer: Computer,
+    *,
+    replace: bool = False,
+) -> ImportedLaunch:
+    """Write the model of a launch file to *out*, as YAML; see ``read_launch`` and ``launch_tree``.
+
+    Raises:
+        ModelError: *source* is no launch file, or starts nothing.
+        UsageError: *out* exists and is not to be replaced, or cannot be written.
+    """
+    if out.exists() and not replace:
+        raise UsageError(f"{out} exists; --replace writes over it")
+    reading = read_launch(source, given, packages)
+    tree = launch_tree(reading, source, out.parent, computer)
+    _write(out, model_text(tree))
+    return ImportedLaunch(tree, reading.notes)
+
+
+def export_model(
+    model: Path, target: Path, vocabulary: Vocabulary, packages: Packages | None = None
+) -> tuple[Note, ...]:
     """Write a model to *target* in the format of its ending; return what has no place in it.
 
     A .uml file that exists is updated: ids, diagrams and what volery does not know stay valid.
@@ -182,18 +249,22 @@ def export_model(model: Path, target: Path, vocabulary: Vocabulary) -> tuple[Not
         model: The model's file, or its folder.
         target: The new file.
         vocabulary: Names that are defined outside the model.
+        packages: Finds the packages of programs, for a launch file.
 
     Raises:
         ModelError: the text of the model is wrong, or the existing .uml file cannot be read.
         UsageError: the ending of *target* is of no known format, or it cannot be written.
     """
-    if target.suffix not in FORMATS:
+    ending = launch_ending(target) if packages is not None else ""
+    if not ending and target.suffix not in FORMATS:
         listed = choices([f"{ending} ({what})" for ending, what in FORMATS.items()])
         raise UsageError(f"{target}: its ending chooses the format: {listed}")
     file = model_file(model)
     _check_form(file, vocabulary)
     tree = read_tree(file).plain()
-    if target.suffix == ".uml":
+    if ending and packages is not None:
+        text, notes = launch_text(tree, file.parent, ending, packages)
+    elif target.suffix == ".uml":
         base = read_uml(target, file.parent, vocabulary.processors) if target.exists() else None
         if base is not None and base.file.parts:
             files = ", ".join(base.file.parts)

@@ -1,11 +1,30 @@
-"""What a format has no place for: one note for each part of a model, shared by AADL and SysML v2."""
+"""What a format has no place for: a note for each thing. ``Unmapped`` collects them by kind."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any
 
+from volery.base.errors import Location
 from volery.model.fields import STATED_KEYS
+
+
+@dataclass(frozen=True)
+class Note:
+    """What was not imported or exported as it stands, where, and what to do.
+
+    ``lost`` is false where nothing was left out: a name that was changed, a value that was assumed.
+    """
+
+    what: str
+    where: Location | None = None
+    element: str = ""
+    lost: bool = True
+
+    def __str__(self) -> str:
+        place = f"{self.where}: " if self.where else ""
+        return f"{place}{self.element + ': ' if self.element else ''}{self.what}"
 
 
 class Unmapped:

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from volery.exchange.notes import (
+    Note,
     Unmapped,
     connections,
     default_allocation,
@@ -18,7 +19,6 @@ from volery.exchange.notes import (
     note_rest,
     without_provenance,
 )
-from volery.exchange.uml.context import Note
 
 _MANY = "[]"
 _MAPPED = (

@@ -236,6 +236,9 @@ def _every_header() -> list[str]:
     """Return the names of all headers that come with volery; those for Eigen where it is installed."""
     eigen = any((folder / "Eigen").is_dir() for folder in roscpp.FALLBACK)
     names = sorted(str(file.relative_to(roscpp.INCLUDE)) for file in roscpp.INCLUDE.rglob("*.h"))
+    names += ["angles/angles.h", "tf2/exceptions.h", "tf2/linear_math.h"]
+    shared = INCLUDE[1]
+    names += sorted(str(file.relative_to(shared)) for file in shared.glob("message_filters/**/*.h"))
     return [name for name in names if eigen or "eigen" not in name]
 
 

@@ -213,6 +213,32 @@ def a_node_that_cannot_be_destroyed(site: Site, texts: list[str]) -> None:
     goes_on.set()
 
 
+def a_part_that_cannot_be_taken(site: Site, texts: list[str]) -> None:
+    """Where rclpy fails to take one part of a node, the others go on, and it is said."""
+    speaker, listener = site.node("speaker"), site.spinning(site.node("listener"))
+    heard: list[str] = []
+    broken: Any = listener.subscribe("broken", STRING, lambda one: None)
+
+    def fail() -> None:
+        raise RuntimeError("not to be taken")
+
+    for handler in broken.subscription._subscription.event_handlers:
+        handler.take_data = fail
+    listener.subscribe("chat", STRING, lambda one: heard.append(one.data))
+    speaker.advertise("broken", STRING)
+    site.until(speaker, lambda: any("not to be taken" in one for one in texts), "it is said")
+    publisher = speaker.advertise("chat", STRING)
+    site.until(speaker, publisher.subscribers, "they connect")
+    publisher.publish(new(STRING, data="still here"))
+    site.until(speaker, lambda: heard == ["still here"], "the other topic is heard")
+    kind = service(SET_MODE)
+    speaker.serve("set_mode", SET_MODE, lambda asked: kind.response(True))
+    site.spinning(speaker)
+    client = listener.client("set_mode", SET_MODE)
+    demand(client.wait(LIMIT), "it is served")
+    demand(client.call(request(SET_MODE, custom_mode="LAND"), LIMIT).mode_sent, "its calls are answered")
+
+
 FAULTS = (
     a_type_without_support,
     a_type_with_other_fields,
@@ -222,6 +248,7 @@ FAULTS = (
     a_subscriber_that_never_reads,
     another_type_on_our_topic,
     a_thousand_topics,
+    a_part_that_cannot_be_taken,
     a_node_that_cannot_be_destroyed,
 )
 

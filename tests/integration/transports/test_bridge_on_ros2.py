@@ -26,13 +26,15 @@ def beside() -> Iterator[Beside]:
     python, around = python_of("jazzy"), surroundings()
     started: list[subprocess.Popen[str]] = []
 
-    def run(script: str, argument: str, *options: str) -> dict[str, Any]:
+    def run(
+        script: str, argument: str, *options: str, url: str = "sim:ardupilot?start=warm"
+    ) -> dict[str, Any]:
         bridge = (
             python,
             *COMMAND[1:],
             "ros",
             "bridge",
-            "sim:ardupilot?start=warm",
+            url,
             "--graph",
             "ros2",
             "--speed",
@@ -70,6 +72,16 @@ def test_a_vehicle_behind_mavros(beside: Beside) -> None:
     assert found["parameters"] > 800
     assert found["rally"] == 1
     assert abs(found["roll"]) < 10.0
+
+
+@pytest.mark.parametrize(("autopilot", "mode"), [("px4", "AUTO.LOITER"), ("ardupilot", "GUIDED")])
+def test_a_vehicle_behind_its_own_names(beside: Beside, autopilot: str, mode: str) -> None:
+    url = f"sim:{autopilot}?start=warm"
+    found = beside("ros2_own_topics.py", f"{autopilot}+ros2:///", "--names", autopilot, url=url)
+    assert found["home"] == pytest.approx(900.0, abs=2.0)
+    assert found["went"] == pytest.approx(0.00008, abs=1e-5)
+    assert found["mode"] == mode
+    assert not found["armed"]
 
 
 def test_the_graph_is_shown_to_whoever_has_just_come(beside: Beside) -> None:

@@ -47,7 +47,7 @@ def assert_delivered(folder: Path, said: str) -> None:
     assert (folder / "run.json").exists(), said
     record: dict[str, Any] = json.loads((folder / "run.json").read_text())
     assert record["outcome"]["status"] == "completed", said
-    assert record["notes"]["parcel"]["parcel-1"]["state"] == "delivered"
+    assert record["notes"]["parcel"]["parcel-1"]["state"] == "delivered", said
     assert record["outcome"]["requirements_met"], record["requirements"]
     assert all(vehicle["landed"] for vehicle in record["vehicles"].values())
     assert not record["failures"]
@@ -69,7 +69,8 @@ def run(command: list[str], env: Mapping[str, str], cwd: Path) -> str:
     return said
 
 
-def test_catkin_builds_it_and_roslaunch_delivers_the_parcel(tmp_path: Path) -> None:
+def built_by_catkin(tmp_path: Path) -> tuple[Deployment, Path, dict[str, str], int]:
+    """The packages in a workspace that catkin has built, the environment of programs, the master's port."""
     if not available() or not all(map(shutil.which, ("roslaunch", "catkin_make"))):
         lacking("no rospy, roslaunch or catkin_make here (scripts/debian-packages ros1)")
     made = deployed(tmp_path / "ws" / "src", 1)
@@ -83,13 +84,36 @@ def test_catkin_builds_it_and_roslaunch_delivers_the_parcel(tmp_path: Path) -> N
     workspace = tmp_path / "ws"
     built = ["catkin_make", "-C", str(workspace), f"-DPYTHON_EXECUTABLE={sys.executable}"]
     run(built, env, workspace)
-    assert_types_are_those_of_the_build(workspace, made.interfaces)
-    options = " ".join((*SETTINGS, "--out", str(tmp_path / "out")))
-    start = f"roslaunch -p {port} {made.verification} {made.verification}.launch options:='{options}'"
+    return made, workspace, env, port
+
+
+def started_by_roslaunch(built: tuple[Deployment, Path, dict[str, str], int], *options: str) -> str:
+    """What roslaunch says of the whole system, which runs to its end."""
+    made, workspace, env, port = built
+    start = f"roslaunch -p {port} {made.verification} {made.verification}.launch"
     debian = "export ROS_PACKAGE_PATH=$ROS_PACKAGE_PATH:/usr/share"
-    said = run(["bash", "-c", f". devel/setup.bash && {debian} && exec {start}"], env, workspace)
-    assert_delivered(tmp_path / "out", said)
+    return run(
+        ["bash", "-c", f". devel/setup.bash && {debian} && exec {start} options:='{' '.join(options)}'"],
+        env,
+        workspace,
+    )
+
+
+def test_catkin_builds_it_and_roslaunch_starts_it(tmp_path: Path) -> None:
+    built = built_by_catkin(tmp_path)
+    assert_types_are_those_of_the_build(built[1], built[0].interfaces)
+    settings = ("--seed", "7", "--speed", "1.5", "--set", "run.duration=4s", "--out", str(tmp_path / "out"))
+    said = started_by_roslaunch(built, *settings)
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert record["notes"]["parcel"]["parcel-1"]["history"][0]["state"] == "ordered", said
+    assert not record["failures"]
     assert "process has finished cleanly" in said
+
+
+@pytest.mark.long  # minutes of ten processes: as a deployment it delivers on ROS 2
+def test_roslaunch_delivers_the_parcel(tmp_path: Path) -> None:
+    settings = (*SETTINGS, "--out", str(tmp_path / "out"))
+    assert_delivered(tmp_path / "out", started_by_roslaunch(built_by_catkin(tmp_path), *settings))
 
 
 def assert_types_are_those_of_the_build(workspace: Path, package: str) -> None:
@@ -177,7 +201,7 @@ def test_pip_installs_it_and_the_entry_points_deliver_the_parcel_on_ros_2(tmp_pa
         assert len(started) == 9
         said = run([str(installed / "bin" / "world"), *SETTINGS, "--out", "out"], env, tmp_path)
         assert_all_end(started)
-    assert_delivered(tmp_path / "out", said)
+        assert_delivered(tmp_path / "out", said + "".join(map(complaints_of, started)))
 
 
 @contextmanager
@@ -206,6 +230,12 @@ def started_on_ros_2(
             process.wait()
             assert process.stderr is not None
             process.stderr.close()  # it may have been read to its end
+
+
+def complaints_of(process: subprocess.Popen[str]) -> str:
+    """What a process that has ended wrote to standard error."""
+    assert process.stderr is not None
+    return f"\n{process.args}: {process.stderr.read()}"
 
 
 def assert_all_end(started: list[subprocess.Popen[str]]) -> None:

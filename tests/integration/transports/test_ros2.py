@@ -27,6 +27,7 @@ FAULTS = (
     "fault-a-subscriber-that-never-reads",
     "fault-another-type-on-our-topic",
     "fault-a-thousand-topics",
+    "fault-a-part-that-cannot-be-taken",
     "fault-a-node-that-cannot-be-destroyed",
     "the-end",
 )

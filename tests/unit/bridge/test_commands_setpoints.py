@@ -95,3 +95,30 @@ def test_the_waypoint_that_is_the_current_one(rig: Any) -> None:
     rig.emit("MISSION_CURRENT", seq=4)
     rig.run(200 * MS)
     assert [(message.current_seq, len(message.waypoints)) for message in received] == [(3, 1), (4, 1)]
+
+
+def test_an_acceleration(rig: Any) -> None:
+    rig.connect()
+    vector = {"x": 1.0, "y": 2.0, "z": 3.0}
+    rig.publish("setpoint_accel/accel", "geometry_msgs/Vector3Stamped", vector=vector)
+    rig.run(10 * MS)
+    [sent] = rig.asked("SET_POSITION_TARGET_LOCAL_NED")
+    assert (sent["afx"], sent["afy"], sent["afz"]) == (2.0, 1.0, -3.0)
+    assert sent["type_mask"] == 0xC3F
+
+
+def test_a_thrust_and_an_attitude_or_rates_are_sent_as_one(rig: Any) -> None:
+    rig.connect()
+    topic = "setpoint_attitude"
+    rig.publish(f"{topic}/thrust", "mavros_msgs/Thrust", thrust=0.5)
+    rig.run(10 * MS)
+    assert rig.asked("SET_ATTITUDE_TARGET") == []
+    rig.publish(f"{topic}/attitude", "geometry_msgs/PoseStamped", pose={"orientation": {"w": 1.0}})
+    rig.run(10 * MS)
+    rig.publish(f"{topic}/cmd_vel", "geometry_msgs/TwistStamped", twist={"angular": {"y": 0.25}})
+    rig.publish(f"{topic}/thrust", "mavros_msgs/Thrust", thrust=0.25)
+    rig.run(10 * MS)
+    attitude, rates = rig.asked("SET_ATTITUDE_TARGET")
+    assert (attitude["thrust"], attitude["type_mask"]) == (0.5, 7)
+    assert [abs(one) for one in attitude["q"]] == pytest.approx([0.5**0.5, 0.0, 0.0, 0.5**0.5])
+    assert (rates["thrust"], rates["type_mask"], rates["body_pitch_rate"]) == (0.25, 128, -0.25)

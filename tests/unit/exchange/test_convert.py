@@ -7,7 +7,7 @@ import pytest
 from rigs.watch_model import write_watch_model
 from volery.base.errors import ModelError, UsageError
 from volery.exchange.convert import export_model, import_model, read_uml
-from volery.exchange.uml.xmi import MOST_BYTES
+from volery.exchange.xml_text import MOST_BYTES
 from volery.model.assembly import read_tree
 from volery.model.system_loader import load
 from volery.run.assembly.model_checks import vocabulary
@@ -86,7 +86,7 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
 
 
 def test_the_ending_chooses_the_format(watch, tmp_path):
-    with pytest.raises(UsageError, match=r"its ending chooses the format: \.aadl \(AADL\), \.sysml"):
+    with pytest.raises(UsageError, match=r"its ending chooses the format: \.aadl \(AADL\), \.launch"):
         export_model(watch, tmp_path / "x.xmi", WORDS)
     with pytest.raises(UsageError, match="cannot write"):
         export_model(watch, tmp_path / "none" / "x.sysml", WORDS)

@@ -9,14 +9,14 @@ of the model, and calls its operations. Values of the model's types (``bool``, `
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from volery.base.errors import Location, ModelError, choices
+from volery.base.errors import Location, ModelError, UsageError, choices
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
 from volery.components.cpp.compiler import CppToolchain, ReportProgress, cache_folder
 from volery.components.cpp.sources import Sources, find_sources
@@ -250,8 +250,9 @@ def compile_each(
 class CppComponent:
     """A type of component in C++.
 
-    ``class_name`` is empty for a program with a ``main``. ``flags`` go to the compiler, ``libraries`` to the
-    linker, without the leading ``-l``. ``where`` is the line of the model that names the file.
+    ``class_name`` is empty for a program with a ``main``. ``node_class`` is the class of a client library's
+    node, if the model states it. ``flags`` go to the compiler, ``libraries`` to the linker, without the
+    leading ``-l``. ``where`` is the line of the model that names the file.
     """
 
     name: str
@@ -263,6 +264,7 @@ class CppComponent:
     flags: tuple[str, ...] = ()
     libraries: tuple[str, ...] = ()
     where: Location | None = None
+    node_class: str = ""
 
 
 @dataclass(frozen=True)
@@ -271,13 +273,15 @@ class ClientLibrary:
 
     ``include`` folders are searched before the system's, ``fallback`` folders after them. ``generate`` makes
     message headers for the names that a component includes; the text of one that is not offered begins with
-    ``not_offered``, and says why.
+    ``not_offered``, and says why. ``main_of`` returns the text of a file with the ``main`` that a component's
+    sources lack, or ``""``.
     """
 
     include: tuple[Path, ...] = ()
     fallback: tuple[Path, ...] = ()
     generate: GenerateHeaders = lambda includes, folder, found: {}
     not_offered: str = "//"
+    main_of: Callable[[Sources, str], str] = lambda sources, node_class: ""
 
 
 @dataclass(frozen=True)
@@ -307,13 +311,18 @@ def compile_component(
     headers = _generated_headers(component, client_library, sources)
     include = (sources.folder, headers, *client_library.include, *INCLUDE, *sources.folders)
     fallback = (option for path in client_library.fallback for option in ("-idirafter", str(path)))
-    files = _translation_units(component, sources)
+    files = [*_translation_units(component, sources), *_main(component, client_library, sources)]
     try:
         units = compiled_by(tools, files, include, (*component.flags, *fallback))
     except ModelError as error:
         error = _of_the_class(component, sources, error)
         raise _with_missing_headers(sources, headers, client_library.not_offered, error) from None
-    ours = ["component.cpp", "virtual_time.cpp", *(["main_entry.cpp"] if not component.class_name else [])]
+    ours = [
+        "component.cpp",
+        "virtual_time.cpp",
+        "virtual_threads.cpp",
+        *(["main_entry.cpp"] if not component.class_name else []),
+    ]
     objects = [*units, *(_runtime_object(name) for name in ours)]
     options = [str(framework), *(f"-l{library}" for library in component.libraries)]
     return CompiledComponent(component, tools.library(objects, options), framework)
@@ -404,6 +413,16 @@ def _translation_units(component: CppComponent, sources: Sources) -> list[Path]:
     )
     name = file.with_suffix(".cpp").name  # what is said of this unit is said of the user's file
     return [_write_generated({name: text}) / name, *(one for one in sources.compiled if one != file)]
+
+
+def _main(component: CppComponent, client_library: ClientLibrary, sources: Sources) -> Iterator[Path]:
+    """Yield the file with the ``main`` that the client library provides, if any."""
+    try:
+        text = client_library.main_of(sources, component.node_class)
+    except UsageError as error:
+        raise ModelError(str(error), component.name, component.where) from None
+    if text:
+        yield _write_generated({"main_of_node.cpp": text}) / "main_of_node.cpp"
 
 
 def _write_generated(texts: Mapping[str, str]) -> Path:

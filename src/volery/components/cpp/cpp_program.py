@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -30,8 +30,9 @@ from volery.components.virtual_stdlib import EPOCH
 from volery.components.virtual_stdlib.process_environment import INFO
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
+from volery.kernel.waiting import Signal, current_task
 from volery.ros.client_libraries.abi_codec import CppFiber, Reader, RequestHandler, RequestHandlers, Writer
-from volery.trace.events import Text
+from volery.trace.events import Failure, Text
 from volery.vehicles import Drone
 
 STICK_FULL_SCALE = 1000
@@ -59,6 +60,7 @@ def request_handlers(
     """
     return {
         **_service_handlers(kernel),
+        **_thread_handlers(kernel, name),
         **_port_handlers(name, ports),
         "parameter": _ParameterHandler(name, parameters),
     }
@@ -109,6 +111,39 @@ def _service_handlers(kernel: Kernel) -> dict[str, RequestHandler]:
         "note": note,
         "exit": exit_process,
     }
+
+
+def _thread_handlers(kernel: Kernel, component: str) -> dict[str, RequestHandler]:
+    """Return the handlers of threads, and of the waits for what another thread does."""
+    changed = Signal(kernel, f"{component} (a thread)")
+    changes = 0
+
+    def thread(fiber: CppFiber, arguments: Reader) -> bytes:
+        number = arguments.integer()
+        task = current_task(kernel)
+        context = replace(task.contexts[0], deadline=None, period=None, on_release=None)
+
+        def body() -> None:
+            try:
+                fiber.call_beside(number)
+            except Exception as error:
+                kernel.record(Failure(kernel.now(), component, f"a thread raised {error}"))
+
+        kernel.spawn(body, f"{component} (a thread)", context, task.scope)
+        return b""
+
+    def block(fiber: CppFiber, arguments: Reader) -> bytes:
+        seen, within = arguments.integer(), arguments.integer()
+        changed.wait_for(lambda: changes > seen, None if within < 0 else within, ends_activation=True)
+        return b""
+
+    def wake(fiber: CppFiber, arguments: Reader) -> bytes:
+        nonlocal changes
+        changes += 1
+        changed.notify()
+        return b""
+
+    return {"thread": thread, "block": block, "wake": wake}
 
 
 class _ParameterHandler:

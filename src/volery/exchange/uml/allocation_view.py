@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from volery.exchange.uml.context import Export, Import
-from volery.exchange.uml.xmi import Element, tag, xmi_id
+from volery.exchange.uml.xmi import tag, xmi_id
+from volery.exchange.xml_text import Element
 
 DEFAULT = "default"
 """Name of the allocation that an import makes of links outside all architectural views."""

@@ -14,9 +14,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from volery.exchange.uml.context import Import, identifier
+from volery.exchange.identifiers import identifier
+from volery.exchange.uml.context import Import
 from volery.exchange.uml.notations import SOURCES, figure, tagged
-from volery.exchange.uml.xmi import Element, tag, uml_type
+from volery.exchange.uml.xmi import tag, uml_type
+from volery.exchange.xml_text import Element
 
 STEPS = (
     *("GaStep", "PaStep", "SaStep", "PaCommStep", "GaCommStep"),

@@ -15,7 +15,8 @@ from volery.exchange.uml.context import Export, Import
 from volery.exchange.uml.interfaces_view import EXPOSED, is_many, set_many
 from volery.exchange.uml.notations import properties, property_text, tagged
 from volery.exchange.uml.times_view import ACTIVE, Times, below, generals, write_activity, write_times
-from volery.exchange.uml.xmi import Element, local, tag, uml_type, xmi_id
+from volery.exchange.uml.xmi import local, tag, uml_type, xmi_id
+from volery.exchange.xml_text import Element
 from volery.model.components import LANGUAGES
 from volery.model.text import parse as parse_yaml
 from volery.model.writing import flow_text

@@ -8,7 +8,6 @@ places in the packages and whatever else stands on them are kept, and diagrams o
 from __future__ import annotations
 
 import hashlib
-import re
 from base64 import urlsafe_b64encode
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -17,34 +16,18 @@ from typing import Any
 
 from lxml import etree
 
-from volery.base.errors import Location, ModelError
+from volery.base.errors import ModelError
+from volery.exchange.identifiers import identifier
+from volery.exchange.notes import Note
 from volery.exchange.uml.stereotypes import NAMESPACES, PROFILES, prefix_of
-from volery.exchange.uml.xmi import ECORE, UML, XMI, Element, XmiFile, local, uml_type, xmi_id
+from volery.exchange.uml.xmi import ECORE, UML, XMI, XmiFile, local, uml_type, xmi_id
 from volery.exchange.uml.xmi import tags as tags_of
+from volery.exchange.xml_text import Element
 from volery.model.text import parse as parse_yaml
 from volery.model.writing import flow_text
 
 SOURCE = "volery"
 """Source of the EMF annotations that hold what neither UML nor MARTE nor S3D has a place for."""
-
-_NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
-
-
-@dataclass(frozen=True)
-class Note:
-    """What was not imported or exported as it stands, where, and what to do.
-
-    ``lost`` is false where nothing was left out: a name that was changed, a value that was assumed.
-    """
-
-    what: str
-    where: Location | None = None
-    element: str = ""
-    lost: bool = True
-
-    def __str__(self) -> str:
-        place = f"{self.where}: " if self.where else ""
-        return f"{place}{self.element + ': ' if self.element else ''}{self.what}"
 
 
 def annotation(element: Element) -> dict[str, Any]:
@@ -167,12 +150,6 @@ class Import:
     def finish(self, key: str, element: Element) -> None:
         """Record that *element* stands for *key* and was understood."""
         self.keys.setdefault(key, element)
-
-
-def identifier(text: str) -> str:
-    """Return *text* with everything replaced that a name in a model cannot have; empty if nothing is left."""
-    made = _NO_NAME.sub("_", text.strip()).strip("_-")
-    return f"_{made}" if made[:1].isdigit() else made
 
 
 def _states_nothing(application: Element, name: str) -> bool:

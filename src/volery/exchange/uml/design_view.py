@@ -7,7 +7,8 @@ from typing import Any
 
 from volery.exchange.uml.context import Export, Import
 from volery.exchange.uml.notations import UNITS, split_figure
-from volery.exchange.uml.xmi import Element, tag, tags, xmi_id
+from volery.exchange.uml.xmi import tag, tags, xmi_id
+from volery.exchange.xml_text import Element
 
 _HEAD, _TAIL = "platform.processors.", ".frequency"
 MOST_STEPS = 1000

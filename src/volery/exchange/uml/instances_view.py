@@ -12,7 +12,8 @@ from typing import Any
 from volery.exchange.uml.components_view import instance_owners
 from volery.exchange.uml.context import Export, Import
 from volery.exchange.uml.times_view import generals
-from volery.exchange.uml.xmi import Element, local, uml_type, xmi_id
+from volery.exchange.uml.xmi import local, uml_type, xmi_id
+from volery.exchange.xml_text import Element
 
 _MANY = "[]"
 _ENVIRONMENT = "environment"

@@ -8,7 +8,8 @@ from typing import Any
 from lxml import etree
 
 from volery.exchange.uml.context import Export, Import
-from volery.exchange.uml.xmi import XMI, Element, local, uml_type, xmi_id
+from volery.exchange.uml.xmi import XMI, local, uml_type, xmi_id
+from volery.exchange.xml_text import Element
 from volery.model.components import SPECIAL_INTERFACES
 
 PRIMITIVES = {"bool": "Boolean", "int": "Integer", "float": "Real", "str": "String"}

@@ -7,7 +7,8 @@ from typing import Any
 
 from volery.exchange.uml.context import Export, Import
 from volery.exchange.uml.notations import quantity_text, stated_quantity
-from volery.exchange.uml.xmi import Element, local, tag, tags, uml_type, xmi_id
+from volery.exchange.uml.xmi import local, tag, tags, uml_type, xmi_id
+from volery.exchange.xml_text import Element
 
 SCHEDULERS = {
     "fixed-priority": "FixedPriorityPreEmptive",

@@ -7,7 +7,8 @@ from typing import Any
 
 from volery.exchange.uml.context import Export, Import
 from volery.exchange.uml.notations import SOURCES, tagged, tagged_text
-from volery.exchange.uml.xmi import Element, local, tag, tags, xmi_id
+from volery.exchange.uml.xmi import local, tag, tags, xmi_id
+from volery.exchange.xml_text import Element
 
 ACTIVE = "RtUnit"
 _TIMES = {"best": "BOET", "time": "MOET", "worst": "WOET"}

@@ -10,6 +10,7 @@ from pathlib import PurePath
 from typing import Any
 
 from volery.base.errors import Location, ModelError
+from volery.exchange.notes import Note
 from volery.exchange.uml import (
     allocation_view,
     analysis_view,
@@ -19,10 +20,11 @@ from volery.exchange.uml import (
     interfaces_view,
     platform_view,
 )
-from volery.exchange.uml.context import Export, Import, Note, empty_file
+from volery.exchange.uml.context import Export, Import, empty_file
 from volery.exchange.uml.notations import properties
 from volery.exchange.uml.stereotypes import NAMESPACES, PROFILES
-from volery.exchange.uml.xmi import Element, ReadPart, XmiFile, local, parse
+from volery.exchange.uml.xmi import ReadPart, XmiFile, local, parse
+from volery.exchange.xml_text import Element
 from volery.model.builder import plain_node
 from volery.model.document import Document, EnvironmentText
 from volery.model.fields import entries

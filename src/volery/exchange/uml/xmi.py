@@ -11,16 +11,14 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, TypeAlias
 
 from lxml import etree
 
 from volery.base.errors import Location, ModelError
+from volery.exchange.xml_text import Element, xml_root
 
 MOST_ELEMENTS = 200_000
 """Most elements of a file that is read: a bound of the time, too."""
-MOST_BYTES = 32 << 20
-"""Largest .uml file that is read. The complete profile of S3D with its history has 2.6 MB."""
 
 XMI = "http://www.omg.org/spec/XMI/20131001"
 UML = "http://www.eclipse.org/uml2/5.0.0/UML"
@@ -47,9 +45,6 @@ _OTHER_FILES = {
     "EPackage": ".ecore",
     "Profile": ".profile.uml",
 }
-
-Element: TypeAlias = Any
-"""An element of lxml, which carries no types."""
 
 
 def local(element: Element) -> str:
@@ -277,7 +272,7 @@ def parse(data: bytes, name: str, read_part: ReadPart | None = None) -> XmiFile:
     Raises:
         ModelError: it is too large, no XML, not safe, or no UML model.
     """
-    root = _tree(data, name)
+    root = xml_root(data, name)
     parts = () if read_part is None else _put_together(root, name, read_part)
     count = sum(1 for _ in root.iter(etree.Element))
     if count > MOST_ELEMENTS:
@@ -300,7 +295,7 @@ def _put_together(root: Element, name: str, read_part: ReadPart) -> tuple[str, .
         if file not in parts:
             if len(parts) >= MOST_PARTS:
                 raise ModelError(f"more than {MOST_PARTS} submodels in other files", "", Location(name, 1))
-            parts[file] = _part(root, _tree(read_part(file), file))
+            parts[file] = _part(root, xml_root(read_part(file), file))
         element = parts[file].get(target)
         if element is not None and element not in stub.iterancestors():  # else it is a reference to nothing
             element.tag = stub.tag
@@ -341,26 +336,6 @@ def _local_reference(text: str, files: set[str]) -> str:
     """Return a reference to one of *files* as one within this file."""
     found = _PART.match(text)
     return f"#{found['id']}" if found and PurePosixPath(found["file"]).name in files else text
-
-
-def _tree(data: bytes, name: str) -> Element:
-    if len(data) > MOST_BYTES:
-        what = f"{len(data) / 1e6:.0f} MB; a UML model has at most {MOST_BYTES >> 20} MiB"
-        raise ModelError(what, "", Location(name, 0))
-    if re.search(rb"<!\s*(DOCTYPE|ENTITY)", data[: 1 << 16], re.IGNORECASE) or b"<!ENTITY" in data:
-        what = "a document type or an entity is declared; models have none: remove the declaration"
-        raise ModelError(what, "", Location(name, 1))
-    parser = etree.XMLParser(
-        resolve_entities=False, load_dtd=False, no_network=True, huge_tree=False, remove_blank_text=True
-    )
-    try:
-        root = etree.fromstring(data, parser)
-    except etree.XMLSyntaxError as error:
-        line = error.lineno or 1
-        raise ModelError(f"this is not XML: {error.msg}", "", Location(name, line)) from None
-    if root.getroottree().docinfo.doctype:  # in an encoding in which the search above finds nothing
-        raise ModelError("a document type is declared; models have none", "", Location(name, 1))
-    return root
 
 
 def _model_root(root: Element, name: str) -> Element:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Protocol, Self
 
 _INTEGER = struct.Struct("<q")
+_PAIR = struct.Struct("<qq")
 _REAL = struct.Struct("<d")
 
 
@@ -79,6 +80,11 @@ class Writer:
     def done(self) -> bytes:
         """Return all appended values."""
         return bytes(self.data)
+
+
+def pair(one: int, other: int) -> bytes:
+    """Return two integers as ``Writer`` writes them, for what is written with each message."""
+    return _PAIR.pack(one, other)
 
 
 class CppFiber(Protocol):

@@ -462,6 +462,10 @@ class EmbeddedGraph:
         topic = self._graph.topics.get(topic_name)
         return topic is not None and bool(topic.subscriptions)
 
+    def uses_content(self, topic_name: str) -> bool:
+        """Return whether a node subscribes to the topic, or its messages are recorded with their content."""
+        return self.has_subscribers(topic_name) or self._graph.records(topic_name) is Recorded.ALL
+
     def services(self) -> list[ServiceState]:
         """Return the services that have a server, by name."""
         served = sorted(self._graph.services.items())

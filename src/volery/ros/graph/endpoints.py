@@ -102,6 +102,14 @@ def incompatible(offered: QoS, requested: QoS) -> str:
     return ""
 
 
+_LARGEST = {"nav_msgs/msg/OccupancyGrid": 1 << 20}
+"""Bytes up to which long messages of a type are recorded with their content all the same.
+
+A map is what a run was about; it is published seldom, and its cells pack well: to a sixteenth in
+examples/mapping.
+"""
+
+
 class Connection(NamedTuple):
     """A publisher's connection to a subscription; ``deliver(message, sent, publisher, size)``."""
 
@@ -134,6 +142,7 @@ class EmbeddedPublisher:
         self._latches = qos.durability == TRANSIENT_LOCAL
         self._latched: deque[tuple[Any, Ns, int]] = deque(maxlen=qos.depth)
         self._recorded = node.graph.records(topic.name)
+        self._most = _LARGEST.get(topic.type, 0)
         self._checked = not node.graph.unrecorded  # whether messages are encoded, as real ROS does
         self._sized = False  # whether the size of a message matters otherwise
         self._spacing: Ns = 0  # shortest of the subscriptions', on a graph that takes the place of a link
@@ -224,7 +233,7 @@ class EmbeddedPublisher:
         node = self.node
         data, missing = abridged_cdr(content)
         size = len(data) + missing
-        if missing and self._recorded < Recorded.ALL:
+        if missing and size > self._most and self._recorded < Recorded.ALL:
             node.kernel.record(Omitted(sent, self.topic, self.type, node.name, size))
         else:
             whole = copied_to_cdr(content) if missing else bytes(data)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns, S, from_seconds
@@ -142,6 +143,8 @@ class PlayOptions:
             time on a real graph.
         wait_for_subscribers: Wait until each topic has a subscriber, before the delay.
         on_message: Called for each message with the number of played messages and its recorded time, ns.
+        loop: Begin again at the end, until the node is closed.
+        restamped: Move the stamps of headers by the difference of the graph's time to the recorded one.
     """
 
     rate: float = 1.0
@@ -151,6 +154,8 @@ class PlayOptions:
     delay: float = 0.0
     wait_for_subscribers: bool = False
     on_message: Callable[[int, Ns], None] = lambda played, at: None
+    loop: bool = False
+    restamped: bool = False
 
     def __post_init__(self) -> None:
         if not 0.0 < self.rate < float("inf"):
@@ -170,10 +175,21 @@ def play(node: Node, bag: Bag, how: PlayOptions = PlayOptions()) -> int:
     """
     publishers = _advertise(node, bag, how)
     clock = node.advertise(CLOCK, "rosgraph_msgs/msg/Clock", QoS(1)) if how.clock else None
-    begin = bag.start + from_seconds(how.after)
     while how.wait_for_subscribers and not all(one.subscribers() for one in publishers.values()):
         node.sleep(_LOOK_PERIOD)
     node.sleep(from_seconds(how.delay))
+    played = _pass(node, bag, how, publishers, clock)
+    while how.loop and not node.closed:
+        played += _pass(node, bag, how, publishers, clock)
+    node.sleep(from_seconds(how.delay))
+    return played
+
+
+def _pass(
+    node: Node, bag: Bag, how: PlayOptions, publishers: Mapping[str, Publisher], clock: Publisher | None
+) -> int:
+    """Publish a recording once, from now on; return the number of messages."""
+    begin = bag.start + from_seconds(how.after)
     started = node.now()
     ticked: Ns = begin - _CLOCK_PERIOD
     played = 0
@@ -186,14 +202,35 @@ def play(node: Node, bag: Bag, how: PlayOptions = PlayOptions()) -> int:
             _wait(node, started, ticked - begin, how.rate)
             clock.publish(_clock(ticked))
         _wait(node, started, recorded.at - begin, how.rate)
+        if how.restamped:
+            _move_stamps(recorded.message, started + round((recorded.at - begin) / how.rate) - recorded.at)
         publisher.publish(recorded.message)
         played += 1
         how.on_message(played, recorded.at)
-    node.sleep(from_seconds(how.delay))
     return played
 
 
-def _advertise(node: Node, bag: Bag, how: PlayOptions) -> dict[str, Publisher]:
+_HEADER = "std_msgs/msg/Header"
+
+
+def _move_stamps(value: Any, by: Ns) -> None:
+    """Add *by* to the stamps of all headers in a message; one that is 0 states no time and stays."""
+    if isinstance(value, Message) and value.__msgtype__ == _HEADER:
+        header: Any = value
+        stamp = header.stamp
+        at = stamp.sec * S + stamp.nanosec
+        if at:
+            stamp.sec, stamp.nanosec = divmod(max(at + by, 0), S)
+    elif isinstance(value, Message):
+        for name in value.__match_args__:
+            _move_stamps(getattr(value, name), by)
+    elif isinstance(value, list) and value and isinstance(value[0], Message):
+        for each in value:
+            _move_stamps(each, by)
+
+
+def check_topics(bag: Bag, how: PlayOptions) -> None:
+    """Raise ``UsageError`` if a topic that is to be played was not recorded, or cannot be decoded."""
     there = [topic.name for topic in bag.topics]
     for name in how.topics or ():
         if name in bag.omitted and name not in there:
@@ -203,6 +240,10 @@ def _advertise(node: Node, bag: Bag, how: PlayOptions) -> dict[str, Publisher]:
             raise UsageError(f"{bag.path} has no topic {name!r}{hint}; it has {choices(there)}")
         if name in bag.unreadable and name not in bag.usual:
             raise UsageError(f"{bag.path}: {name} cannot be played: {bag.unreadable[name]}")
+
+
+def _advertise(node: Node, bag: Bag, how: PlayOptions) -> dict[str, Publisher]:
+    check_topics(bag, how)
     wanted = set(bag.usual if how.topics is None else how.topics)
     if how.clock:
         wanted -= {CLOCK}

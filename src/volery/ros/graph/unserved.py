@@ -32,7 +32,8 @@ _ACTION_PARTS = ("/cancel", "/feedback", "/goal", "/result", "/status")
 _ACTION_TYPES = ("ActionFeedback", "ActionGoal", "ActionResult", "/GoalID", "/GoalStatusArray")
 _ACTION_OF_ROS2 = "/_action/"
 
-_DDS_NAMES = {"/fmu/": "PX4's DDS names", "/ap/": "ArduPilot's DDS names"}
+_OWN_NAMES = {"/fmu/": "px4", "/ap/": "ardupilot"}
+"""Beginnings of the names of an autopilot's own interface, and the names of a vehicle that has them."""
 _WRITTEN = {"mavros": "MAVROS", "": "its SDK"}
 
 
@@ -159,12 +160,13 @@ def _near_miss(kind: str, name: str, type_name: str, wants: Wants, around: Surro
     for want in wants.entries.values():
         if (want.kind, want.name) == (other, name) and kind in (PUBLISHED, SUBSCRIBED):
             return f"{want.node} {'publishes' if kind == SUBSCRIBED else 'takes'} it with another QoS or type"
-    for prefix, whose in _DDS_NAMES.items():
-        if prefix in name and around.vehicles:
+    for prefix, wanted in _OWN_NAMES.items():
+        offered = any(names.partition("-")[0] == wanted for names in around.vehicles.values())
+        if prefix in name and around.vehicles and not offered:
             listed = [
                 f"{vehicle} has {_WRITTEN.get(names, names)}'s" for vehicle, names in around.vehicles.items()
             ]
-            return f"no vehicle offers {whose}; {', '.join(listed[:3])}"
+            return f"a vehicle with 'names: {wanted}' offers such topics; {', '.join(listed[:3])}"
     if kind == TRANSFORM:
         return "no node publishes /tf"
     namespace = name.split("/")[1] if name.startswith("/") else ""

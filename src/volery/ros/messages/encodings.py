@@ -21,7 +21,7 @@ from volery.base.errors import UsageError
 from volery.ros.messages import lazy_rosbags as rosbags
 from volery.ros.messages.cdr_encoder import CDR_HEADER, FORMATS, abridged, encode, encoded
 from volery.ros.messages.conversion import FILLER, HEADER, Conversion
-from volery.ros.messages.message import Message
+from volery.ros.messages.message import DEFAULTS, Message
 from volery.ros.messages.store import ROS1_SPELLING, message_class, message_name, service, service_name, store
 
 
@@ -374,7 +374,8 @@ class FieldLayout(NamedTuple):
     """A field: exactly one of ``base`` (a number, bool or string) and ``nested`` (a type's name) is given.
 
     ``length`` is ``None`` for a single value, 0 for a sequence, else the length of an array. ``carried`` is
-    False for what ROS 1 has and the encoding has not: a header's ``seq``.
+    False for what ROS 1 has and the encoding has not: a header's ``seq``. ``default`` is what the definition
+    states, or None.
     """
 
     name: str
@@ -382,6 +383,7 @@ class FieldLayout(NamedTuple):
     nested: str = ""
     length: int | None = None
     carried: bool = True
+    default: Any = None
 
 
 class Constant(NamedTuple):
@@ -405,7 +407,19 @@ def ros1_layout(name: str) -> Layout:
     """Return a message type's layout in ROS 1, or ours where it differs; ``UsageError`` if it is unknown."""
     full = message_name(name)
     message_class(full)
-    of = definition_store(full) if _to_noetic(full).same_bytes else store()
+    return _layout(full, definition_store(full) if _to_noetic(full).same_bytes else store())
+
+
+def ros2_layout(name: str) -> Layout:
+    """Return a message type's layout in ROS 2; ``UsageError`` if it is unknown."""
+    full = message_name(name)
+    message_class(full)
+    found = _layout(full, store())
+    fields = tuple(one._replace(default=DEFAULTS.get((full, one.name))) for one in found.fields)
+    return found._replace(fields=fields)
+
+
+def _layout(full: str, of: rosbags.Typestore) -> Layout:
     constants, fields = of.fielddefs[full]
     return Layout(
         full,

@@ -138,12 +138,19 @@ def store() -> rosbags.Typestore:
     texts: dict[str, str] = {}
     written_out = files("volery.ros.messages").joinpath("definitions").iterdir()
     for file in sorted(written_out, key=lambda file: file.name):
-        package, text = file.name.removesuffix(".txt"), file.read_text(encoding="utf-8")
-        for section in text.split("\n=== ")[1:]:
-            heading, body = section.split("\n", 1)
-            texts.update(interface_messages(f"{package}/{heading.strip()}", body))
+        for name, text in read_definitions(file.name.removesuffix(".txt"), file.read_text("utf-8")).items():
+            texts.update(interface_messages(name, text))
     _register(known, texts)
     return known
+
+
+def read_definitions(package: str, text: str) -> dict[str, str]:
+    """Return the definitions of a file of ``definitions/`` by full name."""
+    found = {}
+    for section in text.split("\n=== ")[1:]:
+        heading, body = section.split("\n", 1)
+        found[f"{package}/{heading.strip()}"] = body
+    return found
 
 
 def parse_messages(name: str, text: str) -> dict[str, Any]:
@@ -320,10 +327,10 @@ def replace_known(name: str, text: str) -> bool:
     Returns:
         Whether the known definition was forgotten.
     """
+    if is_known_as(name, text):
+        return False
     known = store().fielddefs
     stated = interface_messages(name, text)
-    if all(_outline(full, one) == _known_outline(full) for full, one in stated.items()):
-        return False
     if any(full in _KEPT or full in _classes for full in stated):
         return False
     for full, one in stated.items():
@@ -345,6 +352,17 @@ def replace_known(name: str, text: str) -> bool:
                 store().types.pop(part, None)
             return True
     return False
+
+
+def is_known_as(name: str, text: str) -> bool:
+    """Return whether the known definition of a type states the fields and constants of *text*."""
+    stated = interface_messages(name, text)
+    return all(_outline(full, one) == _known_outline(full) for full, one in stated.items())
+
+
+def has_messages(name: str) -> bool:
+    """Return whether messages of a type may exist, so that its definition must stay."""
+    return any(full in _classes for full in (name, f"{name}_Request", f"{name}_Response"))
 
 
 def _outline(full: str, text: str) -> set[str]:

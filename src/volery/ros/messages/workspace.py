@@ -66,10 +66,10 @@ class Workspace:
     """The packages that the files of one run can use; folders are searched once.
 
     Args:
-        below: A folder whose packages are found, too, before those that the environment names.
+        below: Folders whose packages are found, too, before those that the environment names.
     """
 
-    def __init__(self, below: Path | None = None) -> None:
+    def __init__(self, *below: Path) -> None:
         self._below = below
         self._beside: dict[Path, dict[str, Package]] = {}
 
@@ -135,8 +135,7 @@ class Workspace:
     @cached_property
     def _sourced(self) -> dict[str, Package]:
         found: dict[str, Package] = {}
-        below = [] if self._below is None else [self._below]
-        sources = [*below, *entries("ROS_PACKAGE_PATH")]
+        sources = [*self._below, *entries("ROS_PACKAGE_PATH")]
         for one in (*_packages(sources), *_installed(entries("AMENT_PREFIX_PATH"))):
             found.setdefault(one.name, one)
         return found

@@ -37,8 +37,8 @@ class Flown:
         self.driver = open_simulated_driver(self.kernel, self.fleet, wanted, 1)
         self.graph = EmbeddedGraph(self.kernel)
         self.adapter = MavlinkAdapter(self.kernel, self.driver, ExecutionContext("bridge"))
-        names = options.setdefault("names", MAVROS)
-        rates = {"streams": dict.fromkeys(names.streams, 10), "period": None}
+        options.setdefault("names", MAVROS)
+        rates = {"rate": 10, "period": None}
         stated = VehicleNodeOptions(geoid=LevelGeoid(GEOID_M), **{**rates, **options})
         self.node = VehicleNode(self.graph, self.adapter, "/d", stated)
         self.node.start(ExecutionContext("bridge"), self.kernel.root)

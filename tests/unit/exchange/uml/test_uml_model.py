@@ -12,7 +12,8 @@ from volery.base.errors import ModelError, UsageError
 from volery.cli.commands.first_steps import example
 from volery.exchange.convert import export_model, import_model, read_uml
 from volery.exchange.uml.uml_model import export_uml, import_uml
-from volery.exchange.uml.xmi import MOST_BYTES, xmi_id
+from volery.exchange.uml.xmi import xmi_id
+from volery.exchange.xml_text import MOST_BYTES
 from volery.model.assembly import read_tree
 from volery.model.document import schema
 from volery.model.text import parse
@@ -349,7 +350,7 @@ EMPTY = """<xmi:XMI xmlns:xmi="http://www.omg.org/spec/XMI/20131001" xmlns:uml="
             "this is a .di file",
         ),
         (EMPTY.encode(), "nothing in it is a component. Its stereotypes: none."),
-        (b" " * (MOST_BYTES + 1), "a UML model has at most 32 MiB"),
+        (b" " * (MOST_BYTES + 1), "at most 32 MiB are read"),
     ],
 )
 def test_what_is_no_model_is_refused_with_the_reason(data, expected):

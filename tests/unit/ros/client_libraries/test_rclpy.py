@@ -473,6 +473,29 @@ def test_a_latched_topic_reaches_those_who_come_late(stage: Stage) -> None:
     assert stage.run(5 * S) == [7]
 
 
+def test_what_a_profile_leaves_to_the_middleware(stage: Stage) -> None:
+    """As endpoints of rclpy Jazzy state it, on Fast DDS."""
+    stage.script(
+        "user",
+        """
+        import rclpy
+        from rclpy.qos import qos_profile_sensor_data, qos_profile_system_default as default
+        from std_msgs.msg import Int32
+        rclpy.init()
+        node = rclpy.create_node("user")
+        node.create_subscription(Int32, "sensor", lambda message: out(message.data), default)
+        node.create_publisher(Int32, "sensor", qos_profile_sensor_data).publish(Int32(data=1))
+        rclpy.spin_once(node, timeout_sec=1.0)
+        node.create_publisher(Int32, "map", default)
+        [writer] = node.get_publishers_info_by_topic("/map")
+        [reader] = node.get_subscriptions_info_by_topic("/sensor")
+        for one in (writer.qos_profile, reader.qos_profile):
+            out((one.reliability.name, one.durability.name))
+        """,
+    )
+    assert stage.run(5 * S) == [1, ("RELIABLE", "TRANSIENT_LOCAL"), ("BEST_EFFORT", "VOLATILE")]
+
+
 @pytest.mark.parametrize("given", ["'ten'", "True", "-1"])
 def test_a_quality_of_service_that_is_none(stage: Stage, given: str) -> None:
     stage.script(

@@ -117,6 +117,14 @@ def test_the_content_of_chosen_topics_is_recorded(rig: Any) -> None:
     assert rig.of(Omitted) == []
 
 
+@pytest.mark.parametrize(("cells", "kind"), [(1_000_000, Published), (1 << 20, Omitted)])
+def test_a_map_of_up_to_a_million_cells_is_recorded(rig: Any, cells: int, kind: type[Any]) -> None:
+    published(rig, rig.graph, "map", messages.new("nav_msgs/msg/OccupancyGrid", data=np.ones(cells, np.int8)))
+    (event,) = rig.of(Published) + rig.of(Omitted)
+    assert isinstance(event, kind)
+    assert event.topic == "/map"
+
+
 def test_a_large_message_without_a_long_array_is_recorded(rig: Any) -> None:
     path = messages.new("nav_msgs/msg/Path", poses=[messages.new("geometry_msgs/PoseStamped")] * 200)
     assert messages.cdr_size(path.copy()) > LONG

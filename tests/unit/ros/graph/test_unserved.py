@@ -106,5 +106,8 @@ def test_names_of_dds_and_vehicles_without_a_node():
         ours.wait_for_service("/mavros/set_mode", 0)
 
     seen = found(body, {"drone_1": "mavros"}, "rover")
-    assert seen["/fmu/out/vehicle_status"].hint == "no vehicle offers PX4's DDS names; drone_1 has MAVROS's"
+    assert (
+        seen["/fmu/out/vehicle_status"].hint
+        == "a vehicle with 'names: px4' offers such topics; drone_1 has MAVROS's"
+    )
     assert seen["/mavros/set_mode"].hint == "rover is in no allocation, so it has no MAVROS node"

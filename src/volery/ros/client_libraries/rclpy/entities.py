@@ -103,7 +103,7 @@ class Publisher:
         self._made = node.graph_node.advertise(name, kind, graph_qos(self.qos_profile))
         self.topic = self.topic_name = self._made.topic
         if events is not None and events[0] is not None:
-            watch(node.context, node.graph, self._made, events[0], events[1])
+            watch(node.context, node.graph, self._made, events[0], events[1].ready)
 
     def publish(self, msg: Any) -> None:
         """Publish a message, or the bytes of one.
@@ -217,12 +217,12 @@ class Subscription:
         self._wants_info = _wants_info(callback)
         self._received = 0
         name = node.absolute_name(topic)
-        used = graph_qos(self.qos_profile)
+        used = graph_qos(self.qos_profile, reads=True)
         self._made = node.graph_node.subscribe(name, kind, self._call, used, queue.ready)
         self.topic = self.topic_name = self._made.topic
         queue.add(self)
         if events is not None:
-            watch(node.context, node.graph, self._made, events, queue)
+            watch(node.context, node.graph, self._made, events, queue.ready)
 
     def _call(self, message: Any) -> None:
         given = to_cdr(message) if self.raw else message

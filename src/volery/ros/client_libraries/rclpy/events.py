@@ -9,14 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
-from volery.ros.client_libraries.rclpy.context import Context
-from volery.ros.client_libraries.rclpy.executors import CallbackQueue
+from volery.kernel.api import Kernel
 from volery.ros.client_libraries.rclpy.qos import QoSPolicyKind
-from volery.ros.graph import EmbeddedGraph, QoS, RosGraph, Work
+from volery.ros.graph import EmbeddedGraph, Group, QoS, RosGraph, Work
 from volery.ros.graph.endpoints import incompatible
 
 
@@ -122,21 +121,32 @@ class PublisherEventCallbacks:
     use_default_callbacks: bool = field(default=True, kw_only=True)
 
 
+class TaskOwner(Protocol):
+    """What starts tasks of a component: the context of rclpy, the session of rclcpp."""
+
+    @property
+    def kernel(self) -> Kernel:
+        """The kernel of the run."""
+
+    def spawn(self, body: Callable[[], None], label: str, /) -> object:
+        """Run *body* in a task of its own."""
+
+
 def watch(
-    context: Context,
+    owner: TaskOwner,
     graph: RosGraph,
     watched: Any,
     callbacks: PublisherEventCallbacks | SubscriptionEventCallbacks,
-    queue: CallbackQueue,
+    ready: Group,
 ) -> None:
     """Call the callbacks of a publisher or a subscription from now on.
 
     Args:
-        context: Context of its node.
+        owner: Starts the task that watches.
         graph: The embedded graph; events of real ROS are refused.
         watched: Publisher or subscription of the graph.
         callbacks: Its callbacks.
-        queue: Queue of its callback group.
+        ready: Queue of its callback group.
     """
     is_publisher = isinstance(callbacks, PublisherEventCallbacks)
     wanted = {name: call for name, call in vars(callbacks).items() if callable(call)}
@@ -144,12 +154,12 @@ def watch(
         return
     if not isinstance(graph, EmbeddedGraph):
         raise UsageError("event_callbacks are there on the embedded graph only; leave them out on real ROS")
-    kernel = context.kernel
+    kernel = owner.kernel
 
     def emit(name: str, info: Any) -> None:
         if name in wanted:
             with kernel.guard:
-                queue.ready.add(Work(kernel.now(), lambda: wanted[name](info)))
+                ready.add(Work(kernel.now(), lambda: wanted[name](info)))
 
     monitor = _Monitor(watched, emit, is_publisher=is_publisher)
 
@@ -158,7 +168,7 @@ def watch(
             due = monitor.check(kernel.now())
             graph.changed.wait_for(monitor.has_changed, None if due is None else due - kernel.now())
 
-    context.spawn(body, f"events of {watched.topic}")
+    owner.spawn(body, f"events of {watched.topic}")
 
 
 class _Monitor:

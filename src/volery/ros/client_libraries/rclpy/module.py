@@ -401,7 +401,7 @@ def wait_for_message(
 
     at_once = node.graph_node.group(lambda work: work.run())
     name, kind = node.absolute_name(topic), entities.type_name("wait_for_message", msg_type)
-    subscription = node.graph_node.subscribe(name, kind, keep, graph_qos(qos_profile), at_once)
+    subscription = node.graph_node.subscribe(name, kind, keep, graph_qos(qos_profile, reads=True), at_once)
     try:
         longest = timeout_sec_to_nsec(time_to_wait)
         arrived.wait_for(lambda: received, None if longest < 0 else longest, ends_activation=True)

@@ -246,10 +246,13 @@ class DeclaredParameters:
         if isinstance(value, type) and issubclass(value, (bool, int, float, str)):
             kind = Parameter.Type.from_parameter_value(value())
         default = None if kind is not None else value
+        typed: Parameter.Type | None = None  # that of a default of rclcpp, whose empty lists have one, too
+        if isinstance(default, Parameter):
+            default, typed = default.value, default.type_
         given = default if ignore else self._override(name, private, default)
         described = self._descriptors[name] = descriptor or new(_DESCRIPTOR)
         if kind is None and given is not None and not described.dynamic_typing:
-            kind = Parameter(name, value=default if default is not None else given).type_
+            kind = typed or Parameter(name, value=default if default is not None else given).type_
         described.name, described.type = name, int(kind or 0)
         # rclpy converts nothing: 50 from a launch file does not fit a double. Only an empty list has no type.
         empty = kind is not None and isinstance(given, _SEQUENCES) and not len(given)

@@ -263,9 +263,18 @@ def profile_of(given: Any) -> QoSProfile:
     return given
 
 
-def graph_qos(given: Any) -> QoS:
-    """Return the quality of service of the graph for a profile or a depth."""
+def graph_qos(given: Any, *, reads: bool = False) -> QoS:
+    """Return the quality of service of the graph for a profile or a depth.
+
+    What a profile leaves to the middleware is as Fast DDS has it: one that *reads* is best effort and
+    volatile, and one that does not is reliable and keeps what it has sent.
+    """
     profile = profile_of(given)
+    reliability, durability = (BEST_EFFORT, VOLATILE) if reads else (RELIABLE, TRANSIENT_LOCAL)
+    if profile.reliability is not ReliabilityPolicy.SYSTEM_DEFAULT:
+        reliability = _RELIABILITY.get(profile.reliability, RELIABLE)
+    if profile.durability is not DurabilityPolicy.SYSTEM_DEFAULT:
+        durability = _DURABILITY.get(profile.durability, VOLATILE)
     depth = None if profile.history is HistoryPolicy.KEEP_ALL else max(1, profile.depth)
     spans = [
         span.nanoseconds if 0 < span.nanoseconds < _ENDLESS_FROM else 0
@@ -273,8 +282,8 @@ def graph_qos(given: Any) -> QoS:
     ]
     return QoS(
         depth,
-        _RELIABILITY.get(profile.reliability, RELIABLE),
-        _DURABILITY.get(profile.durability, VOLATILE),
+        reliability,
+        durability,
         deadline=spans[0],
         lifespan=spans[1],
         lease=spans[2],

@@ -14,11 +14,11 @@ tasks of the run, which change at requests only; wall time is the time of the ru
 
 from pathlib import Path
 
-from volery.ros.client_libraries.roscpp.message_headers import INCLUDE, NOT_OFFERED, generate_headers
+from volery.ros.client_libraries.roscpp.message_headers import INCLUDE, generate_headers
 from volery.ros.client_libraries.roscpp.requests import request_handlers
 from volery.ros.client_libraries.roscpp.session import Session
 
 FALLBACK = (Path(__file__).parent / "fallback", Path("/usr/include/eigen3"))
 """Folders that are searched last; the second one is where ``find_package(Eigen3)`` finds it."""
 
-__all__ = ["FALLBACK", "INCLUDE", "NOT_OFFERED", "Session", "generate_headers", "request_handlers"]
+__all__ = ["FALLBACK", "INCLUDE", "Session", "generate_headers", "request_handlers"]

@@ -8,22 +8,21 @@ from pathlib import Path
 
 from volery.base.errors import UsageError
 from volery.ros import messages
+from volery.ros.client_libraries.cpp.message_structs import (
+    BASES,
+    SHARED_INCLUDE,
+    constant_lines,
+    refusal,
+    visit_lines,
+    with_ours,
+)
 from volery.ros.client_libraries.roscpp.config_headers import config_header
-from volery.ros.messages.encodings import Constant, FieldLayout, Layout, ros1_layout
+from volery.ros.messages.encodings import FieldLayout, Layout, ros1_layout
 from volery.ros.messages.store import ROS1_SPELLING, define_ros1_action
 
 INCLUDE = Path(__file__).parent / "include"
 _HEADER = re.compile(r"^(\w+)/(\w+)\.h$")
 _CONFIG_HEADER = re.compile(r"^(\w+)/(\w+)Config\.h$")
-_INCLUDED = re.compile(r'^#include "([^"]+)"', re.MULTILINE)
-_BASES = {
-    "bool": "std::uint8_t", "byte": "std::int8_t", "char": "std::uint8_t", "octet": "std::uint8_t",
-    "int8": "std::int8_t", "uint8": "std::uint8_t", "int16": "std::int16_t", "uint16": "std::uint16_t",
-    "int32": "std::int32_t", "uint32": "std::uint32_t", "int64": "std::int64_t", "uint64": "std::uint64_t",
-    "float32": "float", "float64": "double", "string": "std::string",
-}  # fmt: skip
-NOT_OFFERED = "// volery: "
-"""Beginning of the text of a header that is not offered; the rest says so, and what to do instead."""
 _TIMES = {"builtin_interfaces/msg/Time": "ros::Time", "builtin_interfaces/msg/Duration": "ros::Duration"}
 
 
@@ -43,7 +42,7 @@ def generate_headers(includes: Sequence[str], path: Path, present: Collection[st
     """
     if any(_CONFIG_HEADER.match(name) for name in includes):
         includes = [*includes, "dynamic_reconfigure/config_tools.h"]
-    includes = _with_ours(includes)
+    includes = with_ours(includes, INCLUDE)
     named = [found for name in includes if (found := _HEADER.match(name))]
     messages.define_packages(path, dict.fromkeys(found[1] for found in named))
     packages = {name.partition("/")[0] for name in (*messages.types(), *messages.service_types())}
@@ -56,25 +55,16 @@ def generate_headers(includes: Sequence[str], path: Path, present: Collection[st
         if config and name not in texts and name not in present:
             made = config_header(config[1], config[2], path)
             texts.update({} if made is None else {name: made})
-        if name in texts or name in present or package == name or (INCLUDE / name).exists():
+        if name in texts or name in present or package == name or _offered(name):
             continue
         remedy = "no message or service of this name" if package in packages else _NOT_OFFERED.get(package)
         if remedy is not None:
-            texts[name] = f"{NOT_OFFERED}<{name}> is not offered: {remedy}\n"
+            texts[name] = refusal(name, remedy)
     return texts
 
 
-def _with_ours(includes: Sequence[str]) -> list[str]:
-    """Return *includes* and, of the headers offered here, what they include in turn."""
-    found = dict.fromkeys(includes)
-    waiting = list(includes)
-    while waiting:
-        ours = INCLUDE / waiting.pop()
-        if ours.is_file():
-            further = [name for name in _INCLUDED.findall(ours.read_text()) if name not in found]
-            found.update(dict.fromkeys(further))
-            waiting += further
-    return list(found)
+def _offered(name: str) -> bool:
+    return (INCLUDE / name).exists() or (SHARED_INCLUDE / name).exists()
 
 
 _OWN_PROCESS = "it needs threads or a process of its own; write it in Python, or leave this node out"
@@ -94,6 +84,7 @@ _NOT_OFFERED = {
     "tf_conversions": "include <tf_conversions/tf_eigen.h>",
     "eigen_conversions": "include <eigen_conversions/eigen_msg.h>",
     "xmlrpcpp": "include <xmlrpcpp/XmlRpcValue.h>; the graph has no servers of XML-RPC",
+    "laser_geometry": "compute the points from the ranges of the scan",
     "cv_bridge": "read sensor_msgs::Image::data",
     "pcl_ros": "read sensor_msgs::PointCloud2::data",
     "nodelet": _OWN_PROCESS,
@@ -101,7 +92,7 @@ _NOT_OFFERED = {
     "mavros": "publish to the topics of MAVROS and call its services",
     "mavconn": "publish to the topics of MAVROS and call its services",
     "rosbag": "record the run with `volery simulate`, which writes a bag",
-    "rclcpp": "it is a header of ROS 2; components of rclcpp do not run yet",
+    "rclcpp": "it is a header of ROS 2; state `language: rclcpp`",
 }
 """Packages of ROS whose headers need the real libraries, and what to do instead."""
 
@@ -182,29 +173,16 @@ def message_header(package: str, label: str, layout: Layout) -> str:
     lines += ["", f"namespace {package} {{", "", f"struct {label} {{"]
     lines += [f"    using Ptr = boost::shared_ptr<{label}>;"]
     lines += [f"    using ConstPtr = boost::shared_ptr<{label} const>;"]
-    lines += [f"    {_constant(one)}" for one in layout.constants]
+    lines += constant_lines(layout, BASES.__getitem__)
     lines += [f"    {_type(one)} {one.name}{{}};" for one in layout.fields]
-    lines += ["    template <class Visitor, class Message>"]
-    lines += ["    static void each_([[maybe_unused]] Visitor& visit, [[maybe_unused]] Message& message) {"]
-    lines += [f'        visit("{one.name}", message.{one.name});' for one in layout.fields if one.carried]
-    if not any(one.carried for one in layout.fields):
-        lines += ["        visit.nothing();"]
-    lines += ["    }", f'    static const char* name_() {{ return "{layout.name}"; }}', "};", ""]
+    lines += [*visit_lines(layout), "};", ""]
     lines += [f"using {label}Ptr = {label}::Ptr;", f"using {label}ConstPtr = {label}::ConstPtr;", ""]
     lines += [f"using ros::message_operators::operator{one};" for one in ("<<", "==", "!=")]
     return "\n".join([*lines, "", f"}}  // namespace {package}", ""])
 
 
-def _constant(one: Constant) -> str:
-    if one.base == "string":
-        text = str(one.value).replace("\\", "\\\\").replace('"', '\\"')
-        return f'static inline const std::string {one.name} = "{text}";'
-    value = str(one.value).lower() if isinstance(one.value, bool) else one.value
-    return f"static constexpr {_BASES[one.base]} {one.name} = static_cast<{_BASES[one.base]}>({value});"
-
-
 def _type(one: FieldLayout) -> str:
-    single = _BASES[one.base] if one.base else _TIMES.get(one.nested) or _ros1(one.nested).replace("/", "::")
+    single = BASES[one.base] if one.base else _TIMES.get(one.nested) or _ros1(one.nested).replace("/", "::")
     if one.length is None:
         return single
     return f"boost::array<{single}, {one.length}>" if one.length else f"std::vector<{single}>"

@@ -7,15 +7,15 @@ from typing import Any
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
-from volery.kernel.waiting import Rate, sleep
 from volery.ros.client_libraries.abi_codec import CppFiber, Reader, RequestHandler, Writer
-from volery.ros.client_libraries.roscpp.session import RefusedRequestError, Session
-from volery.ros.client_libraries.roscpp.transforms import TRANSFORMS
+from volery.ros.client_libraries.cpp.requests import CdrPublisher, Simple, WithFiber, time_out
+from volery.ros.client_libraries.cpp.requests import request_handlers as shared_handlers
+from volery.ros.client_libraries.cpp.session import RefusedRequestError
+from volery.ros.client_libraries.roscpp.session import Session
 from volery.ros.graph import BEST_AVAILABLE, LATCHED, Client, Group, QoS, ServiceError, Timer
 from volery.ros.graph.endpoints import Connection, EmbeddedPublisher
 from volery.ros.graph.work import Work
 from volery.ros.messages import from_cdr, service, to_cdr
-from volery.trace.events import Text
 
 # -- topics
 
@@ -25,33 +25,16 @@ def _subscriber_qos(depth: int) -> QoS:
     return QoS(depth or None, BEST_AVAILABLE, BEST_AVAILABLE)
 
 
-class _Publisher:
-    """A publisher of messages in CDR."""
-
-    def __init__(self, session: Session, arguments: Reader) -> None:
-        topic, self._type = arguments.text(), arguments.text()
-        depth, latched = arguments.integer(), arguments.flag()
-        qos = LATCHED if latched else QoS(depth or None)
-        self.made = session.node.advertise(topic, self._type, qos)
-        self.close = self.made.close
-
-    def publish(self, data: bytes) -> None:
-        """Publish the message that *data* encodes."""
-        self.made.publish(from_cdr(self._type, data))
-
-    def publish_to(self, connection: Connection, data: bytes) -> None:
-        """Publish to one subscription."""
-        assert isinstance(self.made, EmbeddedPublisher)
-        self.made.publish_to(connection, from_cdr(self._type, data))
-
-
-def _publish(session: Session, arguments: Reader) -> None:
-    session.find(arguments.integer(), _Publisher).publish(arguments.raw())
+def _advertise(session: Session, arguments: Reader) -> int:
+    topic, kind = arguments.text(), arguments.text()
+    depth, latched = arguments.integer(), arguments.flag()
+    qos = LATCHED if latched else QoS(depth or None)
+    return session.keep(CdrPublisher(session.node.advertise(topic, kind, qos), kind))
 
 
 def _watch(session: Session, arguments: Reader) -> None:
     """Call back for each subscription that is connected to a publisher, or disconnected from it."""
-    publisher = session.find(arguments.integer(), _Publisher).made
+    publisher = session.find(arguments.integer(), CdrPublisher).made
     callback, group = arguments.integer(), session.group(arguments.integer())
     if not isinstance(publisher, EmbeddedPublisher):
         raise UsageError(
@@ -71,7 +54,7 @@ def _watch(session: Session, arguments: Reader) -> None:
 
 
 def _publish_to(session: Session, arguments: Reader) -> None:
-    publisher, connection = session.find(arguments.integer(), _Publisher), arguments.integer()
+    publisher, connection = session.find(arguments.integer(), CdrPublisher), arguments.integer()
     publisher.publish_to(session.find(connection, Connection), arguments.raw())
 
 
@@ -85,13 +68,8 @@ def _subscribe(session: Session, arguments: Reader) -> int:
     return session.keep(session.node.subscribe(topic, kind, on_message, _subscriber_qos(depth), group))
 
 
-def _publisher_count(session: Session, arguments: Reader) -> int:
-    count: int = session.entity(arguments.integer()).publishers()
-    return count
-
-
 def _wait_for_message(session: Session, arguments: Reader) -> bytes:
-    topic, kind, within = arguments.text(), arguments.text(), _timeout(arguments.integer())
+    topic, kind, within = arguments.text(), arguments.text(), time_out(arguments.integer())
     received: list[Any] = []
     group = session.node.group()
     subscription = session.node.subscribe(topic, kind, received.append, _subscriber_qos(1), group)
@@ -101,11 +79,6 @@ def _wait_for_message(session: Session, arguments: Reader) -> bytes:
         subscription.close()
     reply = Writer().flag(bool(received)).done()
     return reply + to_cdr(received[0]) if received else reply
-
-
-def _timeout(timeout: Ns) -> Ns | None:
-    """Return a time-out of roscpp, of which a negative one means none."""
-    return None if timeout < 0 else timeout
 
 
 # -- services
@@ -150,7 +123,7 @@ def _call(session: Session, arguments: Reader) -> bytes:
 
 
 def _wait_for_service(session: Session, arguments: Reader) -> bool:
-    return session.node.wait_for_service(arguments.text(), _timeout(arguments.integer()))
+    return session.node.wait_for_service(arguments.text(), time_out(arguments.integer()))
 
 
 # -- timers
@@ -275,56 +248,16 @@ def _spin_spinner(session: Session, fiber: CppFiber, arguments: Reader) -> None:
     session.spin(fiber, session.find(arguments.integer(), _Spinner).spin)
 
 
-def _spawn(session: Session, fiber: CppFiber, arguments: Reader) -> None:
-    number, label = arguments.integer(), arguments.text()
-    session.spawn(lambda: fiber.call_beside(number), label)
-
-
-class _Event:
-    """Wakes tasks that wait until another one has changed something."""
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
-        self._count = 0
-
-    def notify(self) -> None:
-        """Wake those who wait."""
-        self._count += 1
-        self._session.changed.notify()
-
-    def wait(self, seen: int, timeout: Ns, until_end: bool) -> None:
-        """Block until more than *seen* notifications, the time-out, or *until_end* the end of the node."""
-        session = self._session
-        session.changed.wait_for(
-            lambda: self._count > seen or (until_end and session.finished),
-            _timeout(timeout),
-            ends_activation=True,
-        )
-
-
-def _wait_for_event(session: Session, arguments: Reader) -> None:
-    event = session.find(arguments.integer(), _Event)
-    event.wait(arguments.integer(), arguments.integer(), arguments.flag())
-
-
-SIMPLE: dict[str, Callable[[Session, Reader], Any]] = {
-    "advertise": lambda session, arguments: session.keep(_Publisher(session, arguments)),
-    "publish": _publish,
+_ENTITIES: dict[str, Simple[Session]] = {
+    "advertise": _advertise,
     "watch": _watch,
     "publish_to": _publish_to,
-    "event": lambda session, arguments: session.keep(_Event(session)),
-    "event_notify": lambda session, arguments: session.find(arguments.integer(), _Event).notify(),
-    "event_wait": _wait_for_event,
     "queue": lambda session, arguments: session.keep(session.node.group()),
     "queue_length": lambda session, arguments: len(session.group(arguments.integer())),
     "queue_clear": _queue_clear,
     "spinner": lambda session, arguments: session.keep(_Spinner(session, session.group(arguments.integer()))),
     "spinner_stop": lambda session, arguments: session.find(arguments.integer(), _Spinner).stop(),
-    "subscribers": lambda session, arguments: session.find(
-        arguments.integer(), _Publisher
-    ).made.subscribers(),
     "subscribe": _subscribe,
-    "publishers": _publisher_count,
     "wait_for_message": _wait_for_message,
     "serve": _serve,
     "client": _create_client,
@@ -339,44 +272,13 @@ SIMPLE: dict[str, Callable[[Session, Reader], Any]] = {
     ),
 }
 
-WITH_FIBER: dict[str, Callable[[Session, CppFiber, Reader], Any]] = {
+_WITH_FIBER: dict[str, WithFiber[Session]] = {
     "spin_once": lambda session, fiber, arguments: session.spin(fiber, session.node.spin_available),
     "spin": lambda session, fiber, arguments: session.spin(fiber, session.node.spin),
     "queue_call_one": _queue_call(lambda group, timeout: group.spin_once(max(timeout, 0))),
     "queue_call_available": _queue_call(_call_available),
     "spinner_spin": _spin_spinner,
-    "spawn": _spawn,
 }
-
-
-_SEVERITIES = (7, 6, 4, 3, 2)
-"""Severities of syslog by roscpp's levels: debug, info, warn, error, fatal."""
-
-Simple = Callable[[Session, Reader], Any]
-"""Executes a request; returns a boolean, an integer, a text, bytes or nothing."""
-
-
-def request_handlers(session: Session) -> dict[str, RequestHandler]:
-    """Return the handlers of all requests of the component that *session* belongs to, by name."""
-
-    def simple(handle: Simple) -> RequestHandler:
-        return lambda fiber, arguments: _encoded(handle(session, arguments))
-
-    def with_fiber(handle: Callable[[Session, CppFiber, Reader], Any]) -> RequestHandler:
-        return lambda fiber, arguments: _encoded(handle(session, fiber, arguments))
-
-    handlers = {name: simple(one) for name, one in {**_PROCESS, **_NAMES, **_TIME, **_PARAMETERS}.items()}
-    handlers.update({name: simple(one) for name, one in {**SIMPLE, **TRANSFORMS}.items()})
-    handlers.update({name: with_fiber(one) for name, one in WITH_FIBER.items()})
-    return {f"ros.{name}": handler for name, handler in handlers.items()}
-
-
-def _encoded(value: bytes | str | int | None) -> bytes:
-    if value is None:
-        return b""
-    if isinstance(value, bytes):
-        return value
-    return Writer().text(value).done() if isinstance(value, str) else Writer().integer(value).done()
 
 
 # -- the process
@@ -386,20 +288,11 @@ def _init(session: Session, arguments: Reader) -> None:
     session.join(arguments.text(), anonymous=arguments.flag())
 
 
-def _log(session: Session, arguments: Reader) -> None:
-    severity, text = _SEVERITIES[arguments.integer()], arguments.text()
-    with session.kernel as kernel:
-        kernel.record(Text(kernel.now(), session.component, severity, text))
-
-
-_PROCESS: dict[str, Simple] = {
+_PROCESS: dict[str, Simple[Session]] = {
     "init": _init,
     "initialized": lambda session, arguments: session.opened is not None,
     "ok": lambda session, arguments: session.ok(),
-    "shutdown": lambda session, arguments: session.end(),
     "wait_for_shutdown": lambda session, arguments: session.wait_for_end(),
-    "close": lambda session, arguments: session.close(arguments.integer()),
-    "log": _log,
 }
 
 
@@ -424,7 +317,7 @@ def _node_handle(session: Session, arguments: Reader) -> str:
     return f"{parent.rstrip('/')}/{namespace}".rstrip("/") or "/"
 
 
-_NAMES: dict[str, Simple] = {
+_NAMES: dict[str, Simple[Session]] = {
     "resolve": _resolve,
     "node_handle": _node_handle,
     "name": lambda session, arguments: session.node.name,
@@ -434,40 +327,6 @@ _NAMES: dict[str, Simple] = {
 
 
 # -- time
-
-
-class _Rate:
-    """A ``ros::Rate``, which measures the execution time of each cycle."""
-
-    def __init__(self, session: Session, period: Ns) -> None:
-        if period <= 0:
-            raise UsageError(f"{session.component}: ros::Rate with a period of {period} ns; give one above 0")
-        self._session = session
-        self._rate = session.node.rate(period) if session.opened else Rate(session.kernel, period)
-        self._began = session.now()
-
-    def sleep(self) -> Ns:
-        """Block until the next release; return the duration of the cycle in ns."""
-        took = self._session.now() - self._began
-        self._rate.sleep()
-        self._began = self._session.now()
-        return took
-
-
-def _sleep(session: Session, arguments: Reader) -> None:
-    """Sleep; before ``ros::init`` there is no node that the call is charged to."""
-    if session.opened is None:
-        sleep(session.kernel, arguments.integer())
-    else:
-        session.node.sleep(arguments.integer())
-
-
-_TIME: dict[str, Simple] = {
-    "now": lambda session, arguments: session.now(),
-    "sleep": _sleep,
-    "rate": lambda session, arguments: session.keep(_Rate(session, arguments.integer())),
-    "rate_sleep": lambda session, arguments: session.find(arguments.integer(), _Rate).sleep(),
-}
 
 
 # -- parameters, whose values are encoded as a letter for the kind and the value
@@ -557,7 +416,7 @@ def _search_parameter(session: Session, arguments: Reader) -> str:
     return ""
 
 
-_PARAMETERS: dict[str, Simple] = {
+_PARAMETERS: dict[str, Simple[Session]] = {
     "param_get": _get_parameter,
     "param_set": _set_parameter,
     "param_has": lambda session, arguments: session.node.has_parameter(arguments.text()),
@@ -565,3 +424,9 @@ _PARAMETERS: dict[str, Simple] = {
     "param_names": _parameter_names,
     "param_search": _search_parameter,
 }
+
+
+def request_handlers(session: Session) -> dict[str, RequestHandler]:
+    """Return the handlers of all requests of the component that *session* belongs to, by name."""
+    own = {**_ENTITIES, **_PROCESS, **_NAMES, **_PARAMETERS}
+    return shared_handlers(session, own, _WITH_FIBER)

@@ -164,17 +164,19 @@ class Ros2Library:
 
     def _spin(self) -> None:
         looked = time.monotonic()
+        gone = import_module("rclpy.exceptions").InvalidHandle  # of a part that was closed meanwhile
         while not self._over.is_set():
-            if time.monotonic() - looked > WATCH_S:
-                looked = time.monotonic()
-                self._warn_of_types()
             try:
+                if time.monotonic() - looked > WATCH_S:
+                    looked = time.monotonic()
+                    self._warn_of_types()
                 self._executor.spin_once(timeout_sec=0.5)
-            except NoAnswerError:
+            except (NoAnswerError, gone):
                 pass
             except Exception as error:  # rclpy raises what went wrong anywhere in it; the others go on
                 if not self._over.is_set():
                     self.say(f"rclpy: {type(error).__name__}: {error}")
+        self._shut_down()
 
     def _endpoints(self, topic: str) -> list[Any]:
         """Return rclpy's descriptions of the publishers and subscriptions of a topic."""
@@ -224,24 +226,18 @@ class Ros2Library:
         self._left.add(join_names(node.get_namespace(), node.get_name()))
 
         def leave() -> None:
-            self._executor.remove_node(node)
-            node.destroy_node()
+            with suppress(Exception):  # the node is not used any more either way
+                self._executor.remove_node(node)
+                node.destroy_node()
 
-        self._leave(leave)
-
-    def _leave(self, act: Callable[[], None]) -> None:
-        """Run what destroys a part of rclpy, and go on after ``GOODBYE_S``: it can wait for ever.
-
-        Its errors are dropped, since rclpy's wait may still use the part; it is not used any more either way.
-        """
-
-        def run() -> None:
-            with suppress(Exception):
-                act()
-
-        leaving = threading.Thread(target=run, name="leaving", daemon=True)
-        leaving.start()
-        leaving.join(GOODBYE_S)
+        # Only the thread that waits for a node's parts destroys them: beside that wait rclpy's destroy_node
+        # can hold the interpreter's lock for ever.
+        if threading.current_thread() is self._thread:
+            leave()
+        else:
+            left = threading.Event()
+            self._executor.create_task(leave).add_done_callback(lambda task: left.set())
+            left.wait(GOODBYE_S)
 
     def _wait_for_discovery(self) -> None:
         """Wait until the nodes that exist at the start of this process have been discovered.
@@ -298,17 +294,17 @@ class Ros2Library:
     def close(self) -> None:
         """Stop spinning and shut rclpy down."""
         self._over.set()
-        self._executor.wake()
+        self._executor.create_task(lambda: None)  # a wake alone does not end a wait
         self._thread.join(GOODBYE_S)
 
-        def leave() -> None:
-            try:
-                self._own.destroy_node()
-                self._executor.shutdown(timeout_sec=0)
-            finally:
-                self._rclpy.shutdown(context=self._context)
-
-        self._leave(leave)
+    def _shut_down(self) -> None:
+        """Destroy the transport's own node; errors are dropped, since nothing is used any more."""
+        with suppress(Exception):
+            self._own.destroy_node()
+        with suppress(Exception):
+            self._executor.shutdown(timeout_sec=0)
+        with suppress(Exception):
+            self._rclpy.shutdown(context=self._context)
 
 
 def _users(ends: list[Any]) -> tuple[str, ...]:

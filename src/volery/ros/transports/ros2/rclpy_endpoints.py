@@ -2,6 +2,10 @@
 
 Parameters in ROS 2 belong to nodes: ``/ns/node/gains/p`` is the parameter ``gains.p`` of ``/ns/node``. A
 node's own are accessed through rclpy, those of other nodes through their parameter services.
+
+Each part of a node has a callback group of its own: where rclpy fails to take what is ready, it leaves the
+group locked for ever. In the group of the node that would end all its topics, ``/clock`` included, and the
+answers to its calls, without a word.
 """
 
 from __future__ import annotations
@@ -30,6 +34,11 @@ def profile(qos: QoS) -> Any:
         reliability=rclpy_qos.ReliabilityPolicy[qos.reliability.upper()],
         durability=rclpy_qos.DurabilityPolicy[qos.durability.upper()],
     )
+
+
+def own_group() -> Any:
+    """Return a callback group for one part of a node; reentrant: a request in progress blocks nothing."""
+    return import_module("rclpy.callback_groups").ReentrantCallbackGroup()
 
 
 def offered_qos(offered: Any) -> QoS:
@@ -84,9 +93,12 @@ class Ros2Subscription:
         self._now = self._fitting()
         self._subscription = self._subscribe()
 
+    def _offers(self) -> list[Any]:
+        return [one.qos_profile for one in self._node.get_publishers_info_by_topic(self._topic)]
+
     def _fitting(self) -> QoS:
         """Return the strongest QoS that all publishers known by now offer, within the requested one."""
-        offers = [one.qos_profile for one in self._node.get_publishers_info_by_topic(self._topic)]
+        offers = self._offers()
         reliability, durability = self._wanted.reliability, self._wanted.durability
         if reliability == BEST_AVAILABLE:
             unreliable = any(one.reliability.name == "BEST_EFFORT" for one in offers)
@@ -107,6 +119,7 @@ class Ros2Subscription:
             self._take,
             profile(self._now),
             raw=True,
+            callback_group=own_group(),
             event_callbacks=callbacks(**events),
         )
 
@@ -116,13 +129,13 @@ class Ros2Subscription:
             self._arrived(ReceivedMessage(data, self._read, ""))
 
     def _look_again(self, event: Any) -> None:
-        """Adapt to a new publisher, in a thread, since this is called within rclpy's wait."""
+        """Adapt to a new publisher in the thread that waits, before its next wait: in one nothing may go."""
         if BEST_AVAILABLE in (self._wanted.reliability, self._wanted.durability):
-            threading.Thread(target=self._adapt, daemon=True).start()
+            self._node.executor.create_task(self._adapt)
 
     def _adapt(self) -> None:
         with self._guard:
-            if self._open and (fitting := self._fitting()) != self._now:
+            if self._open and self._offers() and (fitting := self._fitting()) != self._now:
                 self._now = fitting
                 self._node.destroy_subscription(self._subscription)
                 self._repeated = self._latest
@@ -169,9 +182,7 @@ class Ros2ServiceServer:
                 raise NoAnswerError
             return to_rclpy(answer, types.response)
 
-        # reentrant: a request in progress must not block its node
-        group = import_module("rclpy.callback_groups").ReentrantCallbackGroup()
-        self._service = node.create_service(types.type, name, handle, callback_group=group)
+        self._service = node.create_service(types.type, name, handle, callback_group=own_group())
 
     def close(self) -> None:
         """Remove it from the node."""
@@ -184,7 +195,7 @@ class Ros2ServiceClient:
     def __init__(self, node: Any, name: str, kind: ServiceType) -> None:
         self._node, self._name, self._kind = node, name, kind
         self._types = rclpy_service(kind)
-        self._client = node.create_client(self._types.type, name)
+        self._client = node.create_client(self._types.type, name, callback_group=own_group())
 
     def call(self, request: Message, done: OnResponse) -> Callable[[], None]:
         """Send the request, if a server has been discovered; rclpy would wait for one without limit."""
@@ -304,7 +315,7 @@ class OtherParameters:
         self._services = import_module("rcl_interfaces.srv")
 
     def _call(self, kind: Any, service: str, request: Any) -> Any:
-        client = self._node.create_client(kind, f"{self._name}/{service}")
+        client = self._node.create_client(kind, f"{self._name}/{service}", callback_group=own_group())
         try:
             if not client.wait_for_service(PATIENCE_S):
                 raise LinkSilent(f"node {self._name} offers no parameters")

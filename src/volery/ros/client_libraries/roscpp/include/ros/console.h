@@ -1,6 +1,5 @@
 // ROS_INFO and the other log macros, which record lines in the trace.
 #pragma once
-#include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "ros/time.h"
+#include "volery/text.h"
 
 namespace ros {
 namespace console {
@@ -48,16 +48,7 @@ inline void say(console::Level level, const std::string& text) {
     volery::request("ros.log", volery::Writer().put(static_cast<int>(level)).put(text));
 }
 
-__attribute__((format(printf, 1, 2))) inline std::string formatted(const char* format, ...) {
-    std::va_list arguments, again;
-    va_start(arguments, format);
-    va_copy(again, arguments);
-    std::vector<char> text(static_cast<std::size_t>(std::vsnprintf(nullptr, 0, format, arguments)) + 1);
-    std::vsnprintf(text.data(), text.size(), format, again);
-    va_end(again);
-    va_end(arguments);
-    return text.data();
-}
+using volery::formatted;
 
 // Returns whether a line that is logged at most once a period is due; updates the time *last* of the last line. The
 // first one is due at once, or with *delayed* after a period.

@@ -1,5 +1,7 @@
 // ros::Time, ros::Duration and their wall-clock variants, which also use the clock of the run.
 #pragma once
+#include <math.h>  // user code relies on its names without std::
+
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -68,6 +70,11 @@ public:
     Self& operator+=(const Self& other) { return fromNSec(toNSec() + other.toNSec()); }
     Self& operator-=(const Self& other) { return fromNSec(toNSec() - other.toNSec()); }
     Self& operator*=(double factor) { return fromSec(toSec() * factor); }
+    template <class Visitor, class Span>
+    static void each_(Visitor& visit, Span& span) {
+        visit("sec", span.sec);
+        visit("nsec", span.nsec);
+    }
     bool operator==(const Self& other) const { return toNSec() == other.toNSec(); }
     bool operator!=(const Self& other) const { return toNSec() != other.toNSec(); }
     bool operator<(const Self& other) const { return toNSec() < other.toNSec(); }
@@ -127,6 +134,11 @@ public:
     Self operator-(const Span& span) const { return Self().fromNSec(moved(-span.toNSec())); }
     Self& operator+=(const Span& span) { return fromNSec(moved(span.toNSec())); }
     Self& operator-=(const Span& span) { return fromNSec(moved(-span.toNSec())); }
+    template <class Visitor, class Moment>
+    static void each_(Visitor& visit, Moment& time) {
+        visit("sec", time.sec);
+        visit("nsec", time.nsec);
+    }
     bool operator==(const Self& other) const { return toNSec() == other.toNSec(); }
     bool operator!=(const Self& other) const { return toNSec() != other.toNSec(); }
     bool operator<(const Self& other) const { return toNSec() < other.toNSec(); }

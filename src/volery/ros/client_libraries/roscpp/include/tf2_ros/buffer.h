@@ -3,42 +3,27 @@
 #include <string>
 #include <vector>
 
-#include "tf2/exceptions.h"
 #include "tf2_geometry_msgs/tf2_geometry_msgs.h"
+#include "tf2/buffer_requests.h"
 #include "tf2_msgs/TFMessage.h"
 
 namespace tf2 {
 
 // Transforms of the last *cache_time*.
-class BufferCore {
+class BufferCore : public BufferRequests {
 public:
-    explicit BufferCore(ros::Duration cache_time = ros::Duration(10.0)) : cache_(cache_time) {}
-    BufferCore(const BufferCore&) = delete;
-    BufferCore& operator=(const BufferCore&) = delete;
-    virtual ~BufferCore() = default;
+    explicit BufferCore(ros::Duration cache_time = ros::Duration(10.0)) : BufferRequests(cache_time.toNSec()) {}
 
-    bool setTransform(const geometry_msgs::TransformStamped& transform, const std::string&, bool is_static = false) {
-        auto const with = volery::Writer().put(number_()).put(ros::detail::to_bytes(transform)).put(is_static);
-        return volery::request("ros.tf_set", with).flag();
-    }
-    void clear() { volery::request("ros.tf_clear", volery::Writer().put(number_())); }
-    std::string allFramesAsString() const { return volery::request("ros.tf_frames", volery::Writer().put(number_())).text(); }
-
-    // With a time-out wait until the transform is available. Throws a TransformException if it is not.
     geometry_msgs::TransformStamped lookupTransform(const std::string& target, const std::string& source,
                                                     const ros::Time& time,
                                                     const ros::Duration timeout = ros::Duration(0.0)) const {
-        return found(about(target, source, time, timeout));
+        return look_up(target, source, nanoseconds(time), timeout.toNSec());
     }
     geometry_msgs::TransformStamped lookupTransform(const std::string& target, const ros::Time& target_time,
                                                     const std::string& source, const ros::Time& source_time,
                                                     const std::string& fixed_frame,
                                                     const ros::Duration timeout = ros::Duration(0.0)) const {
-        auto const first = lookupTransform(fixed_frame, source, source_time, timeout);
-        auto last = lookupTransform(target, fixed_frame, target_time, timeout);
-        last.transform = toMsg(transform_of(last) * transform_of(first));
-        last.child_frame_id = source;
-        return last;
+        return look_up(target, nanoseconds(target_time), source, nanoseconds(source_time), fixed_frame, timeout.toNSec());
     }
     bool canTransform(const std::string& target, const std::string& source, const ros::Time& time,
                       std::string* error = nullptr) const {
@@ -46,9 +31,7 @@ public:
     }
     bool canTransform(const std::string& target, const std::string& source, const ros::Time& time,
                       const ros::Duration timeout, std::string* error = nullptr) const {
-        auto const reason = volery::request("ros.tf_can", about(target, source, time, timeout)).text();
-        if (error != nullptr) *error = reason;
-        return reason.empty();
+        return can_transform_(target, source, nanoseconds(time), timeout.toNSec(), error);
     }
     bool canTransform(const std::string& target, const ros::Time& target_time, const std::string& source,
                       const ros::Time& source_time, const std::string& fixed_frame,
@@ -57,30 +40,8 @@ public:
                canTransform(target, fixed_frame, target_time, timeout, error);
     }
 
-    // Number of the tree on the graph, which is made at its first use.
-    std::int64_t number_() const {
-        if (number < 0) number = volery::request("ros.tf_buffer", volery::Writer().put(cache_.toNSec())).integer();
-        return number;
-    }
-
 private:
-    volery::Writer about(const std::string& target, const std::string& source, const ros::Time& time,
-                         const ros::Duration& timeout) const {
-        auto const at = static_cast<std::int64_t>(time.toNSec());
-        return volery::Writer().put(number_()).put(target).put(source).put(at).put(timeout.toNSec());
-    }
-    static geometry_msgs::TransformStamped found(const volery::Writer& with) {
-        auto answer = volery::request("ros.tf_look_up", with);
-        if (!answer.flag()) {
-            auto const kind = answer.text();
-            detail::raise(kind, answer.text());
-        }
-        geometry_msgs::TransformStamped made;
-        ros::detail::from_bytes(answer, made);
-        return made;
-    }
-    ros::Duration cache_;
-    mutable std::int64_t number = -1;
+    static std::int64_t nanoseconds(const ros::Time& time) { return static_cast<std::int64_t>(time.toNSec()); }
 };
 
 }  // namespace tf2
@@ -143,14 +104,7 @@ public:
         sendTransform(std::vector<geometry_msgs::TransformStamped>{transform});
     }
     void sendTransform(const std::vector<geometry_msgs::TransformStamped>& transforms) {
-        for (const auto& transform : transforms) {
-            auto same = [&](const auto& one) { return one.child_frame_id == transform.child_frame_id; };
-            auto const before = std::find_if(sent_.transforms.begin(), sent_.transforms.end(), same);
-            if (before != sent_.transforms.end())
-                *before = transform;
-            else
-                sent_.transforms.push_back(transform);
-        }
+        tf2::merge(sent_.transforms, transforms);
         publisher_.publish(sent_);
     }
 

@@ -1,47 +1,16 @@
-// tf2_ros::MessageFilter: passes messages on once the transforms at their stamps are known.
+// tf2_ros::MessageFilter of roscpp.
 #pragma once
-#include <list>
-
-#include "message_filters/simple_filter.h"
 #include "tf2_ros/buffer.h"
+#include "tf2_ros/transform_filter.h"
 
 namespace tf2_ros {
 
-namespace filter_failure_reasons {
-enum FilterFailureReason { Unknown, OutTheBack, EmptyFrameID };
-}
-using FilterFailureReason = filter_failure_reasons::FilterFailureReason;
-
-class MessageFilterBase {
-public:
-    using V_string = std::vector<std::string>;
-    virtual ~MessageFilterBase() = default;
-    virtual void clear() = 0;
-    virtual void setTargetFrame(const std::string& frame) = 0;
-    virtual void setTargetFrames(const V_string& frames) = 0;
-    virtual void setTolerance(const ros::Duration& tolerance) = 0;
-};
-
 template <class Message>
-class MessageFilter : public MessageFilterBase,
-                      public message_filters::OneInput<MessageFilter<Message>, Message> {
-    using Input = message_filters::OneInput<MessageFilter, Message>;
-
+class MessageFilter : public TransformFilter<Message> {
 public:
-    using typename Input::EventType;
-    using typename Input::MConstPtr;
-    using MEvent = EventType;
-    using FailureCallback = boost::function<void(const MConstPtr&, FilterFailureReason)>;
-    using Input::add;
-
     MessageFilter(tf2::BufferCore& buffer, const std::string& target, std::uint32_t queue_size,
                   ros::CallbackQueueInterface* queue)
-        : buffer_(buffer), size_(queue_size) {
-        setTargetFrame(target);
-        callable_ = volery::register_callable([this](volery::Reader, volery::Writer&) { check(); });
-        auto const number = ros::detail::number_of(queue);
-        watch_ = volery::request("ros.tf_watch", volery::Writer().put(buffer.number_()).put(callable_).put(number)).integer();
-    }
+        : TransformFilter<Message>(buffer, target, queue_size, ros::detail::number_of(queue)) {}
     MessageFilter(tf2::BufferCore& buffer, const std::string& target, std::uint32_t queue_size,
                   const ros::NodeHandle& node)
         : MessageFilter(buffer, target, queue_size, node.getCallbackQueue()) {}
@@ -51,79 +20,6 @@ public:
         : MessageFilter(buffer, target, queue_size, std::forward<Where>(where)) {
         this->connectInput(filter);
     }
-    ~MessageFilter() override {
-        volery::try_request("ros.close", volery::Writer().put(watch_));
-        volery::unregister_callable(callable_);
-    }
-
-    void setTargetFrame(const std::string& frame) override { setTargetFrames({frame}); }
-    void setTargetFrames(const V_string& frames) override {
-        frames_ = frames;
-        for (auto& frame : frames_)
-            if (!frame.empty() && frame.front() == '/') frame.erase(0, 1);
-    }
-    std::string getTargetFramesString() const {
-        std::string all;
-        for (const auto& frame : frames_) all += frame + " ";
-        return all;
-    }
-    // The transforms must be known from the stamp until so much later.
-    void setTolerance(const ros::Duration& tolerance) override { tolerance_ = tolerance; }
-    void setQueueSize(std::uint32_t size) { size_ = size; }
-    std::uint32_t getQueueSize() const { return static_cast<std::uint32_t>(size_); }
-    void clear() override { waiting_.clear(); }
-    message_filters::Connection registerFailureCallback(const FailureCallback& callback) {
-        return failures_.add(callback);
-    }
-
-    void add(const EventType& event) {
-        if (frame_of(event).empty()) {
-            failures_(event.getConstMessage(), filter_failure_reasons::EmptyFrameID);
-            return;
-        }
-        waiting_.push_back(event);
-        check();
-        if (size_ == 0 || waiting_.size() <= size_) return;
-        auto const oldest = waiting_.front();
-        waiting_.pop_front();
-        failures_(oldest.getConstMessage(), filter_failure_reasons::Unknown);
-    }
-
-private:
-    static std::string frame_of(const EventType& event) {
-        auto const frame = ros::message_traits::FrameId<Message>::value(*event.getConstMessage());
-        return !frame.empty() && frame.front() == '/' ? frame.substr(1) : frame;
-    }
-    // Pass on what can be transformed, and drop what is older than the transforms that the buffer keeps.
-    void check() {
-        auto const before = std::exchange(waiting_, {});
-        for (const auto& event : before) {
-            std::string why;
-            if (known(event, why))
-                this->signalMessage(event);
-            else if (why.find("extrapolation into the past") != std::string::npos)
-                failures_(event.getConstMessage(), filter_failure_reasons::OutTheBack);
-            else
-                waiting_.push_back(event);
-        }
-    }
-    bool known(const EventType& event, std::string& why) const {
-        auto const stamp = ros::message_traits::TimeStamp<Message>::value(*event.getConstMessage());
-        auto const source = frame_of(event);
-        for (const auto& frame : frames_) {
-            if (!buffer_.canTransform(frame, source, stamp, &why)) return false;
-            if (!tolerance_.isZero() && !buffer_.canTransform(frame, source, stamp + tolerance_, &why)) return false;
-        }
-        return true;
-    }
-
-    tf2::BufferCore& buffer_;
-    std::size_t size_;
-    V_string frames_;
-    ros::Duration tolerance_;
-    std::list<EventType> waiting_;
-    message_filters::detail::Calls<MConstPtr, FilterFailureReason> failures_;
-    std::int64_t callable_ = 0, watch_ = 0;
 };
 
 }  // namespace tf2_ros

@@ -1,7 +1,9 @@
 // message_filters::Synchronizer and TimeSynchronizer, with the policies ExactTime and ApproximateTime.
 #pragma once
 #include <array>
+#include <cmath>
 #include <deque>
+#include <limits>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -27,21 +29,16 @@ struct WithoutNull<List<Kept...>, First, Left...>
     : std::conditional_t<std::is_same_v<First, NullType>, WithoutNull<List<Kept...>>,
                          WithoutNull<List<Kept..., First>, Left...>> {};
 
-template <class Message>
-ros::Time stamp(const ros::MessageEvent<Message const>& event) {
-    return ros::message_traits::TimeStamp<Message>::value(*event.getConstMessage());
-}
-
 // The callbacks of a synchronizer, and the set of messages that they get.
 template <class... Messages>
 class Output {
 public:
     static constexpr std::size_t COUNT = sizeof...(Messages);
-    using Set = std::tuple<ros::MessageEvent<Messages const>...>;
+    using Set = std::tuple<library::Event<Messages>...>;
 
     template <class Function>
     Connection registerCallback(const Function& callback) {
-        return calls_.add([callback](const ros::MessageEvent<Messages const>&... events) mutable {
+        return calls_.add([callback](const library::Event<Messages>&... events) mutable {
             callback(events.getConstMessage()...);
         });
     }
@@ -50,7 +47,7 @@ public:
         return add<Parameters...>(callback);
     }
     template <class... Parameters>
-    Connection registerCallback(const boost::function<void(Parameters...)>& callback) {
+    Connection registerCallback(const library::Function<void(Parameters...)>& callback) {
         return add<Parameters...>(callback);
     }
     template <class Class, class Base, class... Parameters>
@@ -65,11 +62,11 @@ private:
     template <class... Parameters, class Function>
     Connection add(Function callback) {
         static_assert(sizeof...(Parameters) == COUNT, "a callback of a synchronizer has one parameter a message");
-        return calls_.add([callback](const ros::MessageEvent<Messages const>&... events) {
+        return calls_.add([callback](const library::Event<Messages>&... events) {
             callback(argument<Parameters, Messages>(events)...);
         });
     }
-    Calls<ros::MessageEvent<Messages const>...> calls_;
+    Calls<library::Event<Messages>...> calls_;
 };
 
 // Sets of messages with the same stamp.
@@ -81,7 +78,7 @@ public:
 
     template <std::size_t input>
     void add(const std::tuple_element_t<input, Set>& event) {
-        auto const at = stamp(event);
+        auto const at = library::stamp<std::tuple_element_t<input, std::tuple<Messages...>>>(event);
         auto& set = sets_[at];
         std::get<input>(set.events) = event;
         set.there[input] = true;
@@ -96,7 +93,7 @@ public:
     // Of sets that stayed incomplete; the messages that never came are null.
     template <class Function>
     Connection registerDropCallback(const Function& callback) {
-        return drops_.add([callback](const ros::MessageEvent<Messages const>&... events) {
+        return drops_.add([callback](const library::Event<Messages>&... events) {
             callback(events.getConstMessage()...);
         });
     }
@@ -116,8 +113,8 @@ private:
         std::apply(drops_, events);
     }
     std::size_t size_;
-    std::map<ros::Time, Partial> sets_;
-    Calls<ros::MessageEvent<Messages const>...> drops_;
+    std::map<std::int64_t, Partial> sets_;
+    Calls<library::Event<Messages>...> drops_;
 };
 
 // Sets of messages with stamps that are close to each other, each message in one set at most, by the algorithm of
@@ -128,7 +125,7 @@ public:
     using typename Output<Messages...>::Set;
     using Output<Messages...>::COUNT;
     explicit Approximate(std::uint32_t queue_size) : size_(queue_size) {
-        bounds_.fill(ros::Duration(0.0));
+        bounds_.fill(0);
     }
 
     template <std::size_t input>
@@ -145,13 +142,15 @@ public:
         process();
     }
     void setAgePenalty(double penalty) { age_penalty_ = penalty; }
-    void setInterMessageLowerBound(int input, ros::Duration bound) { bounds_.at(static_cast<std::size_t>(input)) = bound; }
-    void setInterMessageLowerBound(ros::Duration bound) { bounds_.fill(bound); }
-    void setMaxIntervalDuration(ros::Duration longest) { longest_ = longest; }
+    void setInterMessageLowerBound(int input, library::Duration bound) {
+        bounds_.at(static_cast<std::size_t>(input)) = library::nanoseconds(bound);
+    }
+    void setInterMessageLowerBound(library::Duration bound) { bounds_.fill(library::nanoseconds(bound)); }
+    void setMaxIntervalDuration(library::Duration longest) { longest_ = library::nanoseconds(longest); }
 
 private:
     static constexpr std::size_t NONE = COUNT;
-    using Stamps = std::array<ros::Time, COUNT>;
+    using Stamps = std::array<std::int64_t, COUNT>;
 
     // Call with each index as a constant.
     template <class Function>
@@ -169,9 +168,10 @@ private:
     Stamps next() const {
         Stamps stamps;
         each([&](auto index) {
+            using Message = std::tuple_element_t<index, std::tuple<Messages...>>;
             const auto& queue = std::get<index>(waiting_);
-            stamps[index] = queue.empty() ? std::max(stamp(std::get<index>(past_).back()) + bounds_[index], pivot_time_)
-                                          : stamp(queue.front());
+            stamps[index] = queue.empty() ? std::max(library::stamp<Message>(std::get<index>(past_).back()) + bounds_[index], pivot_time_)
+                                          : library::stamp<Message>(queue.front());
         });
         return stamps;
     }
@@ -183,8 +183,8 @@ private:
         return static_cast<std::size_t>(stamps.rend() - reversed) - 1;
     }
     // Whether a set that ends at *end* can be no better than the candidate, measured from *start*.
-    bool no_better(const ros::Time& end, const ros::Time& start) const {
-        return (end - candidate_end_) * (1 + age_penalty_) >= start - candidate_start_;
+    bool no_better(std::int64_t end, std::int64_t start) const {
+        return std::llround(static_cast<double>(end - candidate_end_) * (1 + age_penalty_)) >= start - candidate_start_;
     }
     void advance(std::size_t input, bool keep = true) {
         each([&](auto index) {
@@ -202,7 +202,7 @@ private:
             past.pop_back();
         }
     }
-    void become_candidate(const ros::Time& start, const ros::Time& end) {
+    void become_candidate(std::int64_t start, std::int64_t end) {
         each([&](auto index) {
             std::get<index>(candidate_) = std::get<index>(waiting_).front();
             std::get<index>(past_).clear();
@@ -260,14 +260,14 @@ private:
     }
 
     std::size_t size_;
-    std::tuple<std::deque<ros::MessageEvent<Messages const>>...> waiting_;
-    std::tuple<std::vector<ros::MessageEvent<Messages const>>...> past_;
+    std::tuple<std::deque<library::Event<Messages>>...> waiting_;
+    std::tuple<std::vector<library::Event<Messages>>...> past_;
     Set candidate_;
-    ros::Time candidate_start_, candidate_end_, pivot_time_;
+    std::int64_t candidate_start_ = 0, candidate_end_ = 0, pivot_time_ = 0;  // ns
     std::size_t pivot_ = NONE;  // the input whose message ended the first candidate
     std::array<bool, COUNT> dropped_{};
-    std::array<ros::Duration, COUNT> bounds_;
-    ros::Duration longest_ = ros::DURATION_MAX;
+    std::array<std::int64_t, COUNT> bounds_;
+    std::int64_t longest_ = std::numeric_limits<std::int64_t>::max();
     double age_penalty_ = 0.1;
 };
 
@@ -326,8 +326,8 @@ public:
         connect(std::index_sequence_for<Filters...>(), filters...);
     }
     template <int input, class Message>
-    void add(const boost::shared_ptr<Message>& message) {
-        Policy::template add<input>({message, ros::Time::now()});
+    void add(const library::Pointer<Message>& message) {
+        Policy::template add<input>({message, library::now()});
     }
     using Policy::add;
     Policy* getPolicy() { return this; }
@@ -337,7 +337,7 @@ public:
 private:
     template <std::size_t... input, class... Filters>
     void connect(std::index_sequence<input...>, Filters&... filters) {
-        (inputs_.push_back(filters.registerCallback(boost::function<void(
+        (inputs_.push_back(filters.registerCallback(library::Function<void(
              const std::tuple_element_t<input, typename Policy::Set>&)>(
              [this](const auto& event) { Policy::template add<input>(event); }))),
          ...);

@@ -1,14 +1,14 @@
 // message_filters: what has an output of messages, and the filters with one input.
 #pragma once
 #include <algorithm>
+#include <cstdint>
 #include <functional>
 #include <memory>
-#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
-#include "ros/message_traits.h"
-#include "ros/node_handle.h"
+#include "message_filters/library.h"
 
 namespace message_filters {
 
@@ -51,12 +51,12 @@ private:
 
 // An event as a callback's parameter: a pointer, a message or an event.
 template <class Parameter, class Message>
-decltype(auto) argument(const ros::MessageEvent<Message const>& event) {
+decltype(auto) argument(const library::Event<Message>& event) {
     using Plain = std::remove_cv_t<std::remove_reference_t<Parameter>>;
-    if constexpr (std::is_constructible_v<Plain, ros::MessageEvent<Message const>>)
+    if constexpr (std::is_constructible_v<Plain, library::Event<Message>>)
         return Plain(event);
-    else if constexpr (std::is_same_v<Plain, boost::shared_ptr<Message>>)
-        return boost::make_shared<Message>(*event.getConstMessage());
+    else if constexpr (std::is_same_v<Plain, library::Pointer<Message>>)
+        return Plain(new Message(*event.getConstMessage()));
     else if constexpr (std::is_same_v<Plain, Message>)
         return static_cast<const Message&>(*event.getConstMessage());
     else
@@ -68,10 +68,10 @@ decltype(auto) argument(const ros::MessageEvent<Message const>& event) {
 template <class Message>
 class SimpleFilter {
 public:
-    using MConstPtr = boost::shared_ptr<Message const>;
-    using EventType = ros::MessageEvent<Message const>;
-    using Callback = boost::function<void(const MConstPtr&)>;
-    using EventCallback = boost::function<void(const EventType&)>;
+    using MConstPtr = library::Pointer<Message const>;
+    using EventType = library::Event<Message>;
+    using Callback = library::Function<void(const MConstPtr&)>;
+    using EventCallback = library::Function<void(const EventType&)>;
 
     SimpleFilter() = default;
     SimpleFilter(const SimpleFilter&) = delete;
@@ -82,7 +82,7 @@ public:
         return calls_.add([callback = Callback(callback)](const EventType& event) { callback(event.getConstMessage()); });
     }
     template <class Parameter>
-    Connection registerCallback(const boost::function<void(Parameter)>& callback) {
+    Connection registerCallback(const library::Function<void(Parameter)>& callback) {
         return add<Parameter>(callback);
     }
     template <class Parameter>
@@ -97,7 +97,7 @@ public:
     const std::string& getName() const { return name_; }
 
 protected:
-    void signalMessage(const MConstPtr& message) { calls_(EventType(message, ros::Time::now())); }
+    void signalMessage(const MConstPtr& message) { calls_(EventType(message, library::now())); }
     void signalMessage(const EventType& event) { calls_(event); }
 
 private:
@@ -121,9 +121,9 @@ public:
     void connectInput(Filter& filter) {
         input_.disconnect();
         input_ = filter.registerCallback(
-            boost::function<void(const EventType&)>([this](const EventType& event) { self().add(event); }));
+            library::Function<void(const EventType&)>([this](const EventType& event) { self().add(event); }));
     }
-    void add(const MConstPtr& message) { self().add(EventType(message, ros::Time::now())); }
+    void add(const MConstPtr& message) { self().add(EventType(message, library::now())); }
 
 private:
     Self& self() { return static_cast<Self&>(*this); }
@@ -159,41 +159,42 @@ public:
     void add(const EventType& event) {
         while (kept_.size() >= size_) kept_.erase(kept_.begin());
         auto const place = std::find_if(kept_.rbegin(), kept_.rend(),
-                                        [&](const EventType& one) { return !(stamp(event) < stamp(one)); });
+                                        [&](const EventType& one) { return library::stamp<Message>(event) >= library::stamp<Message>(one); });
         kept_.insert(place.base(), event);
         this->signalMessage(event);
     }
-    std::vector<MConstPtr> getInterval(const ros::Time& start, const ros::Time& end) const {
+    std::vector<MConstPtr> getInterval(const library::Time& start, const library::Time& end) const {
         return messages(from(start), until(end));
     }
     // The same with the message before the interval, and the one after it.
-    std::vector<MConstPtr> getSurroundingInterval(const ros::Time& start, const ros::Time& end) const {
+    std::vector<MConstPtr> getSurroundingInterval(const library::Time& start, const library::Time& end) const {
         auto first = until(start), last = from(end);
         if (first != kept_.begin()) --first;
         if (last != kept_.end()) ++last;
         return messages(first, last);
     }
-    MConstPtr getElemBeforeTime(const ros::Time& time) const {
+    MConstPtr getElemBeforeTime(const library::Time& time) const {
         auto const after = from(time);
         return after == kept_.begin() ? MConstPtr() : std::prev(after)->getConstMessage();
     }
-    MConstPtr getElemAfterTime(const ros::Time& time) const {
+    MConstPtr getElemAfterTime(const library::Time& time) const {
         auto const after = until(time);
         return after == kept_.end() ? MConstPtr() : after->getConstMessage();
     }
-    ros::Time getLatestTime() const { return kept_.empty() ? ros::Time() : stamp(kept_.back()); }
-    ros::Time getOldestTime() const { return kept_.empty() ? ros::Time() : stamp(kept_.front()); }
+    library::Time getLatestTime() const { return library::time(kept_.empty() ? 0 : library::stamp<Message>(kept_.back())); }
+    library::Time getOldestTime() const { return library::time(kept_.empty() ? 0 : library::stamp<Message>(kept_.front())); }
 
 private:
     using Place = typename std::vector<EventType>::const_iterator;
-    static ros::Time stamp(const EventType& event) {
-        return ros::message_traits::TimeStamp<Message>::value(*event.getConstMessage());
+    Place from(const library::Time& time) const {
+        auto const at = library::nanoseconds(time);
+        return std::find_if(kept_.begin(), kept_.end(),
+                            [at](const EventType& one) { return library::stamp<Message>(one) >= at; });
     }
-    Place from(const ros::Time& time) const {
-        return std::find_if(kept_.begin(), kept_.end(), [&](const EventType& one) { return stamp(one) >= time; });
-    }
-    Place until(const ros::Time& time) const {
-        return std::find_if(kept_.begin(), kept_.end(), [&](const EventType& one) { return stamp(one) > time; });
+    Place until(const library::Time& time) const {
+        auto const at = library::nanoseconds(time);
+        return std::find_if(kept_.begin(), kept_.end(),
+                            [at](const EventType& one) { return library::stamp<Message>(one) > at; });
     }
     static std::vector<MConstPtr> messages(Place first, Place last) {
         std::vector<MConstPtr> found;
@@ -202,49 +203,6 @@ private:
     }
     std::vector<EventType> kept_;
     std::size_t size_ = 1;
-};
-
-// Passes messages on in the order of their stamps, each *delay* after its stamp.
-template <class Message>
-class TimeSequencer : public OneInput<TimeSequencer<Message>, Message> {
-public:
-    using typename SimpleFilter<Message>::EventType;
-    using OneInput<TimeSequencer, Message>::add;
-    TimeSequencer(ros::Duration delay, ros::Duration update_rate, std::uint32_t queue_size,
-                  ros::NodeHandle node = ros::NodeHandle())
-        : delay_(delay), size_(queue_size) {
-        timer_ = node.createTimer(update_rate, [this](const ros::TimerEvent&) { dispatch(); });
-    }
-    template <class Filter>
-    TimeSequencer(Filter& filter, ros::Duration delay, ros::Duration update_rate, std::uint32_t queue_size,
-                  ros::NodeHandle node = ros::NodeHandle())
-        : TimeSequencer(delay, update_rate, queue_size, node) {
-        this->connectInput(filter);
-    }
-    void add(const EventType& event) {
-        auto const at = stamp(event);
-        if (at < last_) return;
-        waiting_.insert({at, event});
-        if (size_ != 0 && waiting_.size() > size_) waiting_.erase(waiting_.begin());
-    }
-
-private:
-    static ros::Time stamp(const EventType& event) {
-        return ros::message_traits::TimeStamp<Message>::value(*event.getConstMessage());
-    }
-    void dispatch() {
-        while (!waiting_.empty() && waiting_.begin()->first + delay_ <= ros::Time::now()) {
-            auto const next = *waiting_.begin();
-            waiting_.erase(waiting_.begin());
-            last_ = next.first;
-            this->signalMessage(next.second);
-        }
-    }
-    ros::Duration delay_;
-    std::size_t size_;
-    ros::Time last_;
-    std::multimap<ros::Time, EventType> waiting_;
-    ros::Timer timer_;
 };
 
 }  // namespace message_filters

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from volery.base.time import Ns
 from volery.ros.client_libraries.abi_codec import Reader, Writer
-from volery.ros.client_libraries.roscpp.session import Session
+from volery.ros.client_libraries.cpp.session import CppSession
 from volery.ros.client_libraries.tf2.tf2_ros import TF, TF_STATIC, Buffer
 from volery.ros.client_libraries.tf2.transform_tree import TransformException
 from volery.ros.graph import AS_OFFERED, Group
@@ -39,7 +39,7 @@ class _WatchedBuffer(Buffer):
 class _Watch:
     """Calls back in the tasks of a queue after changes of a buffer, once for changes at one time."""
 
-    def __init__(self, session: Session, buffer: _WatchedBuffer, callback: int, group: Group) -> None:
+    def __init__(self, session: CppSession, buffer: _WatchedBuffer, callback: int, group: Group) -> None:
         self._session, self._buffer, self._callback, self._group = session, buffer, callback, group
         self._pending = False
         buffer.watches[self] = None
@@ -60,21 +60,21 @@ class _Watch:
         self._buffer.watches.pop(self, None)
 
 
-def _create(session: Session, arguments: Reader) -> int:
+def _create(session: CppSession, arguments: Reader) -> int:
     kind: Any = type("Buffer", (_WatchedBuffer,), {"graph": session.graph, "kernel": session.kernel})
     return session.keep(kind(_Nanoseconds(arguments.integer())))
 
 
-def _watch(session: Session, arguments: Reader) -> int:
+def _watch(session: CppSession, arguments: Reader) -> int:
     buffer = session.find(arguments.integer(), _WatchedBuffer)
     return session.keep(_Watch(session, buffer, arguments.integer(), session.group(arguments.integer())))
 
 
-def _buffer(session: Session, arguments: Reader) -> Buffer:
+def _buffer(session: CppSession, arguments: Reader) -> Buffer:
     return session.find(arguments.integer(), Buffer)
 
 
-def _listen(session: Session, arguments: Reader) -> None:
+def _listen(session: CppSession, arguments: Reader) -> None:
     """Fill a buffer in a task of its own, as the listener's thread does."""
     buffer, node = _buffer(session, arguments), session.node
     group = node.group()
@@ -89,7 +89,7 @@ def _listen(session: Session, arguments: Reader) -> None:
     session.spawn(group.spin, "tf2_ros::TransformListener")
 
 
-def _set(session: Session, arguments: Reader) -> bool:
+def _set(session: CppSession, arguments: Reader) -> bool:
     buffer = _buffer(session, arguments)
     transform = from_cdr("geometry_msgs/msg/TransformStamped", arguments.raw())
     buffer.set_transform(transform, static=arguments.flag())
@@ -102,13 +102,13 @@ def _question(arguments: Reader) -> tuple[str, str, _Nanoseconds, _Nanoseconds]:
     return target, source, _Nanoseconds(arguments.integer()), _Nanoseconds(arguments.integer())
 
 
-def _can(session: Session, arguments: Reader) -> str:
+def _can(session: CppSession, arguments: Reader) -> str:
     """Return why there is no transform, or ``""``."""
     possible, reason = _buffer(session, arguments).can_transform(*_question(arguments), True)
     return "" if possible else reason or "a name of a frame is not valid"
 
 
-def _look_up(session: Session, arguments: Reader) -> bytes:
+def _look_up(session: CppSession, arguments: Reader) -> bytes:
     try:
         found = _buffer(session, arguments).lookup_transform(*_question(arguments))
     except TransformException as error:
@@ -116,7 +116,7 @@ def _look_up(session: Session, arguments: Reader) -> bytes:
     return Writer().flag(True).done() + to_cdr(found)
 
 
-TRANSFORMS: dict[str, Callable[[Session, Reader], Any]] = {
+TRANSFORMS: dict[str, Callable[[CppSession, Reader], Any]] = {
     "tf_buffer": _create,
     "tf_listen": _listen,
     "tf_set": _set,
