@@ -3,7 +3,7 @@
 The flights of ``examples/landing`` over wind, light, distance of the approach, yaw of the marker and seed;
 then those that must not end on the pad: no marker, a covered one, no light. The goal is a mean of less than
 0.10 m, 0.25 m at most, none lost; what lands elsewhere says why. Each offset is given where the drone touches
-the ground and where it rests: in wind a PX4 slides until it knows that it has landed.
+the ground and where it rests, and both by autopilot and wind.
 
     python bench/landings.py [--flights 20] [--workers 2]
 """
@@ -29,7 +29,8 @@ from volery.run.assembly.model_checks import vocabulary
 MODEL = Path(__file__).parents[1] / "examples" / "landing"
 LEGS_M = 0.16
 """Height of the centre of a drone whose legs are as good as on the ground [m]."""
-AUTOPILOTS = ("ardupilot", "px4")
+AUTOPILOTS = {"ardupilot": 0.5, "px4": 0.0}
+"""Autopilots and the damping with which they land."""
 SHEET = (
     "{sheet: {corners: [{east: 20 m, north: 9 m}, {east: 21 m, north: 9 m}, {east: 21 m, north: 11 m}, "
     "{east: 20 m, north: 11 m}], ceiling: 5 cm}}"
@@ -37,12 +38,21 @@ SHEET = (
 
 
 class Flight(NamedTuple):
-    """What is flown: words for the table, changes of the model, the seed, and whether it should land."""
+    """What is flown: group and words for the table, changes of the model, seed, whether it lands."""
 
+    group: str
     words: str
     changes: tuple[str, ...]
     seed: int
     lands: bool = True
+
+
+def _flown_by(autopilot: str) -> tuple[str, ...]:
+    """Return the changes of the model for an autopilot."""
+    return (
+        f"environment.vehicles.drone.autopilot={autopilot}",
+        f"components.MarkerLanding.parameters.damping={AUTOPILOTS[autopilot]}",
+    )
 
 
 def flights(count: int) -> list[Flight]:
@@ -50,13 +60,13 @@ def flights(count: int) -> list[Flight]:
     random = Random(1)
     found = []
     for number in range(count):
-        autopilot = AUTOPILOTS[number % 2]
+        autopilot = tuple(AUTOPILOTS)[number % 2]
         light = ("day", "dusk")[number // 2 % 2]
         wind, gusts = random.choice(((0.0, 0.0), (3.0, 0.5), (6.0, 1.0)))
         east, north = random.uniform(-2.0, 2.0), random.uniform(-2.0, 2.0)
         yaw, direction = random.uniform(0.0, 360.0), random.uniform(0.0, 360.0)
         changes = (
-            f"environment.vehicles.drone.autopilot={autopilot}",
+            *_flown_by(autopilot),
             f"environment.light={light}",
             f"environment.wind={{speed: {wind} m/s, gusts: {gusts} m/s, direction: {direction:.0f} deg}}",
             f"environment.places.beside={{east: {20.0 + east:.2f} m, north: {10.0 + north:.2f} m}}",
@@ -64,7 +74,7 @@ def flights(count: int) -> list[Flight]:
             f"environment.markers.pad.yaw={yaw:.0f} deg",
         )
         words = f"{autopilot}, {light}, wind {wind:g} m/s, approach {east:+.1f} {north:+.1f} m, yaw {yaw:.0f}"
-        found.append(Flight(words, changes, number + 1))
+        found.append(Flight(f"{autopilot}, wind {wind:g} m/s", words, changes, number + 1))
     return found
 
 
@@ -77,7 +87,11 @@ def refusals() -> list[Flight]:
     }
     return [
         Flight(
-            f"{autopilot}, {words}", (f"environment.vehicles.drone.autopilot={autopilot}", change), 1, False
+            autopilot,
+            f"{autopilot}, {words}",
+            (*_flown_by(autopilot), change),
+            1,
+            False,
         )
         for autopilot, (words, change) in product(AUTOPILOTS, cases.items())
     ]
@@ -104,6 +118,11 @@ def fly(flight: Flight) -> Landed:
     return Landed(touched, run.observables.get("drone.landing_offset", -1.0), str(run.error or ""))
 
 
+def summary(offsets: list[float]) -> str:
+    """Return mean and greatest offset in words."""
+    return f"mean {sum(offsets) / len(offsets):.3f} m, worst {max(offsets):.3f} m"
+
+
 def main() -> None:
     """Fly, and print each flight and the figures."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -117,14 +136,13 @@ def main() -> None:
             figures = f"touches {landed.touched:.3f} m, rests {landed.rests:.3f} m"
             print(f"{flight.words:64} {landed.error or figures}", flush=True)
             results.append((flight, landed))
-    right = [landed for flight, landed in results if flight.lands and not landed.error]
+    right = [(flight.group, landed) for flight, landed in results if flight.lands and not landed.error]
     wrong = [flight.words for flight, landed in results if flight.lands == bool(landed.error)]
     print(f"{len(right)} landings; goal: mean 0.10 m, worst 0.25 m")
-    for words, offsets in (
-        ("touch-down", [one.touched for one in right]),
-        ("rest", [one.rests for one in right]),
-    ):
-        print(f"{words}: mean {sum(offsets) / len(offsets):.3f} m, worst {max(offsets):.3f} m")
+    for group in (*sorted({one for one, _ in right}), "all"):
+        landings = [landed for one, landed in right if group in (one, "all")]
+        touched, rests = [one.touched for one in landings], [one.rests for one in landings]
+        print(f"{group:28} {len(landings):4} {summary(touched)} at touch-down, {summary(rests)} at rest")
     print(f"other than they should: {', '.join(wrong) or 'none'}")
 
 

@@ -3,9 +3,11 @@
 The programs in ``bench/library_programs`` take no part in the measurement of the table. As a reference the
 same programs are estimated without the table: then a library call takes no time.
 
-    python bench/library_calls.py [--unseen] [program ...]
+    python bench/library_calls.py [--unseen | --perception] [program ...]
 
-With --unseen the programs of ``bench/unseen_library_programs``, written when the table was finished.
+With --unseen the programs of ``bench/unseen_library_programs``, written when the table was finished; with
+--perception those of ``bench/perception_programs``: maps, paths, markers, pictures, clouds. Programs whose
+library is not installed are left out.
 """
 
 from __future__ import annotations
@@ -14,11 +16,14 @@ import argparse
 from pathlib import Path
 from statistics import mean, median
 
+from volery.calibration.picture_times import module_if_installed
 from volery.calibration.timed_code import Rounds, TimedCode, measure, timed_program, timed_programs
 from volery.cost import library_table, operation_table
 
 PROGRAMS = Path(__file__).with_name("library_programs")
 UNSEEN = Path(__file__).with_name("unseen_library_programs")
+PERCEPTION = Path(__file__).with_name("perception_programs")
+OPTIONAL = ("gtsam", "small_gicp")
 SEED = 5
 
 
@@ -29,12 +34,23 @@ def shipped_ns(one: TimedCode) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--unseen", action="store_true")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--unseen", action="store_true")
+    which.add_argument("--perception", action="store_true")
     parser.add_argument("programs", nargs="*", metavar="program", help="by default all of the folder")
     wanted = parser.parse_args()
-    folder = UNSEEN if wanted.unseen else PROGRAMS
+    folder = UNSEEN if wanted.unseen else PERCEPTION if wanted.perception else PROGRAMS
     files = [folder / f"{name}.py" for name in wanted.programs] or sorted(folder.glob("*.py"))
-    programs = [timed_program(file.stem, file.read_text(), SEED) for file in files]
+    missing = [f"import {name}" for name in OPTIONAL if module_if_installed(name) is None]
+    texts = {file.stem: file.read_text() for file in files}
+    programs = [
+        timed_program(name, text, SEED)
+        for name, text in texts.items()
+        if not any(one in text for one in missing)
+    ]
+    pictures = module_if_installed("cv2")
+    if pictures is not None:
+        pictures.setNumThreads(1)
     own = timed_programs()
     measure([*own, *programs], Rounds(9, 15, 0.03))
     slowdown = median(one.median / shipped_ns(one) for one in own)

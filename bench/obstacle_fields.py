@@ -12,8 +12,9 @@ from __future__ import annotations
 
 import argparse
 from concurrent.futures import ProcessPoolExecutor
+from functools import cache
 from math import hypot, inf
-from time import perf_counter
+from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -91,12 +92,14 @@ def field(seed: int) -> Field:
     return made
 
 
-def reference(obstacles: Field) -> float:
-    """Return the length of the shortest path that keeps 1 m from all obstacles [m]; infinity without one."""
+@cache
+def reference(seed: int) -> float:
+    """Return the length of the shortest path 1 m from all obstacles [m]; infinity without one."""
+    obstacles = field(seed)
     rows, columns = int(TALL / SIDE), int(WIDE / SIDE)
     row, column = np.indices((rows, columns))
     centres = SIDE * (np.stack((column.ravel(), row.ravel()), axis=1).astype(np.float64) + 0.5)
-    ways = WaysFrom(obstacles.distance(centres).reshape(rows, columns), SIDE, _cell(START), 1.0)
+    ways = WaysFrom(obstacles.distance(centres).reshape(rows, columns), SIDE, _cell(START), 1.0, _cell(GOAL))
     way = ways.straightened(ways.to(_cell(GOAL)))
     if not len(way):
         return inf
@@ -135,9 +138,9 @@ def cross(seed: int, speed: float) -> Crossing:
         if ticks % every == 0:
             seen = obstacles.ranges(*place) + noise.normal(0.0, 0.01, len(BEAMS))
             scan = scan_from_ranges(ticks * 20_000_000, BEAMS, seen, 0.05, SIGHT)
-            begin = perf_counter()
+            begin = process_time()
             command = navigator.update(scan.time, Pose2(*place), scan, velocity)
-            computed += perf_counter() - begin
+            computed += process_time() - begin
         commands.append(command)
         change = commands.pop(0) - velocity
         size = hypot(*change)
@@ -146,7 +149,7 @@ def cross(seed: int, speed: float) -> Crossing:
         place, velocity, length, ticks = place + moved, after, length + hypot(*moved), ticks + 1
         places.append(place)
     time, nearest = ticks * step, float(obstacles.distance(np.array(places)).min())
-    shortest = reference(obstacles)
+    shortest = reference(seed)
     return Crossing(
         seed,
         speed,

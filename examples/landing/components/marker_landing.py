@@ -7,6 +7,7 @@ is not seen the drone comes home.
 from __future__ import annotations
 
 import rospy
+from mavros_msgs.srv import MessageInterval
 from sensor_msgs.msg import CameraInfo, Image, Imu
 
 import volery
@@ -14,10 +15,9 @@ from volery import AMSL, Position, VoleryError
 from volery.autonomy.markers import MarkerFinder, camera_of, picture_of
 from volery.autonomy.precision_landing import Landing, LandingRules, Phase, sight_of, step
 
-FINDING_S = 0.04
-"""Finding markers in one picture of 640 x 480 at ``AT_MHZ``; charged instead of what it takes here."""
-AT_MHZ = 1500
 ROUND_S = 0.05
+ATTITUDE, ATTITUDE_HZ = 30, 20
+"""MAVLink's number of the attitude, and its rate: after a quarter of a second it is wrong by degrees."""
 ATTITUDES = 100
 """Attitudes that are kept: those of the last seconds."""
 
@@ -26,34 +26,46 @@ class MarkerLanding:
     """``marker`` of ``size_m`` lies on ``pad``; the drone looks for it from ``height_m`` above ``approach``.
 
     ``gain`` is m/s for each metre of offset: an autopilot that overshoots its velocity needs a lower one.
+    ``damping`` is m/s for each m/s that a gust takes from it: for an ArduPilot, not for a PX4.
     """
 
-    def __init__(self, drone, field, pad, approach, marker, size_m, height_m, gain):  # noqa: PLR0917  # by name
+    def __init__(self, drone, field, pad, approach, marker, size_m, height_m, gain, damping):  # noqa: PLR0913, PLR0917  # by name
         self._drone, self._pad, self._approach = drone, field.places[pad], field.places[approach]
         self._height_m = height_m
         self._finder = MarkerFinder({marker: size_m})
-        self._rules = LandingRules(gain=gain)
+        self._rules = LandingRules(gain=gain, damping=damping)
         self._camera, self._picture, self._attitudes = None, None, []
 
     def run(self):
         """Fly there and land."""
         rospy.init_node("marker_landing")
-        name = self._drone.name
-        rospy.Subscriber(f"/{name}/camera/camera_info", CameraInfo, self._take_camera, queue_size=1)
-        rospy.Subscriber(f"/{name}/camera/image_raw", Image, self._take_picture, queue_size=1)
-        rospy.Subscriber(f"/{name}/imu/data", Imu, self._take_attitude, queue_size=10)
         drone = self._drone
         drone.wait_ready()
         drone.takeoff(self._height_m)
         above = self._approach.amsl_m + self._height_m
         drone.goto(Position(self._approach.latitude, self._approach.longitude, AMSL(above)))
+        subscriptions = self._open_eyes()
         reason = self._descend()
+        for one in subscriptions:
+            one.unregister()
         if not reason:
             drone.land(self._pad.position)
             return
         volery.log(f"no landing on the pad: {reason}", "warning")
         drone.return_home()
         raise VoleryError(f"no landing on the pad: {reason}")
+
+    def _open_eyes(self):
+        """Subscribe to camera and attitude: above the pad they are needed, and nowhere else."""
+        name = self._drone.name
+        set_rate = rospy.ServiceProxy(f"/{name}/set_message_interval", MessageInterval)
+        if not set_rate(ATTITUDE, ATTITUDE_HZ).success:
+            volery.log("the autopilot does not send its attitude faster", "warning")
+        return (
+            rospy.Subscriber(f"/{name}/camera/camera_info", CameraInfo, self._take_camera, queue_size=1),
+            rospy.Subscriber(f"/{name}/camera/image_raw", Image, self._take_picture, queue_size=1),
+            rospy.Subscriber(f"/{name}/imu/data", Imu, self._take_attitude, queue_size=10),
+        )
 
     def _descend(self):
         """Down to where the autopilot can land alone. Why it did not come there, or nothing."""
@@ -80,7 +92,6 @@ class MarkerLanding:
         picture, self._picture = self._picture, None
         if picture is None or self._camera is None or not self._attitudes:
             return None
-        volery.add_time(FINDING_S, at_mhz=AT_MHZ)
         found = self._finder.find(picture_of(picture), self._camera)
         if not found:
             return None

@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 from volery.autonomy.planar_pose import Array
 from volery.base.elementary import sine_cosine
 from volery.base.errors import UsageError
+from volery.base.metered_work import done
 from volery.base.numeric_code import NumericCode, numeric
 
 _TURNS_DEG = (
@@ -152,6 +153,7 @@ def safe_velocity(
     state = np.array((*place, *present, motion.acceleration, 2.0 * motion.period))
     spare = np.full(len(candidates), np.inf)
     judge_candidates.bind(np.ascontiguousarray(points, dtype=np.float64), candidates, state, spare)()
+    done("avoidance", looks=len(points) * len(candidates))
     off = candidates - speed * np.array((east, north))
     effort = np.sqrt((off * off).sum(axis=1))
     effort += 0.3 * speed * np.maximum(0.0, 1.0 - (spare - motion.room) / _SOFT)

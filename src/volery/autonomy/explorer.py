@@ -10,21 +10,22 @@ from math import ceil, hypot
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from volery.autonomy.avoidance import Motion
-from volery.autonomy.frontiers import frontiers_of
+from volery.autonomy.frontiers import edges_of, frontiers_of, reach_of
 from volery.autonomy.laser_scan import LaserScan2
 from volery.autonomy.navigator import Navigator
 from volery.autonomy.planar_pose import Array, Pose2
 from volery.base.elementary import atan2
 from volery.base.frames import wrap
+from volery.base.metered_work import done
 from volery.base.time import Ns, S
 
 _LOOK: Ns = 2 * S
 """Time between two choices of a frontier."""
 _FIRST: Ns = 2 * S
 """Time for which it looks around before the first: a cell is free after some scans."""
-_SAME = 0.5  # [m] a goal nearer than this to one that was given up is the same
 
 
 class Command(NamedTuple):
@@ -49,7 +50,7 @@ class Explorer:
         gap: Frontiers that are shorter are of no use [m].
 
     ``navigator`` has the map and the word on what it does; ``done`` says that no frontier is left;
-    ``given_up`` are places [m] near frontiers that stayed.
+    ``given_up`` are goals [m] that led to nothing: what is not known near them stays so.
 
     Example::
 
@@ -66,15 +67,24 @@ class Explorer:
         self._began: Ns | None = None
         self._looked: Ns = 0
         self._until: Ns = 0
+        self._updated: Ns = 0
         self._waited = False  # at the goal since the last choice
+        self._found_none = False  # by the last choice; by the next one, too, it is done
 
     def update(self, time: Ns, pose: Pose2, scan: LaserScan2 | None, velocity: Array) -> Command:
         """Return what to command; the arguments are those of ``Navigator.update``."""
         navigator = self.navigator
+        done("exploration")
         command = navigator.update(time, pose, scan, velocity)
         if self._began is None and len(navigator.grid.log_odds):
             self._began = time
-        if self._began is None or time - self._began < _FIRST or self.done:
+        if time < self._updated:  # a clock that jumped back
+            self._looked = self._until = time
+            self._began = time if self._began is None else min(self._began, time)
+        elif navigator.fault:  # the goal is not to blame
+            self._until += time - self._updated
+        self._updated = time
+        if self._began is None or time - self._began < _FIRST or self.done or navigator.fault:
             return Command(np.zeros(2), 0.0)
         came = navigator.arrived and not self._waited
         if navigator.goal is None or came or time - self._looked >= _LOOK:
@@ -85,27 +95,37 @@ class Explorer:
         return Command(command, min(max(2.0 * off, -self.turn), self.turn))
 
     def _choose(self, time: Ns, pose: Pose2) -> None:
-        """Set the goal: stay with the frontier at hand while it is one, else take the best."""
+        """Set the goal: stay with the one at hand while a frontier is near it, else take the best."""
         navigator, grid = self.navigator, self.navigator.grid
         goal = navigator.goal
+        near = ceil(navigator.least / grid.resolution) + 2
         failed = bool(navigator.no_way) or time > self._until or (navigator.arrived and self._waited)
         self._waited = navigator.arrived
+        if goal and failed:
+            self.given_up.append(goal)
+        free = navigator.free
+        edge = edges_of(free, grid.occupied, self._marked(self.given_up), near)
+        if goal and not failed and (edge & reach_of(self._marked([goal]), free, near)).any():
+            return
         ways, window = navigator.ways_from(np.array((pose.x, pose.y)))
-        near = ceil(navigator.least / grid.resolution) + 2
+        ways.cost[ways.clearance < navigator.least] = np.inf  # a way may lead out of there, but not to it
         least = max(4, round(self.gap / grid.resolution))
-        left = []
-        for frontier in frontiers_of(navigator.free, grid.log_odds == 0.0, ways, near, least):
-            x, y = (float(value) for value in window.centres(np.array((frontier.goal,)))[0])
-            if goal and failed and hypot(x - goal[0], y - goal[1]) < _SAME:
-                self.given_up.append((x, y))
-            if all(hypot(x - was_x, y - was_y) >= _SAME for was_x, was_y in self.given_up):
-                left.append(((x, y), frontier))
-        if goal and not failed and any(hypot(x - goal[0], y - goal[1]) < 2.0 * _SAME for (x, y), _ in left):
+        found = frontiers_of(edge, free, ways, near, least)
+        if not found:
+            self.done, navigator.goal = self._found_none, None
+            self._found_none = True
+            if self.done:
+                navigator.word = f"explored; {len(self.given_up)} places led to nothing"
             return
-        if not left:
-            self.done, navigator.goal = True, None
-            navigator.word = f"explored; {len(self.given_up)} frontiers given up"
-            return
-        navigator.goal, best = left[0]
+        self._found_none = False
+        x, y = (float(value) for value in window.centres(np.array((found[0].goal,)))[0])
+        navigator.goal = x, y
         self._waited = False
-        self._until = time + 10 * S + round(3.0 * best.cost / navigator.motion.fastest * S)
+        self._until = time + 10 * S + round(3.0 * found[0].cost / navigator.motion.fastest * S)
+
+    def _marked(self, places: list[tuple[float, float]]) -> NDArray[np.bool_]:
+        """Return the cells of places."""
+        marked = np.zeros(self.navigator.grid.log_odds.shape, dtype=bool)
+        for place in places:
+            marked[self.navigator.grid.cell(*place)] = True
+        return marked

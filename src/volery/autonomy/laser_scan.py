@@ -8,6 +8,7 @@ import numpy as np
 
 from volery.autonomy.planar_pose import Array, Pose2
 from volery.base.errors import UsageError
+from volery.base.metered_work import done
 from volery.base.time import Ns
 
 
@@ -63,6 +64,7 @@ def scan_from_ranges(
     mounting: Pose2 = Pose2(),  # noqa: B008
 ) -> LaserScan2:
     """Return a scan of ranges [m] at angles [rad], as of ``scan_of``."""
+    done("scan", beams=len(ranges))
     with np.errstate(invalid="ignore"):
         met = (ranges >= least) & (ranges < 0.999 * most)
         nothing = ranges >= 0.999 * most

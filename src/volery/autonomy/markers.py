@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from volery.base.errors import UsageError, choices
+from volery.base.metered_work import done
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
@@ -37,6 +38,16 @@ pixels, by day and at dusk."""
 _LEAST_DISTANCE = 0.02
 """Of two outlines that are nearer than this share of their length the outer one is kept. With OpenCV's 0.125
 that is often the white margin's, and the marker in it is lost."""
+
+_CHANNELS = {
+    "mono8": (1, None),
+    "8UC1": (1, None),
+    "bgr8": (3, cv2.COLOR_BGR2GRAY),
+    "rgb8": (3, cv2.COLOR_RGB2GRAY),
+    "bgra8": (4, cv2.COLOR_BGRA2GRAY),
+    "rgba8": (4, cv2.COLOR_RGBA2GRAY),
+}
+"""Bytes of a pixel, and what makes it grey, by encoding."""
 
 
 class CameraModel(NamedTuple):
@@ -86,18 +97,23 @@ def marker_cells(family: str, number: int) -> Picture:
 
 
 def picture_of(message: Any) -> Picture:
-    """Return the picture of a ``sensor_msgs/Image`` (height, width).
+    """Return the picture of a ``sensor_msgs/Image`` in grey (height, width).
 
     Raises:
-        UsageError: It is not of 8 grey bits a pixel, or its data are too short.
+        UsageError: It has not 8 bits of grey or of each colour, or its data are too short.
     """
-    if message.encoding not in ("mono8", "8UC1"):
-        raise UsageError(f"a picture of encoding {message.encoding!r}: publish mono8")
+    if message.encoding not in _CHANNELS:
+        raise UsageError(f"a picture of encoding {message.encoding!r}: publish {choices(_CHANNELS)}")
+    channels, to_grey = _CHANNELS[message.encoding]
     data = np.frombuffer(bytes(message.data), dtype=np.uint8)
     height, width, step = message.height, message.width, message.step
-    if step < width or len(data) < step * height:
+    done("picture", pixels=height * width)
+    if step < width * channels or len(data) < step * height:
         raise UsageError(f"a picture of {width} x {height} pixels has {len(data)} bytes, rows of {step}")
-    return np.ascontiguousarray(data[: step * height].reshape(height, step)[:, :width])
+    rows = np.ascontiguousarray(data[: step * height].reshape(height, step)[:, : width * channels])
+    if to_grey is None:
+        return rows
+    return np.asarray(cv2.cvtColor(rows.reshape(height, width, channels), to_grey), dtype=np.uint8)
 
 
 def camera_of(message: Any) -> CameraModel:
@@ -106,6 +122,7 @@ def camera_of(message: Any) -> CameraModel:
     Raises:
         UsageError: The camera is not calibrated, or its distortion is another one than ``plumb_bob``.
     """
+    done("camera_model")
     matrix, factors = (
         np.asarray(getattr(message, name, getattr(message, name.lower(), ())), dtype=np.float64)
         for name in ("K", "D")
@@ -117,6 +134,18 @@ def camera_of(message: Any) -> CameraModel:
     distortion = np.zeros(5)
     distortion[: factors.size] = factors
     return CameraModel(matrix.reshape(3, 3), distortion)
+
+
+def rectified_camera_of(message: Any) -> CameraModel:
+    """Return the model of the rectified pictures beside a ``sensor_msgs/CameraInfo`` of ROS 1 or 2.
+
+    Raises:
+        UsageError: The camera is not calibrated.
+    """
+    matrix = np.asarray(getattr(message, "P", getattr(message, "p", ())), dtype=np.float64)
+    if matrix.size != 12 or matrix.flat[0] <= 0.0:
+        raise UsageError("the camera is not calibrated: its CameraInfo has no focal length in P")
+    return CameraModel(np.ascontiguousarray(matrix.reshape(3, 4)[:, :3]), np.zeros(5))
 
 
 class MarkerFinder:
@@ -155,7 +184,8 @@ class MarkerFinder:
 
         Markers of other numbers, and those whose pose is not determined, are left out.
         """
-        found, numbers, _ = self._detector.detectMarkers(picture)
+        found, numbers, rejected = self._detector.detectMarkers(picture)
+        done("detection", pixels=picture.size, candidates=len(found) + len(rejected))
         poses = []
         for corners, number in zip(found, () if numbers is None else numbers.reshape(-1), strict=True):
             size = self._sizes.get(int(number))
@@ -168,6 +198,7 @@ class MarkerFinder:
         return sorted(poses, key=lambda one: (one.id, one.residual))
 
     def _pose(self, number: int, corners: Array, size: float, camera: CameraModel) -> MarkerPose | None:
+        done("marker_pose")
         half = 0.5 * size
         square = np.array([(-half, half, 0.0), (half, half, 0.0), (half, -half, 0.0), (-half, -half, 0.0)])
         count, turns, places, _ = cv2.solvePnPGeneric(

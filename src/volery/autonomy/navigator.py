@@ -8,7 +8,6 @@ velocity that is safe by the last scan (``avoidance``). The path finds the way, 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 from math import ceil, isfinite, sqrt
 from typing import NamedTuple
 
@@ -17,17 +16,21 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_closing
 
 from volery.autonomy.avoidance import Motion, safe_velocity
-from volery.autonomy.grid_path import COMFORT, WaysFrom, clearance_of
+from volery.autonomy.grid_path import COMFORT, Cell, WaysFrom, clearance_of
 from volery.autonomy.laser_scan import LaserScan2
 from volery.autonomy.occupancy_grid import OccupancyGrid
 from volery.autonomy.planar_pose import Array, Pose2
 from volery.autonomy.trajectory import Limits, arcs_of, corner_speed
 from volery.base.errors import UsageError
+from volery.base.metered_work import done
 from volery.base.time import MS, Ns, S, to_seconds
 
 _REPLAN: Ns = 500 * MS
+_STUCK = 0.3  # [m] that the vehicle goes while its scan does not change in the least, until the scan is stuck
 _AROUND = 5.0  # [m] by which a path may leave what is mapped
 _SPARE = 0.1  # [m] that a path keeps beyond what a safe velocity needs
+_NOTICED = 3.0
+"""Distance [m] up to which one scan closes a cautious way: farther away an old yaw lays its points wrong."""
 _ROUNDING = 1e-9  # of a cell
 _DEVIATION = 0.4  # [m] of the vehicle from a corner of the path: with it the speed in corners rises
 _LOYAL = 1.2  # times the cost of the best path, up to which a vehicle stays on its path
@@ -61,7 +64,8 @@ class Navigator:
         silence: Age of the last scan from which on the vehicle brakes [ns].
         cautious: Whether paths keep their distance from what is not known, too.
 
-    ``word`` says what it does, or why it does not go on; ``way`` is the path (n, 2) [m]; ``grid`` is the map,
+    ``word`` says what it does, or why it does not go on; ``fault`` is what is wrong with scan, pose or
+    velocity, empty if nothing is; ``way`` is the path (n, 2) [m]; ``grid`` is the map,
     which may be replaced by that of ``slam``.
 
     Example::
@@ -82,7 +86,7 @@ class Navigator:
     ) -> None:
         self.motion, self.silence, self.cautious = motion, silence, cautious
         self.grid = OccupancyGrid(resolution)
-        self.word = "no scan yet"
+        self.word = self.fault = "no scan yet"
         self.arrived = False
         self.near = max(2.0 * resolution, 0.3)
         """Distance [m] from the goal within which it is reached."""
@@ -92,7 +96,10 @@ class Navigator:
         self._planned: Ns | None = None
         self.no_way = ""
         """Why there is no way to the goal, as of the last plan; empty if there is one."""
+        self._now: Ns | None = None
         self._scanned: Ns | None = None
+        self._points: Array = np.zeros((0, 2))  # of the last scan, as it came
+        self._gone = 0.0  # [m] since they changed
         self._seen: Array = np.zeros((0, 2))  # points of the last scan in the map
         self._commands: deque[tuple[Ns, Array]] = deque()
 
@@ -128,13 +135,14 @@ class Navigator:
         """
         velocity = np.asarray(velocity, dtype=np.float64)
         command = self._decide(time, pose, scan, velocity)
+        done("navigation")
         self._commands.append((time, command))
         return command
 
     def _decide(self, time: Ns, pose: Pose2, scan: LaserScan2 | None, velocity: Array) -> Array:
-        fault = self._fault(time, pose, scan, velocity)
-        if fault or self._goal is None:
-            return self._brake(fault or "no goal")
+        self.fault = self._check(time, pose, scan, velocity)
+        if self.fault or self._goal is None:
+            return self._brake(self.fault or "no goal")
         place = np.array((pose.x, pose.y))
         left = self._goal - place
         if sqrt(float((left * left).sum())) < self.near:
@@ -150,33 +158,45 @@ class Navigator:
         self.word = "on the way" if command.any() else "brakes: no velocity towards the path is safe"
         return command
 
-    def _fault(self, time: Ns, pose: Pose2, scan: LaserScan2 | None, velocity: Array) -> str:
+    def _check(self, time: Ns, pose: Pose2, scan: LaserScan2 | None, velocity: Array) -> str:
         """Take a new scan; return why the vehicle must brake whatever the goal."""
         if not (np.isfinite(pose).all() and np.isfinite(velocity).all()):
             return "pose or velocity is not a number"
+        if self._now is None or time < self._now:  # a clock that jumped back: what it dated says nothing
+            self._commands.clear()
+            self._now, self._planned, self._scanned = time, None, None
+        self._gone += sqrt(float((velocity * velocity).sum())) * to_seconds(time - self._now)
+        self._now = time
         if scan is not None and scan.time != self._scanned:
-            fault = self._take(pose, scan)
+            fault = self._doubt(time, pose, scan)
             if fault:
                 return fault
+            self._scanned = scan.time
+            self._seen = pose.of(scan.points)
+            self.grid.insert(pose, scan)
         if self._scanned is None:
             return "no scan yet"
         if time - self._scanned > self.silence:
-            return f"no scan for {to_seconds(time - self._scanned):.1f} s"
+            return f"no scan for more than {to_seconds(self.silence):g} s"
         return ""
 
     def _brake(self, word: str) -> Array:
         self.word = word
         return np.zeros(2)
 
-    def _take(self, pose: Pose2, scan: LaserScan2) -> str:
-        """Put a scan into the map; return what is wrong with it."""
+    def _doubt(self, time: Ns, pose: Pose2, scan: LaserScan2) -> str:
+        """Return why a new scan is not to be believed."""
+        late = to_seconds(time - scan.time)
+        if abs(late) > to_seconds(self.silence):
+            return f"the scan is {abs(late):.0f} s {'old' if late > 0.0 else 'ahead of the clock'}"
         if not len(scan.points) and not len(scan.open_ends):
             return "the scan says nothing: no beam is a number within the limits of the sensor"
         if not len(scan.points) and self._is_something_near(pose):
             return "the scan is all maximum where the map has obstacles"
-        self._scanned = scan.time
-        self._seen = pose.of(scan.points)
-        self.grid.insert(pose, scan)
+        if not len(scan.points) or not np.array_equal(scan.points, self._points):
+            self._points, self._gone = scan.points, 0.0
+        if self._gone > _STUCK:
+            return "the scan does not change although the vehicle moves: it is stuck"
         return ""
 
     def _is_something_near(self, pose: Pose2) -> bool:
@@ -198,7 +218,7 @@ class Navigator:
 
     def _plan(self, place: Array, goal: tuple[float, float]) -> str:
         """Plan the path to the goal; return why there is none."""
-        ways, window = self.ways_from(place, goal)
+        ways, window = self.ways_from(place, goal=goal)
         to = window.cell(*goal)
         kept = self._cost_of_way(place, ways, window)
         if kept < np.inf and kept <= _LOYAL * ways.cost[to]:
@@ -208,9 +228,8 @@ class Navigator:
         if room < self.least:
             return f"no way: the goal is {room:.1f} m from an obstacle, and paths keep {self.least:.1f} m"
         here = float(ways.clearance[ways.start])
-        if ways.cost[to] == np.inf and here < self.least:  # in a gap too narrow to be chosen: out of it
-            side = self.grid.resolution
-            ways = WaysFrom(ways.clearance, side, ways.start, max(here, (1.0 + _ROUNDING) * side))
+        if ways.cost[to] == np.inf and here < self.least:
+            ways = self._out_of_gap(ways, to)
         cells = ways.straightened(ways.to(to))
         if not len(cells):
             return f"no way to ({goal[0]:.1f}, {goal[1]:.1f}) m is {self.least:.1f} m from all obstacles"
@@ -220,31 +239,50 @@ class Navigator:
         self._speeds[-1] = 0.0
         return ""
 
-    def ways_from(self, place: Array, *others: Sequence[float]) -> tuple[WaysFrom, Window]:
-        """Return the ways from a place (2,) [m] through a window that holds the map and the other places.
+    def ways_from(self, place: Array, goal: tuple[float, float] | None = None) -> tuple[WaysFrom, Window]:
+        """Return the ways from a place (2,) [m], only that to the goal if there is one.
 
-        A cautious one's window is the map, if that holds all places.
+        They lead through a window that holds the map, the place and the goal. A cautious one's window is the
+        map, if that holds both.
         """
         grid, side = self.grid, self.grid.resolution
         rows, columns = grid.log_odds.shape
         around = 0.0 if self.cautious else _AROUND
         corner = np.array((grid.west, grid.south))
-        held = np.array((place, *others, corner, corner + side * np.array((columns, rows))))
+        held = np.array(
+            (place, *(() if goal is None else (goal,)), corner, corner + side * np.array((columns, rows)))
+        )
         left, below = np.ceil((corner - held.min(axis=0) + around) / side - _ROUNDING).astype(int)
         window = Window(grid.west - left * side, grid.south - below * side, side)
         tall, wide = np.ceil((held.max(axis=0) + around - window[:2])[::-1] / side - _ROUNDING).astype(int)
         blocked = np.full((tall, wide), self.cautious)
         mapped = ~self.free if self.cautious else grid.occupied
         blocked[below : below + rows, left : left + columns] = mapped
-        for x, y in self._seen:
+        done("plan", points=len(self._seen), cells=blocked.size)
+        off = self._seen - place
+        near = (off * off).sum(axis=1) < _NOTICED * _NOTICED
+        for x, y in self._seen[near] if self.cautious else self._seen:
             blocked[window.cell(x, y)] = True
-        ways = WaysFrom(clearance_of(blocked, side), side, window.cell(*place), self.least)
+        to = None if goal is None else window.cell(*goal)
+        ways = WaysFrom(clearance_of(blocked, side), side, window.cell(*place), self.least, to)
+        if goal is None and not (ways.cost[ways.clearance >= self.least] < np.inf).any():
+            ways = self._out_of_gap(ways, None)
         return ways, window
+
+    def _out_of_gap(self, ways: WaysFrom, to: Cell | None) -> WaysFrom:
+        """Return the ways from a place in a gap that is too narrow to be chosen, through gaps as narrow.
+
+        Narrower by a cell: else there is no way on from where the gap is widest.
+        """
+        side = self.grid.resolution
+        least = max(float(ways.clearance[ways.start]) - side, (1.0 + _ROUNDING) * side)
+        return WaysFrom(ways.clearance, side, ways.start, least, to)
 
     @property
     def free(self) -> NDArray[np.bool_]:
         """Which cells of the map are free (rows, columns), those between the beams of a scan as well."""
         grid = self.grid
+        done("closing", cells=grid.log_odds.size)
         closed: NDArray[np.bool_] = binary_closing(grid.free, np.ones((3, 3), dtype=bool))
         return closed & ~grid.occupied
 

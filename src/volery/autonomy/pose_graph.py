@@ -15,6 +15,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from volery.autonomy.planar_pose import Array, Pose2
+from volery.base.metered_work import done
 
 _ITERATIONS = 20
 _ENOUGH = 1e-6  # [m, rad] a step below this ends the iterations
@@ -60,6 +61,7 @@ def optimise(poses: Sequence[Pose2], edges: Sequence[Edge], doubt: float = 10.0)
     doubted = np.array([not edge.certain for edge in edges])
     rows, columns = _places(first, second)
     for _ in range(_ITERATIONS):
+        done("pose_graph", poses=len(state), edges=len(first))
         error, before, behind = _errors(state[first], state[second], measured)
         chi = np.einsum("ni,nij,nj->n", error, information, error)
         scale = np.minimum(1.0, 2.0 * doubt / (doubt + chi))

@@ -4,6 +4,7 @@
   time when it was taken, however late its marker is known; between two pictures the vehicle knows the way.
 * It descends while it is within a cone above the marker, and centres otherwise. A marker that is lost is
   waited for, then looked for from higher up, a number of times; then the landing is aborted and says why.
+* A camera that stands still gives the same pictures while the vehicle moves: the landing is aborted.
 * So near to the ground that the marker does not fit into the picture any more, a vehicle that was above it
   goes on down without it.
 
@@ -22,6 +23,7 @@ import numpy as np
 from volery.autonomy.markers import MarkerPose
 from volery.base.errors import UsageError
 from volery.base.frames import Quaternion, Vector, body_to_world
+from volery.base.metered_work import done
 from volery.base.time import Ns, to_seconds
 
 _HALF = sqrt(0.5)
@@ -57,6 +59,8 @@ class LandingRules:
         trim_gain: Velocity that a metre of offset adds in a second [1/s^2]: it makes up for an error of the
             vehicle's own velocity.
         most_trim: Greatest such velocity, east and north [m/s].
+        damping: Velocity that is added for each m/s by which it flies slower sideways than it should:
+            its own loop lets a gust push it for seconds. 0.5 halves that on an ArduPilot; a PX4 oscillates.
         most_sideways: Greatest horizontal speed [m/s].
         descent_gain: Descent for each metre of height [1/s].
         most_descent: Greatest descent [m/s].
@@ -77,6 +81,7 @@ class LandingRules:
     gain: float = 0.8
     trim_gain: float = 0.15
     most_trim: float = 0.3
+    damping: float = 0.0
     most_sideways: float = 1.5
     descent_gain: float = 0.35
     most_descent: float = 1.2
@@ -137,6 +142,8 @@ class Landing:
         trim: Velocity east and north that holds it above the marker [m/s].
         seen: Time of the last picture with the marker [ns].
         refused: Sights in a row that contradict the estimate.
+        distance: Distance of the marker in the last picture [m].
+        same_from: Where the vehicle was when that distance was first measured [m].
         lost: How often the marker was lost and looked for.
         top: Height above the marker to which it climbs [m].
         reason: Why it was aborted.
@@ -153,6 +160,8 @@ class Landing:
     trim: tuple[float, float] = (0.0, 0.0)
     seen: Ns = 0
     refused: int = 0
+    distance: float = -1.0
+    same_from: Vector = (0.0, 0.0, 0.0)
     lost: int = 0
     top: float = 0.0
     reason: str = ""
@@ -170,6 +179,8 @@ TILT_SIGMA = 0.006
 _GATE = 25.0  # square of the standard deviations by which a sight may be off
 _SLACK = 0.0025  # [m^2] added to it
 _REFUSALS = 4  # sights in a row after which they are believed
+_SAME = 1e-6  # [m] of distance: less than the noise of a corner ever leaves between two pictures
+_FROZEN = 0.2  # [m] that a vehicle moves while its pictures stay the same
 _TRIMS_WITHIN = 0.5  # [m] of the marker
 _KEPT: Ns = 1_000_000_000  # [ns] of the trail
 
@@ -190,6 +201,7 @@ def sight_of(
         mounting: The same from the camera's axes to the body's.
         place: Where the camera is on the body: forward, left, up [m].
     """
+    done("sight")
     right, down, ahead = (float(one) for one in pose.at)
     turned = body_to_world(mounting, (right, down, ahead))
     along = (turned[0] + place[0], turned[1] + place[1], turned[2] + place[2])
@@ -218,13 +230,15 @@ def step(
         velocity: Estimated velocity of the vehicle [m/s].
         sight: A marker that was not passed before; ``None``: no new one.
     """
+    done("landing_step", sights=sight is not None)
     landing = _trimmed(landing, rules, to_seconds(now - landing.now) if landing.begun >= 0 else 0.0)
     landing = _moved(landing, now, velocity)
     if sight is not None:
+        landing = _compared(landing, sight)
         landing = _measured(landing, sight)
     if landing.phase not in {Phase.ABORT, Phase.LAND}:
         landing = _decided(landing, rules)
-    return landing, Command(_velocity(landing, rules), landing.phase, landing.reason)
+    return landing, Command(_velocity(landing, rules, velocity), landing.phase, landing.reason)
 
 
 def _less(one: Vector, other: Vector) -> Vector:
@@ -264,6 +278,17 @@ def _place_at(landing: Landing, at: Ns) -> Vector:
             return x, y, z
         before, here = after, there
     return landing.trail[0][1] if at <= landing.trail[0][0] else here
+
+
+def _compared(landing: Landing, sight: Sight) -> Landing:
+    """Abort if the vehicle moves and its pictures do not: they would lead it into the ground."""
+    was = _place_at(landing, sight.at)
+    distance = sqrt(sum(one * one for one in sight.offset))
+    if abs(distance - landing.distance) > _SAME:
+        return replace(landing, distance=distance, same_from=was)
+    if sum(one * one for one in _less(was, landing.same_from)) < _FROZEN * _FROZEN:
+        return landing
+    return _abort(landing, "the pictures stay the same while the vehicle moves: restart the camera")
 
 
 def _measured(landing: Landing, sight: Sight) -> Landing:
@@ -332,7 +357,7 @@ def _within(rules: LandingRules, height: float) -> float:
     return rules.centred + rules.cone * max(height - rules.blind_below, 0.0)
 
 
-def _velocity(landing: Landing, rules: LandingRules) -> Vector:
+def _velocity(landing: Landing, rules: LandingRules, flown: Vector) -> Vector:
     offset = landing.offset
     if offset is None or landing.phase in {Phase.SEARCH, Phase.LAND, Phase.ABORT}:
         return 0.0, 0.0, 0.0
@@ -343,4 +368,11 @@ def _velocity(landing: Landing, rules: LandingRules) -> Vector:
         up = rules.climb
     elif landing.phase is Phase.COMMIT or (landing.phase is Phase.DESCEND and away < _within(rules, height)):
         up = -min(rules.most_descent, max(rules.least_descent, rules.descent_gain * height))
-    return share * offset[0] + landing.trim[0], share * offset[1] + landing.trim[1], up
+    east, north = (
+        wanted + rules.damping * (wanted - has)
+        for wanted, has in (
+            (share * off + trim, speed)
+            for off, trim, speed in zip(offset[:2], landing.trim, flown[:2], strict=True)
+        )
+    )
+    return east, north, up

@@ -1,7 +1,8 @@
 """Where was a planar scan taken? Search over a likelihood field, then alignment of points with lines.
 
 * The search tries every pose of a window on a grid and is exact: bounds from maxima over blocks of cells cut
-  off what cannot win (Olson, ICRA 2009; Hess, Kohler, Rapp and Andor, ICRA 2016).
+  off what cannot win (Olson, ICRA 2009; Hess, Kohler, Rapp and Andor, ICRA 2016). What fits worse than the
+  guess cannot, so a bound is left as soon as it is below that.
 * The alignment minimises the distances of points from the lines that scans have seen, with a robust weight
   and the odometry as a prior (Censi, ICRA 2008, of whose metric this is the Gauss-Newton form). The prior is
   what holds the pose along a corridor.
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from volery.autonomy.planar_pose import Array, Pose2
 from volery.base.elementary import sine_cosine
+from volery.base.metered_work import done
 from volery.base.numeric_code import NumericCode, numeric
 
 RESOLUTION = 0.05
@@ -34,6 +36,8 @@ _DISTANCES = (0.5, 0.5, 0.4, 0.4, 0.3, 0.3, 0.2, 0.2, 0.15, 0.15, 0.1, 0.1, 0.1,
 """Farthest line [m] that a point is paired with, for each iteration of the alignment."""
 _NOISE = 0.03  # [m] standard deviation of a point's distance from its line
 _NEIGHBOURS = 4  # points on each side through which a line is laid
+_TIE = 1e-6  # of a likelihood: what rounding may take from a bound
+_BATCH = 64  # points between two checks whether a block can still hold a match
 _APART = 0.35  # [m] a neighbour farther than this is on another surface
 _FLAT = 0.03  # [m] deviation from the line up to which it is one
 
@@ -61,6 +65,7 @@ def normals_of(points: Array) -> Array:
     A normal is zero where the neighbours are too few, too far or not on a line.
     """
     count = len(points)
+    done("normals", points=count)
     index = np.arange(count)[:, None] + np.arange(-_NEIGHBOURS, _NEIGHBOURS + 1)[None, :]
     inside = (index >= 0) & (index < count)
     near = points[np.clip(index, 0, count - 1)] if count else np.zeros((0, 2 * _NEIGHBOURS + 1, 2))
@@ -108,6 +113,12 @@ class LocalMap:
         self._starts = np.zeros(columns * rows + 1, dtype=np.int64)
         np.cumsum(np.bincount(cells, minlength=columns * rows), out=self._starts[1:])
         self._lattice = np.array((low[0], low[1], _SIDE, columns, rows), dtype=np.float64)
+        done("local_map", points=len(points), cells=float(columns * rows))
+
+    @property
+    def extent(self) -> tuple[Array, Array]:
+        """The corners in the south-west and in the north-east of all points [m]."""
+        return self._points.min(axis=0), self._points.max(axis=0)
 
     def _pyramid(self) -> NDArray[np.float32]:
         """Return the likelihood field, and for each level k its maxima over 2^k by 2^k cells north-east."""
@@ -122,6 +133,7 @@ class LocalMap:
                 wide = here.copy()
                 np.maximum(here[:, :-step], wide[:, step:], out=here[:, :-step])
             self._levels = levels
+            done("field", points=len(self._points), cells=float(columns * rows))
         return self._levels
 
     def search(
@@ -145,13 +157,15 @@ class LocalMap:
         block = 1 << level
         steps = (2 * cells + block) // block
         bounds = np.zeros(len(yaws) * steps * steps)
-        window = np.array((guess.x, guess.y, cells, level, steps), dtype=np.float64)
+        window = np.array((guess.x, guess.y, cells, level, steps, least, 0.0), dtype=np.float64)
         scan = np.ascontiguousarray(points)
-        bound_blocks.bind(levels, self._origin, scan, yaws, window, bounds)()
+        places = np.zeros((len(scan), 2), dtype=np.int64)
+        bound_blocks.bind(levels, self._origin, scan, yaws, window, places, bounds)()
         order = np.argsort(-bounds, kind="stable")
-        found = np.array((0.0, 0.0, 0.0, least))
+        found = np.array((0.0, 0.0, 0.0, least, 0.0))
         stack = np.zeros((8 * LEVELS, 4))
         search_blocks.bind(levels, self._origin, scan, yaws, window, bounds, order, stack, found)()
+        done("search", looks=window[6] + len(scan) * found[4], blocks=len(bounds))
         if found[3] <= least:
             return None
         return Match(Pose2(*found[:3]), float(found[3]), np.zeros((3, 3)))
@@ -166,7 +180,7 @@ class LocalMap:
             scale: Factor on the distances within which points are paired.
         """
         pose = np.array(guess, dtype=np.float64)
-        result = np.zeros(10)
+        result = np.zeros(12)
         distances = scale * np.array(_DISTANCES)
         weights = 1.0 / (prior * prior)
         align_lines.bind(
@@ -179,6 +193,7 @@ class LocalMap:
             pose,
             result,
         )()
+        done("align", points=result[10], lines=result[11])
         return Match(Pose2(*map(float, pose)), float(result[9]), result[:9].reshape(3, 3).copy())
 
 
@@ -214,10 +229,14 @@ def _align_once(  # noqa: PLR0917  # likewise
     pose: Array,
     sums: Array,
 ) -> None:
-    """Add up the normal equations of the distances from lines: H (6), b (3), weight of what is paired."""
+    """Add up the normal equations of the distances from lines: H (6), b (3), weight of what is paired.
+
+    The last two sums go on: points, and lines that were looked at.
+    """
     sine, cosine = sine_cosine(pose[2])
     columns, rows = int(lattice[3]), int(lattice[4])
-    sums[:] = 0.0
+    sums[:10] = 0.0
+    sums[10] += len(points)
     for index in range(len(points)):
         x = cosine * points[index, 0] - sine * points[index, 1]
         y = sine * points[index, 0] + cosine * points[index, 1]
@@ -231,6 +250,7 @@ def _align_once(  # noqa: PLR0917  # likewise
             last = min(column + around, columns - 1)
             if first > last:
                 continue
+            sums[11] += starts[line * columns + last + 1] - starts[line * columns + first]
             for at in range(starts[line * columns + first], starts[line * columns + last + 1]):
                 off_x, off_y = lines[at, 0] - east, lines[at, 1] - north
                 square = off_x * off_x + off_y * off_y
@@ -299,20 +319,36 @@ def _compose_spread(digest: str) -> Callable[..., int]:
 
 
 def _compose_bounds(digest: str) -> Callable[..., int]:
-    def bound_blocks(
-        levels: NDArray[np.float32], origin: Array, points: Array, yaws: Array, window: Array, bounds: Array
-    ) -> int:
+    def bound_blocks(  # noqa: PLR0917  # a kernel's arrays
+        levels: NDArray[np.float32], origin: Array, points: Array, yaws: Array, window: Array,
+        places: NDArray[np.int64], bounds: Array,
+    ) -> int:  # fmt: skip
         cells, level, steps = int(window[2]), int(window[3]), int(window[4])
-        size = 1 << level
+        size, count = 1 << level, len(points)
+        sine, cosine = sine_cosine(yaws[len(yaws) // 2])
+        here = _mean_likelihood(levels[0], origin, points, window[0], window[1], sine, cosine)
+        enough = max(window[5], here - _TIE) * count  # the guess is one of the poses that are tried
+        window[6] = 0.0
+        field = levels[level]
+        rows, columns = field.shape
+        east, north = window[0] - cells * RESOLUTION, window[1] - cells * RESOLUTION
         for turn in range(len(yaws)):
             sine, cosine = sine_cosine(yaws[turn])
-            for line in range(steps):
-                north = window[1] + (line * size - cells) * RESOLUTION
-                for column in range(steps):
-                    east = window[0] + (column * size - cells) * RESOLUTION
-                    bounds[(turn * steps + line) * steps + column] = _mean_likelihood(
-                        levels[level], origin, points, east, north, sine, cosine
-                    )
+            for index in range(count):
+                x, y = points[index, 0], points[index, 1]
+                places[index, 0] = int(np.floor((north + sine * x + cosine * y - origin[1]) / RESOLUTION))
+                places[index, 1] = int(np.floor((east + cosine * x - sine * y - origin[0]) / RESOLUTION))
+            for block in range(steps * steps):
+                up, right = block // steps * size, block % steps * size
+                total, index = 0.0, 0
+                while index < count and total + (count - index) > enough:
+                    for at in range(index, min(index + _BATCH, count)):
+                        row, column = places[at, 0] + up, places[at, 1] + right
+                        if 0 <= column < columns and 0 <= row < rows:
+                            total += field[row, column]
+                    index += _BATCH
+                bounds[turn * steps * steps + block] = (total + max(count - index, 0)) / count
+                window[6] += min(index, count)
         return 1 if digest else 0
 
     return bound_blocks
@@ -356,6 +392,7 @@ def _compose_search(digest: str) -> Callable[..., int]:
                         levels[level - 1], origin, points,
                         window[0] + to_east * RESOLUTION, window[1] + to_north * RESOLUTION, sine, cosine,
                     )  # fmt: skip
+                    found[4] += 1.0
                     if stack[depth, 3] > found[3]:
                         depth += 1
         return 1 if digest else 0
@@ -394,8 +431,11 @@ bound_blocks = NumericCode(
     "bound_blocks",
     _compose_bounds,
     _SOURCES,
-    (f"{_G}[:,:,::1]", f"{_F}[::1]", f"{_F}[:,::1]", f"{_F}[::1]", f"{_F}[::1]", f"{_F}[::1]"),
-)
+    (
+        f"{_G}[:,:,::1]", f"{_F}[::1]", f"{_F}[:,::1]", f"{_F}[::1]", f"{_F}[::1]", f"{_I}[:,::1]",
+        f"{_F}[::1]",
+    ),
+)  # fmt: skip
 """Bound the likelihood of a scan in every block of a window, for every yaw."""
 search_blocks = NumericCode(
     "search_blocks",

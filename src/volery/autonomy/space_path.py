@@ -70,9 +70,11 @@ def path_in_space(
     if float(np.prod(size.astype(np.float64))) > _MOST_CELLS:
         raise UsageError(f"a space of {np.prod(size)} cells of {resolution:g} m; give a larger resolution")
     axes = [ends[0, axis] + resolution * np.arange(first[axis], last[axis] + 1) for axis in range(3)]
-    ways = WaysFrom(_clearances(prisms, axes, need + COMFORT), resolution, tuple(-first[::-1]), need)
-    to = np.clip(np.round((ends[1] - ends[0]) / resolution).astype(np.int64), first, last) - first
-    cells = ways.straightened(ways.to(tuple(int(at) for at in to[::-1])))
+    off = np.clip(np.round((ends[1] - ends[0]) / resolution).astype(np.int64), first, last) - first
+    to = tuple(int(at) for at in off[::-1])
+    clearances = _clearances(prisms, axes, need + COMFORT)
+    ways = WaysFrom(clearances, resolution, tuple(-first[::-1]), need, to)
+    cells = ways.straightened(ways.to(to))
     if not len(cells):
         return np.zeros((0, 3))
     path = ends[0] + (cells[:, ::-1] + first) * resolution

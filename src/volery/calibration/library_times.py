@@ -11,19 +11,22 @@ table is judged take no part in it.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import operator
 import pickle
 import re
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from statistics import median
-from time import thread_time_ns
 from typing import NamedTuple
 
 import numpy as np
 
+from volery.base.errors import UsageError, choices
+from volery.calibration.least_time import BATCHES, least_time
+from volery.calibration.picture_times import picture_calls, picture_features
 from volery.calibration.timed_code import (
     Rounds,
     TimedCode,
@@ -31,12 +34,13 @@ from volery.calibration.timed_code import (
     timed_program,
     timed_programs,
 )
-from volery.cost import WRAPPED, LibraryCall, LibraryTable, call_feature, call_size, operation_table
+from volery.calibration.work_times import WorkTimes, work_times
+from volery.cost import OWN, WRAPPED, LibraryCall, LibraryTable, call_feature, call_size, operation_table
 
-BATCH_NS = 4_000_000
-BATCHES = 7
-TIMED_CALLS = 1016
-"""Calls of ``snippets`` and ``features`` together."""
+LONG_CALLS = ("cv2", "gtsam", "small_gicp")
+"""Libraries whose calls take long: their code is warm, and their data are their own."""
+SEPARATE = (*LONG_CALLS, OWN)
+"""Libraries that can be measured without the others: no factor of a context belongs to them."""
 COLD_NS, WARM = 1000.0, 0.15
 """Beginning of a call whose code is cold in a program, and the share of the rest."""
 SIDES = (1, 4, 16, 32, 64, 100, 181, 256, 512, 1024)
@@ -74,10 +78,10 @@ class Snippet(NamedTuple):
 
     def nanoseconds(self) -> float:
         """Return the time of one call on this machine, without what any call of Python takes."""
-        own = _least(self.function, self.arguments)
+        own = least_time(self.function, self.arguments)
         if getattr(self.function, "__name__", "") == "<lambda>":
-            return max(own - _least(_NOTHING[len(self.arguments)], self.arguments), 1.0)
-        return max(own - _least(bool, ((),)), 1.0)
+            return max(own - least_time(_NOTHING[len(self.arguments)], self.arguments), 1.0)
+        return max(own - least_time(bool, ((),)), 1.0)
 
     def measured_size(self) -> int:
         """Return the size of the call."""
@@ -88,21 +92,6 @@ _NOTHING: Sequence[Callable[..., object]] = (
     lambda: None, lambda a: None, lambda a, b: None, lambda a, b, c: None,
 )  # fmt: skip
 """Functions that take what any call of a function in Python takes, by their number of arguments."""
-
-
-def _least(function: Callable[..., object], arguments: tuple[object, ...]) -> float:
-    times, most = 1, 0
-    while most < BATCH_NS // 4:
-        times *= 4
-        most = _batch(function, arguments, times)
-    return min(_batch(function, arguments, times) for _ in range(BATCHES)) / times
-
-
-def _batch(function: Callable[..., object], arguments: tuple[object, ...], times: int) -> int:
-    began = thread_time_ns()
-    for _ in range(times):
-        function(*arguments)
-    return thread_time_ns() - began
 
 
 def _key(function: Callable[..., object]) -> str:
@@ -129,6 +118,7 @@ def snippets() -> Iterator[Snippet]:
         yield one._replace(size="items") if one.name.removeprefix("numpy.") in BY_ITEMS else one
     yield from _linear_algebra(generator)
     yield from _texts()
+    yield from itertools.starmap(Snippet, picture_calls())
 
 
 def features() -> Iterator[Snippet]:
@@ -166,6 +156,7 @@ def features() -> Iterator[Snippet]:
     for name in ("matmul", "dot"):
         yield Snippet(f"numpy.{name}", "outputs", getattr(np, name), (generator.random((1000, 3)), np.eye(3)))
     yield from _features_of_texts()
+    yield from itertools.starmap(Snippet, picture_features())
 
 
 def _features_of_texts() -> Iterator[Snippet]:
@@ -436,20 +427,26 @@ def run(parameters):
 """Programs that the factor of the other libraries is fitted to."""
 
 
-def measure_calls(show: Callable[[str, int], object]) -> dict[str, LibraryCall]:
+def measure_calls(
+    show: Callable[[str, int, int], object], only: Collection[str] = ()
+) -> dict[str, LibraryCall]:
     """Time all calls on this machine: first the points, then the features of their entries.
 
     Args:
-        show: Called with the name of each call and its number.
+        show: Called with the name of each call, its number and the number of all.
+        only: Libraries whose calls are timed; all by default.
 
     Returns:
         Entries by ``library.function``, ns of this machine, as in loops.
     """
     points: dict[str, dict[int, float]] = {}
     sizes: dict[str, str] = {}
-    number = 0
-    for number, one in enumerate(snippets()):
-        show(one.name, number)
+    of_sizes, of_features = (
+        [one for one in given if not only or one.name.partition(".")[0] in only]
+        for given in (snippets(), features())
+    )
+    for number, one in enumerate(of_sizes):
+        show(one.name, number, len(of_sizes) + len(of_features))
         sizes[one.name] = one.size
         points.setdefault(one.name, {})[one.measured_size()] = one.nanoseconds()
     found = {
@@ -457,8 +454,8 @@ def measure_calls(show: Callable[[str, int], object]) -> dict[str, LibraryCall]:
         for name, measured in sorted(points.items())
     }
     beyond: dict[tuple[str, str], list[float]] = {}
-    for place, one in enumerate(features(), number + 1):
-        show(one.name, place)
+    for place, one in enumerate(of_features, len(of_sizes)):
+        show(one.name, place, len(of_sizes) + len(of_features))
         beyond.setdefault((one.name, one.size), []).append(_of_feature(one, found[one.name]))
         each = {**found[one.name].each, one.size: round(max(0.0, median(beyond[one.name, one.size])), 3)}
         found[one.name] = found[one.name].model_copy(update={"each": each})
@@ -546,11 +543,7 @@ def context_factors(
     return 1.0 + max(0.0, float(constant)), 1.0 + max(0.0, float(growth)), max(0.0, float(page)) * 1000.0
 
 
-def measure_table(
-    machine: str,
-    rounds: Rounds,
-    show: Callable[[str, int], object],
-) -> LibraryTable:
+def measure_table(machine: str, rounds: Rounds, show: Callable[[str, int, int], object]) -> LibraryTable:
     """Measure all calls and programs and return the table, for the machine of ``operation_table``.
 
     Args:
@@ -564,7 +557,7 @@ def measure_table(
         for programs in (CONTEXT_PROGRAMS, TEXT_PROGRAMS)
     )
     measure([*own, *with_numpy, *with_text], rounds)
-    slowdown = median(one.median / one.counted_ns(operation_table().nanoseconds) for one in own)
+    slowdown = _slowdown(own)
     table = LibraryTable(
         provenance="measured",
         source=f"volery cost calibrate libraries: least CPU time of {BATCHES} batches of each call",
@@ -574,6 +567,7 @@ def measure_table(
         mean_error=0.0,
         worst_error=0.0,
         calls=scaled(measure_calls(show), 1.0 / slowdown),
+        work=_scaled_work(work_times(show), 1.0 / slowdown),
     )
     cold, data, page = context_factors(with_numpy, table, slowdown, "numpy")
     of_text = context_factors(with_text, table, slowdown, "")[:2]
@@ -581,6 +575,48 @@ def measure_table(
     calls = {
         **in_context(table.calls, *of_text),
         **{name: of_numpy[name] for name in of_numpy if name.startswith("numpy")},
+        **{name: one for name, one in table.calls.items() if name.startswith(LONG_CALLS)},
     }
     fitted = {"in_context": round(cold, 3), "data_in_context": round(data, 3), "page": round(page, 1)}
     return table.model_copy(update={"calls": calls, **fitted})
+
+
+def measured_again(
+    table: LibraryTable, only: Collection[str], rounds: Rounds, show: Callable[[str, int, int], object]
+) -> LibraryTable:
+    """Return a table in which some of the libraries ``SEPARATE`` are measured anew.
+
+    Raises:
+        UsageError: There is no such library among them, or it is not installed.
+    """
+    wrong = sorted(set(only) - set(SEPARATE))
+    if wrong:
+        raise UsageError(
+            f"library {wrong[0]!r} by itself; give {choices(SEPARATE)}, or none for all of the table"
+        )
+    own = timed_programs()
+    measure(own, rounds)
+    factor = 1.0 / _slowdown(own)
+    wanted = set(only) - {OWN}
+    calls = scaled(measure_calls(show, wanted), factor) if wanted else {}
+    missing = sorted(wanted - {name.partition(".")[0] for name in calls})
+    if missing:
+        raise UsageError(f"{missing[0]} is not installed: pip install {missing[0]}")
+    kept = {name: one for name, one in table.calls.items() if name.partition(".")[0] not in wanted}
+    work = _scaled_work(work_times(show), factor) if OWN in only else table.work
+    return table.model_copy(update={"calls": dict(sorted({**kept, **calls}.items())), "work": work})
+
+
+def _slowdown(programs: Sequence[TimedCode]) -> float:
+    """Return the time on this machine over that on the machine of ``operation_table``.
+
+    Of least times, like those of calls: on a busy machine medians are longer by a factor.
+    """
+    return median(min(one.nanoseconds) / one.counted_ns(operation_table().nanoseconds) for one in programs)
+
+
+def _scaled_work(times: WorkTimes, factor: float) -> WorkTimes:
+    return {
+        block: {name: float(f"{each * factor:.4g}") for name, each in amounts.items() if each}
+        for block, amounts in times.items()
+    }

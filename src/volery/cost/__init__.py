@@ -36,7 +36,7 @@ from volery.cost.figures import (
     scale_time,
 )
 from volery.cost.instrumentation import UNIFORM_COSTS, StepCounter
-from volery.cost.library_calls import WRAPPED, LibraryCall, LibraryTable, library_table
+from volery.cost.library_calls import OWN, WRAPPED, LibraryCall, LibraryTable, library_table
 from volery.cost.library_sizes import call_feature, call_size
 from volery.cost.pricing import (
     FREE,
@@ -56,6 +56,7 @@ __all__ = [
     "FREE",
     "NOT_COUNTED",
     "OPERATIONS",
+    "OWN",
     "STEPS_PER_NS",
     "UNIFORM_COSTS",
     "WRAPPED",

@@ -21,7 +21,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from volery.cost.library_calls import OPERATORS, LibraryCalls, LibraryTable
+from volery.cost.library_calls import OPERATORS, LibraryCalls, LibraryTable, library_of
 from volery.cost.python_operations import (
     CATCH,
     ENTER,
@@ -177,10 +177,10 @@ def uses_libraries(tree: ast.Module, libraries: Iterable[str]) -> bool:
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names = [node.module]
+            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
         else:
             continue
-        if any(name.partition(".")[0] in libraries for name in names):
+        if any(library_of(name) in libraries for name in names):
             return True
     return False
 

@@ -6,6 +6,9 @@ same run has the same times. Left out are the values of the data and caches; tha
 A function without points of its own is priced by one that computes alike. The figures in ``libraries.json``
 are in nanoseconds of the machine of ``operation_table``; ``CodeLaw`` scales them to other processors.
 
+Functions of ``volery.autonomy`` say what they did (``base.metered_work``): their time is a sum of amounts of
+work, each at its measured time. Their own Python and what they call is part of it and not counted beside.
+
 Calls are found when they happen: in a file that imports one of the libraries every call, operator and
 subscript passes through ``LibraryCalls``, which looks at the function and at its arguments.
 """
@@ -24,6 +27,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from volery.base.elementary import exp, log
+from volery.base.metered_work import Work, metered
 from volery.cost.figures import WithProvenance
 from volery.cost.library_sizes import FEATURES, SIZES, call_feature, call_size, new_pages
 from volery.cost.python_operations import STEPS_PER_NS
@@ -39,6 +43,15 @@ OPERATORS: Mapping[str, Callable[..., Any]] = {
 """Functions of the operators that pass through, by the name of the syntax node."""
 
 UNARY = ("USub", "Invert")
+
+NAMELESS = ("cv2", "cv2.aruco")
+"""Modules whose functions do not say where they belong."""
+
+OWN = "autonomy"
+"""Library of volery whose functions state their work."""
+
+_PYBIND = "pybind11_builtins"
+_OWN_MODULES = f"volery.{OWN}"
 
 WRAPPED = "wrapped"
 """Feature of a function around a method."""
@@ -125,13 +138,24 @@ class LibraryCall(BaseModel):
         return exp((1.0 - share) * log(self.points[low]) + share * log(self.points[high]))
 
 
+class TableError(BaseModel):
+    """Relative error of estimates of whole programs: ``mean`` and ``worst`` over a number of them."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    mean: float
+    worst: float
+    programs: int
+
+
 class LibraryTable(WithProvenance):
     """Times of calls by ``library.function``, ns, and the errors over programs that they were not fitted to.
 
     ``numpy.*`` and its like is the entry of functions of the library that have none. ``in_context`` and
     ``data_in_context`` are the factors between calls in programs and in loops, of the part that does not grow
     with the size and of the rest; numpy's times contain them. ``page`` is the time of a page of memory that
-    is new to the program, ns.
+    is new to the program, ns. ``work`` are the times of volery's own functions by block of code and
+    amount, ns. ``errors`` are by library; ``mean_error`` and ``worst_error`` are of all others.
     """
 
     machine: str
@@ -141,19 +165,36 @@ class LibraryTable(WithProvenance):
     programs: int
     mean_error: float
     worst_error: float
+    errors: Mapping[str, TableError] = {}
     calls: Mapping[str, LibraryCall]
+    work: Mapping[str, Mapping[str, float]] = {}
 
     @property
     def libraries(self) -> frozenset[str]:
         """Libraries that have an entry."""
-        return frozenset(name.partition(".")[0] for name in self.calls)
+        return frozenset((*(name.partition(".")[0] for name in self.calls), *([OWN] if self.work else ())))
+
+    def error_of(self, library: str) -> TableError:
+        """Return the error of programs that use a library."""
+        rest = TableError(mean=self.mean_error, worst=self.worst_error, programs=self.programs)
+        return self.errors.get(library, rest)
+
+    def of_work(self, work: Work) -> float:
+        """Return the time of amounts of work, ns. A block or an amount that the table lacks takes none."""
+        return sum(
+            self.work.get(block, {}).get(name, 0.0) * amount
+            for block, amounts in work.items()
+            for name, amount in amounts.items()
+        )
 
     def as_text(self) -> str:
         """Return the table as JSON, a line for each function."""
-        head = self.model_dump(exclude={"calls"}, exclude_defaults=True)
+        head = self.model_dump(exclude={"calls", "work"}, exclude_defaults=True)
         rows = [f"    {json.dumps(name)}: {one.model_dump_json()}" for name, one in self.calls.items()]
         lines = [f"  {json.dumps(name)}: {json.dumps(value)}," for name, value in head.items()]
-        return "\n".join(["{", *lines, '  "calls": {', ",\n".join(rows), "  }", "}", ""])
+        works = [f"    {json.dumps(name)}: {json.dumps(dict(each))}" for name, each in self.work.items()]
+        blocks = (["  },", '  "work": {', ",\n".join(works)]) if works else []
+        return "\n".join(["{", *lines, '  "calls": {', ",\n".join(rows), *blocks, "  }", "}", ""])
 
 
 @cache
@@ -181,11 +222,14 @@ class LibraryCalls:
         self.unpriced: dict[str, int] = {}
         self._cell = cell
         self._calls = table.calls
+        self._table = table
         self._page = table.page
         self.libraries = table.libraries
 
     def call(self, function: Any, /, *arguments: Any, **named: Any) -> Any:
         """Call a function, and add its time if it belongs to a library."""
+        if library_of(getattr(function, "__module__", None) or "") == OWN and OWN in self.libraries:
+            return self._work(function, arguments, named)
         name = self._name(function)
         if not name:
             return function(*arguments, **named)
@@ -198,15 +242,27 @@ class LibraryCalls:
         self._add(name, given, result, of_callbacks, not method)
         return result
 
+    def _work(self, function: Any, arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
+        """Call a function of volery, and add the time of the work that it did."""
+        with metered() as work:
+            result = function(*arguments, **named)
+        if not work and not isinstance(function, type):
+            name = f"{OWN}.{function.__name__}"
+            self.unpriced[name] = self.unpriced.get(name, 0) + 1
+        self._take(OWN, self._table.of_work(work))
+        return result
+
     def _name(self, function: Any) -> str:
         """Return ``library.function`` of a function of a library, else an empty text."""
         owner = getattr(function, "__self__", None)
         if owner is None or isinstance(owner, type(sys)):
             kind = function if isinstance(function, type) or hasattr(function, "__name__") else type(function)
-            module = getattr(kind, "__module__", None) or type(function).__module__
+            module = getattr(kind, "__module__", None) or _owner_of(function) or type(function).__module__
         else:
             module = getattr(owner, "__module__", None) if isinstance(owner, type) else type(owner).__module__
-        top = (module or "").partition(".")[0].lstrip("_")
+            if module == _PYBIND:  # functions of modules, too, are bound to an object there
+                module = getattr(function, "__module__", None)
+        top = library_of(module or "")
         if top not in self.libraries:
             return ""
         return f"{top}.{getattr(function, '__name__', type(function).__name__)}"
@@ -223,6 +279,10 @@ class LibraryCalls:
             if entry is None:
                 return
         time = entry.of_call(arguments, result, wrapped) + self._page * new_pages(result)
+        self._take(library, time, already)
+
+    def _take(self, library: str, time: float, already: int = 0) -> None:
+        """Add a time [ns] beyond the steps that are counted already."""
         steps = max(0, round(STEPS_PER_NS * time) - already)
         self._cell[0] += steps
         self.steps[library] = self.steps.get(library, 0) + steps
@@ -279,6 +339,19 @@ class LibraryCalls:
             return result
 
         return operate
+
+
+def _owner_of(function: Any) -> str:
+    """Return the module among ``NAMELESS`` that has a function, else an empty text."""
+    name = getattr(function, "__name__", "")
+    return next((one for one in NAMELESS if getattr(sys.modules.get(one), name, None) is function), "")
+
+
+def library_of(module: str) -> str:
+    """Return the library that a module belongs to, as the table names it."""
+    if module == _OWN_MODULES or module.startswith(f"{_OWN_MODULES}."):
+        return OWN
+    return module.partition(".")[0].lstrip("_")
 
 
 def _picking(index: Any, of_mask: str = "mask", of_indices: str = "take") -> str:

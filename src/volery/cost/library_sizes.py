@@ -77,6 +77,46 @@ def _cube(arguments: Values, result: Any) -> float:
     return elements * sqrt(elements)
 
 
+def _outcome(arguments: Values, result: Any) -> int:
+    """Return the elements of the result: what a picture becomes."""
+    return max(_array_elements(result), 1)
+
+
+def _window(arguments: Values, result: Any) -> int:
+    """Return the elements of a picture times what the side of a filter's window has beyond 3."""
+    sides = [max(one) for one in arguments[1:2] if isinstance(one, tuple) and one]
+    sides += [max(one.shape) for one in _arrays(arguments[1:2])]
+    sides += [one for one in arguments[1:2] if isinstance(one, int)]
+    return _elements(arguments[0]) * max(max(sides, default=3) - 3, 0) if arguments else 0
+
+
+def _count(value: Any) -> int:
+    """Return the points of an array or of an object that states its size."""
+    if getattr(value, "shape", ()):
+        return len(value)
+    size = getattr(value, "size", 0)
+    return int(size() if callable(size) else 0)
+
+
+def _pairs(arguments: Values, result: Any) -> int:
+    """Return the pairs of rows of two arrays."""
+    counts = [len(one) for one in _arrays(arguments)[:2]]
+    return counts[0] * counts[-1] if counts else 1
+
+
+def _variables(arguments: Values, result: Any) -> int:
+    """Return the variables of a solver, which is made or whose method is called."""
+    solvers = (getattr(one, "values", None) for one in (*arguments, result) if not isinstance(one, dict))
+    return max((_count(values()) for values in solvers if callable(values)), default=1) or 1
+
+
+def _candidates(arguments: Values, result: Any) -> int:
+    """Return what was found in a picture, and what was looked at for it."""
+    if not isinstance(result, tuple) or not result:
+        return _rows(arguments, result)
+    return sum(len(one) for one in (result[0], result[-1]) if hasattr(one, "__len__"))
+
+
 def _texts(values: Values) -> list[str | bytes | bytearray]:
     return [one for one in values if isinstance(one, (str, bytes, bytearray))]
 
@@ -98,11 +138,16 @@ SIZES: Mapping[str, Callable[[Values, Any], float]] = {
     "squares": _squares,
     "text": _text,
     "fields": _fields,
+    "outcome": _outcome,
+    "pairs": _pairs,
+    "points": lambda arguments, result: max(map(_count, arguments), default=1) or 1,
+    "variables": _variables,
 }
 """Sizes: elements of the largest array among arguments and result, in units of 8 bytes, because what takes
 the time are vectors of so many bytes; elements whatever their type (``items``); multiplications of a matrix
 product; elements of a matrix to the power of 1.5 (``cube``), or times its columns (``squares``); length of
-the longest text; values of a record."""
+the longest text; values of a record; elements of the result (``outcome``); pairs of rows of two arrays;
+points of the largest cloud; variables of a solver."""
 
 
 def _loops(arguments: Values, result: Any) -> int:
@@ -258,10 +303,14 @@ FEATURES: Mapping[str, Callable[[Values, Any], float]] = {
     "found": lambda arguments, result: len(result) if isinstance(result, list) else 0,
     "matched": _matched,
     "removed": _removed,
+    "candidates": _candidates,
+    "window": _window,
 }
 """Features: inner loops of numpy beyond the first; elements read with gaps, converted first, selected; rows
 that are selected; elements that are searched in several dimensions; elements of the result; commas and colons
 of a text, its points, the digits after them, its lines; bytes that are searched for matches (n · 4r(1 - r)
 with the ratio r of the packed length); characters that a pattern is tried at, results of it, characters of
-its match, characters that a substitution removes. ``wrapped``, which is no property of the arguments, is 1
+its match, characters that a substitution removes, what was found in a picture and what was looked at for it,
+elements of a picture times what the side of a filter's window has beyond 3.
+``wrapped``, which is no property of the arguments, is 1
 for ``numpy.sum(x)`` where the points are of the method ``x.sum()``."""

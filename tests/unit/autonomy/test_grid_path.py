@@ -93,6 +93,20 @@ def test_a_way_from_inside_the_margin_leads_out_and_never_nearer() -> None:
     assert not len(WaysFrom(clearance, SIDE, (30, 22), 1.5).to((30, 10)))
 
 
+@pytest.mark.parametrize("shape", [(60, 80), (12, 20, 24)])
+def test_with_one_goal_the_way_costs_the_same(shape: tuple[int, ...]) -> None:
+    random = np.random.default_rng(4)
+    for _ in range(12):
+        clearance = clearance_of(random.random(shape) < 0.02, SIDE)
+        start, goal = (tuple(int(at) for at in random.integers(0, shape)) for _ in range(2))
+        all_ways = WaysFrom(clearance, SIDE, start, 0.3)
+        ways = WaysFrom(clearance, SIDE, start, 0.3, goal)
+        assert ways.cost[goal] == pytest.approx(all_ways.cost[goal], rel=1e-12)
+        assert (ways.cost >= all_ways.cost - 1e-9).all()
+        assert len(ways.to(goal)) == 0 or ways.to(goal)[-1].tolist() == list(goal)
+        assert np.isfinite(ways.cost).sum() <= np.isfinite(all_ways.cost).sum()
+
+
 def test_there_is_no_way_to_a_goal_that_is_blocked_walled_in_or_outside() -> None:
     blocked = np.zeros((60, 60), dtype=bool)
     blocked[20:41, 20] = blocked[20:41, 40] = blocked[20, 20:41] = blocked[40, 20:41] = True

@@ -8,7 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
-from volery.autonomy.markers import CameraModel, MarkerFinder, camera_of, marker_cells, picture_of
+from volery.autonomy.markers import (
+    CameraModel,
+    MarkerFinder,
+    camera_of,
+    marker_cells,
+    picture_of,
+    rectified_camera_of,
+)
 from volery.base.errors import UsageError
 from volery.ros.messages import new
 from volery.simulation.world.rasteriser import Lens, Rasteriser, View
@@ -85,6 +92,27 @@ def test_messages_give_picture_and_camera(ros1: bool) -> None:
     assert camera_of(new_camera_info()).matrix[0, 0] == 240.0
 
 
+def test_rectified_pictures_have_a_model_of_their_own() -> None:
+    info = new_camera_info()
+    info.d = [0.1] * 5
+    info.p = [200.0, 0.0, 160.0, -12.0, 0.0, 210.0, 120.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+    camera = rectified_camera_of(info)
+    assert camera.matrix.tolist() == [[200.0, 0.0, 160.0], [0.0, 210.0, 120.0], [0.0, 0.0, 1.0]]
+    assert not camera.distortion.any()
+    with pytest.raises(UsageError, match="no focal length in P"):
+        rectified_camera_of(new("sensor_msgs/msg/CameraInfo"))
+
+
+@pytest.mark.parametrize(("encoding", "red"), [("rgb8", 0), ("bgr8", 2), ("rgba8", 0), ("bgra8", 2)])
+def test_colours_become_grey(encoding: str, red: int) -> None:
+    channels = 4 if "a" in encoding else 3
+    image = new("sensor_msgs/msg/Image", height=1, width=2, step=2 * channels + 1, encoding=encoding)
+    pixels = np.zeros(2 * channels + 1, dtype=np.uint8)
+    pixels[red] = 200
+    image.data = pixels
+    assert picture_of(image).tolist() == [[60, 0]], "red is 0.299 of the grey"
+
+
 def new_camera_info():  # type: ignore[no-untyped-def]
     info = new("sensor_msgs/msg/CameraInfo")
     info.k = CAMERA.matrix.reshape(-1)
@@ -93,8 +121,8 @@ def new_camera_info():  # type: ignore[no-untyped-def]
 
 def test_bad_input_is_named() -> None:
     image = new("sensor_msgs/msg/Image")
-    image.encoding, image.height, image.width, image.step = "rgb8", 2, 2, 2
-    with pytest.raises(UsageError, match=r"rgb8.*mono8"):
+    image.encoding, image.height, image.width, image.step = "bayer_rggb8", 2, 2, 2
+    with pytest.raises(UsageError, match=r"bayer_rggb8.*mono8"):
         picture_of(image)
     image.encoding = "mono8"
     with pytest.raises(UsageError, match="has 0 bytes"):

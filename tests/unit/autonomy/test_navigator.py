@@ -114,7 +114,7 @@ def test_it_brakes_when_the_lidar_is_silent_and_goes_on_afterwards() -> None:
     assert navigator.update(100 * MS, pose, old, NOWHERE).any()
     assert navigator.update(400 * MS, pose, None, NOWHERE).any()
     assert not navigator.update(700 * MS, pose, old, NOWHERE).any()
-    assert navigator.word == "no scan for 0.6 s"
+    assert navigator.word == "no scan for more than 0.5 s"
     assert navigator.update(S, pose, scan(ROOM, pose, S), NOWHERE).any()
     assert navigator.word == "on the way"
 
@@ -130,6 +130,41 @@ def test_it_brakes_when_the_scan_says_nothing_or_denies_what_was_seen() -> None:
     assert not navigator.update(S + 100 * MS, pose, nothing, NOWHERE).any()
     assert "all maximum" in navigator.word
     assert (navigator.grid.log_odds == before).all()
+
+
+def test_it_brakes_when_the_scan_is_stuck_and_goes_on_when_it_changes() -> None:
+    navigator, pose, fast = Navigator(DRONE, (18.0, 10.0)), Pose2(7.0, 10.0), np.array((1.0, 0.0))
+    stuck = scan(ROOM, pose, 0)
+
+    def goes(tick: int, velocity: np.ndarray) -> bool:
+        time = tick * 100 * MS
+        return bool(navigator.update(time, pose, stuck._replace(time=time), velocity).any())
+
+    assert all(goes(tick, NOWHERE) for tick in range(8)), "a vehicle that stands sees the same"
+    assert [goes(8 + tick, fast) for tick in range(5)] == [True, True, False, False, False]
+    assert navigator.word == "the scan does not change although the vehicle moves: it is stuck"
+    assert not goes(13, NOWHERE)
+    moved = Pose2(7.5, 10.0)
+    assert navigator.update(1400 * MS, moved, scan(ROOM, moved, 1400 * MS), NOWHERE).any()
+
+
+@pytest.mark.parametrize(("off", "word"), [(-5 * S, "5 s old"), (5 * S, "5 s ahead of the clock")])
+def test_it_brakes_when_the_stamps_are_of_another_time(off: int, word: str) -> None:
+    navigator, pose = Navigator(DRONE, (18.0, 10.0)), Pose2(7.0, 10.0)
+    assert navigator.update(10 * S, pose, scan(ROOM, pose, 10 * S), NOWHERE).any()
+    assert not navigator.update(11 * S, pose, scan(ROOM, pose, 11 * S + off), NOWHERE).any()
+    assert navigator.word == f"the scan is {word}"
+    assert navigator.update(12 * S, pose, scan(ROOM, pose, 12 * S), NOWHERE).any()
+
+
+def test_it_goes_on_when_the_whole_clock_jumps_back() -> None:
+    navigator, pose = Navigator(DRONE, (18.0, 10.0)), Pose2(7.0, 10.0)
+    assert navigator.update(3600 * S, pose, scan(ROOM, pose, 3600 * S), NOWHERE).any()
+    assert not navigator.update(0, pose, None, NOWHERE).any()
+    assert navigator.word == "no scan yet"
+    assert navigator.update(S, pose, scan(ROOM, pose, S), NOWHERE).any()
+    assert not navigator.update(2 * S, pose, None, NOWHERE).any()
+    assert navigator.word == "no scan for more than 0.5 s"
 
 
 def test_an_open_field_is_flown_although_every_beam_is_at_its_maximum() -> None:

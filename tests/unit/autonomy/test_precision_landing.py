@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import hypot
+from math import hypot, inf, sin
 
 import numpy as np
 import pytest
@@ -27,20 +27,26 @@ class Flight:
     seen: Callable[[float, Vector], bool] = lambda _time, _at: True
     rules: LandingRules = field(default_factory=LandingRules)
     noise: float = 0.01
+    marker: Callable[[float], Vector] = lambda _time: (0.0, 0.0, 0.0)
+    frozen_from: float = inf  # [s]: the pictures stay as they are
+    push: Callable[[float], float] = lambda _time: 0.0  # acceleration to the east by gusts [m/s^2]
     phases: list[Phase] = field(default_factory=list)
     heights: list[float] = field(default_factory=list)
+    sideways: list[float] = field(default_factory=list)
     reason: str = ""
 
     def fly(self, seconds: float = 200.0) -> Phase:
         random = np.random.default_rng(1)
         place, velocity, command = np.array(self.at), np.zeros(3), np.zeros(3)
-        landing, due = Landing(), []
+        landing, due, offset = Landing(), [], (0.0, 0.0, 0.0)
         for at in range(0, int(seconds * 1000), 20):
             velocity += (command - velocity) * 0.02 / 0.3
+            velocity[0] += self.push(at / 1000) * 0.02
             place = place + velocity * 0.02
             if at % 100 == 0 and self.seen(at / 1000, tuple(place)):
                 sigma = self.noise * (1.0 + 0.2 * place[2])
-                offset = tuple(-place + random.normal(0.0, sigma, 3))
+                if at / 1000 < self.frozen_from:
+                    offset = tuple(self.marker(at / 1000) - place + random.normal(0.0, sigma, 3))
                 due.append(Sight(at * MS, offset, (sigma,) * 3))
             sight = due.pop(0) if due and due[0].at <= (at - LATE) * MS else None
             if at % 40 == 0 or sight:
@@ -50,6 +56,7 @@ class Flight:
                     self.phases.append(wanted.phase)
                 self.reason = wanted.reason
                 self.heights.append(float(place[2]))
+                self.sideways.append(abs(float(place[0])))
                 if wanted.phase in {Phase.LAND, Phase.ABORT}:
                     break
         self.at = tuple(place)
@@ -80,6 +87,16 @@ def test_near_the_ground_it_goes_on_without_the_marker() -> None:
     assert flight.phases[-2:] == [Phase.COMMIT, Phase.LAND]
 
 
+def test_gusts_push_it_less_far_with_damping() -> None:
+    def farthest(damping: float) -> float:
+        rules = LandingRules(damping=damping)
+        flight = Flight(at=(0.0, 0.0, 8.0), rules=rules, push=lambda time: 0.8 * sin(time))
+        assert flight.fly() is Phase.LAND
+        return max(flight.sideways)
+
+    assert farthest(0.5) < 0.8 * farthest(0.0)
+
+
 def test_it_waits_while_it_is_outside_of_the_cone() -> None:
     flight = Flight(at=(4.0, 3.0, 5.0))
     assert flight.fly() is Phase.LAND
@@ -106,6 +123,27 @@ def test_without_a_marker_it_stays_and_says_so() -> None:
     assert flight.fly() is Phase.ABORT
     assert flight.at == start
     assert flight.reason == "no marker was seen within 10 s"
+
+
+def test_a_frozen_camera_does_not_lead_it_into_the_ground() -> None:
+    for frozen_from in (2.0, 5.0, 9.0):
+        flight = Flight(frozen_from=frozen_from)
+        assert flight.fly() is Phase.ABORT
+        assert flight.reason == "the pictures stay the same while the vehicle moves: restart the camera"
+        assert flight.at[2] > 0.5
+
+
+def test_a_camera_that_goes_black_is_a_marker_that_is_lost() -> None:
+    flight = Flight(seen=lambda time, _at: time < 7.0)
+    assert flight.fly() is Phase.ABORT
+    assert "the marker was lost 4 times" in flight.reason
+    assert flight.at[2] > 2.0, "it has climbed"
+
+
+def test_a_marker_that_moves_in_the_descent_is_followed() -> None:
+    flight = Flight(marker=lambda time: (1.2, 0.0, 0.0) if time > 8.0 else (0.0, 0.0, 0.0))
+    assert flight.fly() is Phase.LAND
+    assert hypot(flight.at[0] - 1.2, flight.at[1]) < 0.1
 
 
 def test_it_does_not_take_for_ever() -> None:

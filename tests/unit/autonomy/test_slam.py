@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from rigs.floor_plans import OFFICE, odometry, scan, tour
+from volery.autonomy.laser_scan import LaserScan2
 from volery.autonomy.planar_pose import Pose2
 from volery.autonomy.slam import Slam
 
@@ -21,7 +22,7 @@ WAY = [
 ]
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))])
 def test_a_way_with_loops_is_found_to_centimetres(seed: int) -> None:
     truth = tour(WAY)
     wheels = odometry(truth, seed)
@@ -62,3 +63,14 @@ def test_a_scan_without_points_is_where_odometry_says() -> None:
     slam.add(Pose2(), scan(OFFICE, Pose2(2.0, 2.0)))
     blind = scan(OFFICE, Pose2(2.0, 2.0), most=0.1)
     assert slam.add(Pose2(1.0, 0.0, 0.1), blind) == pytest.approx((1.0, 0.0, 0.1))
+
+
+def test_it_is_said_that_a_scan_fits_nowhere() -> None:
+    slam = Slam()
+    for x in (0.0, 0.2, 0.4):
+        slam.add(Pose2(x, 0.0), scan(OFFICE, Pose2(2.0 + x, 2.0)))
+    angles = np.linspace(-np.pi, np.pi, 300)
+    ranges = np.random.default_rng(1).uniform(0.5, 9.0, 300)
+    points = np.stack((ranges * np.cos(angles), ranges * np.sin(angles)), axis=1)
+    slam.add(Pose2(1.4, 0.1, 0.3), LaserScan2(0, points, np.zeros((0, 2))))
+    assert "the place is uncertain" in slam.lost[-1][1]

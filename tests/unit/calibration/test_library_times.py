@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import pytest
 
+from volery.base.errors import UsageError
 from volery.calibration.library_times import (
     COLD_NS,
-    TIMED_CALLS,
     WARM,
     Snippet,
     _of_feature,
     context_factors,
     features,
     in_context,
+    measured_again,
     scaled,
     snippets,
 )
-from volery.calibration.timed_code import TimedCode, timed_program
+from volery.calibration.picture_times import module_if_installed
+from volery.calibration.timed_code import Rounds, TimedCode, timed_program
 from volery.cost import WRAPPED, LibraryCall, LibraryTable, call_feature, library_table, operation_table
 
 PROGRAMS = {
@@ -39,12 +41,21 @@ def test_each_feature_is_priced_by_a_call_that_has_it_and_belongs_to_an_entry() 
 
 def test_all_entries_that_come_with_volery_can_be_measured_again() -> None:
     names, of_features = [one.name for one in snippets()], list(features())
-    assert set(names) == set(library_table().calls)
-    assert len(names) + len(of_features) == TIMED_CALLS
+    table = {
+        name: one
+        for name, one in library_table().calls.items()
+        if module_if_installed(name.partition(".")[0])
+    }
+    assert set(names) == set(table)
     priced: dict[str, set[str]] = {}
     for one in of_features:
         priced.setdefault(one.name, set()).add(one.size)
-    assert priced == {name: set(one.each) for name, one in library_table().calls.items() if one.each}
+    assert priced == {name: set(one.each) for name, one in table.items() if one.each}
+
+
+def test_what_cannot_be_measured_by_itself_is_named() -> None:
+    with pytest.raises(UsageError, match=r"library 'numpy' by itself; give .*cv2"):
+        measured_again(library_table(), ["numpy"], Rounds(2, 2), lambda *_: None)
 
 
 def test_a_feature_takes_what_a_call_takes_beyond_its_price(monkeypatch: pytest.MonkeyPatch) -> None:

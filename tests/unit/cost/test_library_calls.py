@@ -9,6 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from volery.autonomy.laser_scan import LaserScan2
 from volery.calibration.timed_code import timed_program
 from volery.cost import STEPS_PER_NS, LibraryTable, StepCounter, library_table, operation_table
 from volery.cost.library_calls import LibraryCall
@@ -214,3 +215,58 @@ def test_sizes_of_records_and_packed_text() -> None:
     assert counter.libraries is not None
     assert 100.0 < counter.libraries.steps["struct"] / STEPS_PER_NS < 2000.0
     assert not counter.libraries.unpriced
+
+
+SLAM = """
+import numpy as np
+from volery.autonomy.laser_scan import LaserScan2
+from volery.autonomy.planar_pose import Pose2
+from volery.autonomy.slam import Slam
+corner = np.stack((np.linspace(-2.0, 2.0, COUNT), np.full(COUNT, 1.5)), axis=1)
+slam, empty = Slam(), corner[:0]
+def run():
+    for number in range(3):
+        slam.add(Pose2(0.01 * number, 0.0, 0.0), LaserScan2(number, corner, empty))
+"""
+
+
+def test_a_call_of_volery_is_charged_by_its_work_once() -> None:
+    spent = {}
+    for count in (50, 400):
+        module, counter = executed(SLAM.replace("COUNT", str(count)))
+        assert counter.libraries is not None
+        of_numpy, plain = counter.libraries.steps["numpy"], counter.take()
+        module.run()
+        spent[count] = counter.libraries.steps["autonomy"]
+        assert counter.libraries.steps["numpy"] - of_numpy < 100, "numpy inside belongs to the call"
+        assert spent[count] < counter.take() < spent[count] + 20_000 * STEPS_PER_NS
+        assert plain > 0
+        assert not any(name.startswith("autonomy") for name in counter.libraries.unpriced)
+    assert spent[400] > 1.5 * spent[50]
+
+
+def test_a_method_of_a_class_that_extends_one_of_volery_is_charged_too() -> None:
+    module, counter = executed(
+        "from volery.autonomy.slam import Slam\nfrom volery.autonomy.planar_pose import Pose2\n"
+        "class Mine(Slam):\n    pass\n"
+        "def run(scan):\n    Mine().add(Pose2(), scan)\n"
+    )
+    assert counter.libraries is not None
+    points = np.stack((np.linspace(0.0, 3.0, 200), np.ones(200)), axis=1)
+    module.run(LaserScan2(0, points, points[:0]))
+    assert counter.libraries.steps["autonomy"] > 50_000 * STEPS_PER_NS
+
+
+def test_functions_of_opencv_are_found_although_they_do_not_say_where_they_belong() -> None:
+    spent = {}
+    for side in (60, 600):
+        _, counter = executed(
+            f"import cv2\nimport numpy as np\npicture = np.zeros(({side}, {side}), np.uint8)\n"
+            "cv2.Canny(picture, 50, 150)\ncv2.GaussianBlur(picture, (5, 5), 1.0)\n"
+            "family = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)\n"
+            "cv2.aruco.ArucoDetector(family).detectMarkers(picture)\n"
+        )
+        assert counter.libraries is not None
+        spent[side] = counter.libraries.steps["cv2"]
+        assert set(counter.libraries.unpriced) <= {"cv2.getPredefinedDictionary", "cv2.ArucoDetector"}
+    assert spent[600] > 2 * spent[60]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,28 @@ from volery.simulation.world.scene import Scene
 from volery.simulation.world.sensors import Mounting, Publication, SampledSensor, SensorInput
 
 
+class Shot(NamedTuple):
+    """An exposure. ``draw`` makes its picture, which takes longer than all else of a camera.
+
+    Args:
+        rasteriser: What draws it.
+        view: Where the camera is and how it moves.
+        ground: Height of the ground below, up [m].
+        lux: Light [lx].
+        number: Number of the grid step, of which its noise is.
+    """
+
+    rasteriser: Rasteriser
+    view: View
+    ground: float
+    lux: float
+    number: int
+
+    def draw(self) -> Picture:
+        """Return a new picture (height, width)."""
+        return self.rasteriser.draw(self.view, self.ground, self.lux, self.number)
+
+
 class _CameraSampler:
     """Takes the pictures of one camera on one body."""
 
@@ -24,9 +46,9 @@ class _CameraSampler:
         self._rasteriser = Rasteriser(camera.lens, scene.solids, scene.markers, camera.exposure, noise)
         self._lux = scene.lux
 
-    def __call__(self, state: SensorInput, k: int) -> Picture:
-        """Return a new picture (height, width)."""
-        return self._rasteriser.draw(view_of(state, self._mounting), state.ground, self._lux, k)
+    def __call__(self, state: SensorInput, k: int) -> Shot:
+        """Return the exposure."""
+        return Shot(self._rasteriser, view_of(state, self._mounting), state.ground, self._lux, k)
 
 
 def view_of(state: SensorInput, mounting: Mounting) -> View:
@@ -83,15 +105,16 @@ class Camera(SampledSensor):
     def publications(self) -> tuple[Publication, ...]:
         """See ``SampledSensor``."""
         return (
-            Publication(f"{self.name}/image_raw", self.type, self.fill),
+            Publication(f"{self.name}/image_raw", self.type, self.fill, on_demand=True),
             Publication(f"{self.name}/camera_info", "sensor_msgs/msg/CameraInfo", self._fill_info),
         )
 
     def fill(self, message: Any, values: Any) -> None:
-        """Write a picture into an image."""
-        message.height, message.width = values.shape
-        message.step, message.encoding = values.shape[1], "mono8"
-        message.data = values.reshape(-1)
+        """Write the picture of an exposure into an image."""
+        picture: Picture = values.draw()
+        message.height, message.width = picture.shape
+        message.step, message.encoding = picture.shape[1], "mono8"
+        message.data = picture.reshape(-1)
 
     def _fill_info(self, message: Any, _values: Any) -> None:
         lens, (column, row) = self.lens, self.lens.centre
