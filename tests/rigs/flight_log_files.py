@@ -13,12 +13,15 @@ from volery.links.mavlink_codec import encode
 Rows = Iterable[Sequence[float]]
 
 
-def dataflash(path: Path, tables: Mapping[str, tuple[str, Rows]]) -> Path:
+def dataflash(
+    path: Path, tables: Mapping[str, tuple[str, Rows]], texts: Iterable[tuple[float, str]] = ()
+) -> Path:
     """Write a binary DataFlash log of messages with ``TimeUS`` (Q) and floats (f).
 
     Args:
         path: file to write.
         tables: name → columns after the time, and rows of time in s and values.
+        texts: times in s and what was said.
     """
     out = bytearray()
 
@@ -33,16 +36,20 @@ def dataflash(path: Path, tables: Mapping[str, tuple[str, Rows]]) -> Path:
         out += definition(kind, 11 + 4 * count, name, "Q" + "f" * count, f"TimeUS,{columns}")
         for time, *values in rows:
             out += struct.pack(f"<2sBQ{count}f", b"\xa3\x95", kind, round(time * 1e6), *values)
+    out += definition(255, 75, "MSG", "QZ", "TimeUS,Message")
+    for time, text in texts:
+        out += struct.pack("<2sBQ64s", b"\xa3\x95", 255, round(time * 1e6), text.encode())
     path.write_bytes(out)
     return path
 
 
-def ulog(path: Path, tables: Mapping[str, tuple[str, Rows]]) -> Path:
+def ulog(path: Path, tables: Mapping[str, tuple[str, Rows]], texts: Iterable[tuple[float, str]] = ()) -> Path:
     """Write a ULog of messages with ``timestamp`` (uint64) and floats.
 
     Args:
         path: file to write.
         tables: name → fields such as ``float[4] q;float x``, and rows of time in s and values.
+        texts: times in s and what was said.
     """
     out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 1_000_000))
 
@@ -60,6 +67,9 @@ def ulog(path: Path, tables: Mapping[str, tuple[str, Rows]]) -> Path:
     for time, number, values in sorted(data, key=lambda one: one[0]):
         stamp = struct.pack("<HQ", number, 1_000_000 + round(time * 1e6))
         out += record(b"D", stamp + struct.pack(f"<{len(values)}f", *values))
+    for time, text in texts:
+        head = struct.pack("<BQ", ord("6"), 1_000_000 + round(time * 1e6))
+        out += record(b"L", head + text.encode())
     path.write_bytes(out)
     return path
 

@@ -1,8 +1,8 @@
 """A program: fly a mission on each autopilot and a delivery, print a digest of each trace.
 
-    python tests/rigs/flown_digests.py
+    python tests/rigs/flown_digests.py [numba]
 
-Run on two processors, or by two versions of Python, it prints the same.
+Run on two processors, by two versions of Python, from object code or compiled by numba: it prints the same.
 """
 
 import hashlib
@@ -11,6 +11,7 @@ import tempfile
 from pathlib import Path
 
 import volery
+from volery.base import numeric_code
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 AUTOPILOTS = ("ardupilot", "px4", "paparazzi", "dji")
@@ -19,6 +20,8 @@ AUTOPILOTS = ("ardupilot", "px4", "paparazzi", "dji")
 def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
+        if "numba" in sys.argv:
+            numeric_code.OBJECT_CODE = out / "none"
         for autopilot in AUTOPILOTS:
             options = volery.Options(seed=1, out=out / autopilot)
             assert volery.fly(EXAMPLES / "mission.py", f"sim:{autopilot}", options).completed

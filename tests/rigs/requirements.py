@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 from typing import NoReturn
 
 import pytest
@@ -13,3 +14,14 @@ def lacking(what: str) -> NoReturn:
     if os.environ.get("VOLERY_REQUIRE_ALL") == "1":
         pytest.fail(f"{what}, and VOLERY_REQUIRE_ALL=1 asks for it")
     pytest.skip(what)
+
+
+def firmware_program(variable: str) -> Path:
+    """Return the program of real firmware that an environment variable names, else skip.
+
+    Nobody distributes these programs and their builds take long, so that CI has none either.
+    """
+    stated = os.environ.get(variable)
+    if not stated:
+        pytest.skip(f"{variable} names no program of real firmware")
+    return Path(stated)

@@ -24,6 +24,7 @@ from volery.cli.configuration import Configuration, read_configuration
 from volery.cli.console import Output
 from volery.cli.old_names import QUIET, current_words
 
+ROS_ARGUMENTS = "--ros-args"
 INFORMATION = frozenset({*HELP, "--version"})
 """Options that a wrong configuration file does not stop: its error is printed beside what they print."""
 
@@ -89,6 +90,8 @@ def main() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     atexit.register(gc.freeze)  # at its end Python looks for garbage in all that exists; nothing needs it
     words, remark = current_words(sys.argv[1:])
+    if ROS_ARGUMENTS in words and "--" not in words:  # ros2 launch adds them, and they are no options
+        words.insert(words.index(ROS_ARGUMENTS), "--")
     if remark:
         Output(quiet=not QUIET.isdisjoint(words)).note(remark)
     informs = not INFORMATION.isdisjoint(words)

@@ -28,7 +28,11 @@ Overrides = Annotated[
 ]
 Fidelity = Annotated[
     str,
-    typer.Option(metavar="times|code", help="Charge stated times, or the cost of the components' own code."),
+    typer.Option(
+        metavar="times|code|firmware",
+        help="Charge stated times, or the cost of the components' own code; with `firmware` the vehicles fly "
+        "on programs of real firmware, too.",
+    ),
 ]
 Scenario = Annotated[str | None, typer.Option(help="Scenario of the model.")]
 Allocation = Annotated[str | None, typer.Option(help="Allocation of the model; by default its first.")]

@@ -54,10 +54,7 @@ SPECIAL_INTERFACES = (*VEHICLE_INTERFACES, ENVIRONMENT_INTERFACE)
 """Interfaces that exist in every model."""
 
 LANGUAGES = ("python", "rospy", "rclpy", "c++", "roscpp", "rclcpp")
-"""Languages that a model may name. The ``Vocabulary`` states which of them run."""
-
-RUNNING_LANGUAGES = ("python", "rospy", "rclpy", "c++", "roscpp")
-"""Languages whose components can run."""
+"""Languages of components."""
 
 CPP_LANGUAGES = ("c++", "roscpp", "rclcpp")
 """Languages that are compiled."""

@@ -8,9 +8,10 @@ points, ways and prisms are written differently from what they become, so each h
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from math import hypot, inf, pi
+from pathlib import Path as FilePath
 from typing import Annotated, Any
 
 from volery.base import units
@@ -22,6 +23,7 @@ from volery.base.time import Ns
 from volery.model import rules
 from volery.model.added_sensors import ADDED_SENSOR, AddedSensor, Odometry
 from volery.model.airframes import AIRFRAME, BATTERY, LOAD, MASS, Airframe, Battery
+from volery.model.components import check_inside
 from volery.model.faults import FAULT, Fault
 from volery.model.fields import (
     AUTOPILOT,
@@ -49,11 +51,13 @@ from volery.model.fields import (
     Syntax,
     Whole,
     WrongValueError,
+    expected,
     read_child,
 )
 from volery.model.floor_plan import FLOOR_PLAN, FloorPlan
 from volery.model.prices import PRICE, Price
 from volery.model.reading import Reading
+from volery.model.recorded_inputs import INPUTS, RecordedInput
 from volery.model.resources import POWER
 from volery.model.text import Node, Path
 
@@ -61,7 +65,11 @@ MOST_COPIES = 1000
 """The greatest `count` of a vehicle."""
 
 VEHICLE_KINDS = ("multirotor", "rover")
-VEHICLE_NAMES = ("mavros", "roscopter", "pprzros")
+VEHICLE_NAMES = (
+    *("mavros", "roscopter", "pprzros"),
+    *("px4", "px4-1.16", "px4-1.15", "px4-1.14"),
+    *("ardupilot", "ardupilot-4.5"),
+)
 SENSOR_SETS = ("consumer", "rtk", "sih")
 STARTS = ("warm", "cold")
 LIGHTS = ("day", "dusk", "night")
@@ -428,16 +436,96 @@ class Wind:
 
 
 @dataclass(frozen=True, slots=True)
+class Firmware:
+    """The program of real firmware that flies a vehicle.
+
+    ``program`` is a path, or a name without ``/`` that is searched when a run starts. ``parameters`` are
+    files of parameters; a later one wins.
+    """
+
+    program: str
+    parameters: tuple[FilePath, ...] = ()
+    repeatable: bool = False
+
+
+class _ParameterFile(Syntax):
+    """A file of parameters beside the model."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> FilePath:
+        """See ``Syntax``."""
+        if not isinstance(node.value, str):
+            raise expected("text", node)
+        check_inside(reading, path, node.value)
+        file = reading.folder / node.value
+        if not file.is_file():
+            what = f"there is no file {node.value!r} beside the model"
+            raise WrongValueError(what, rules.MISSING_FILE)
+        return file
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": "string"}
+
+
+@dataclass(frozen=True, slots=True)
+class AutopilotText:
+    """What flies a vehicle: a simulated autopilot, or with `firmware` a program of the real one."""
+
+    project: Annotated[str, Key("is"), AUTOPILOT, "Autopilot, such as `ardupilot`."]
+    firmware: Annotated[
+        str,
+        TEXT,
+        "Program of its real firmware, which flies in lock step with virtual time: a path relative to the "
+        "model, or a name. `arducopter`, `ardurover` and `px4` are searched in the environment variables "
+        "`VOLERY_ARDUCOPTER`, `VOLERY_ARDUROVER` and `VOLERY_PX4`, then on PATH as any other name is.",
+    ] = ""
+    parameters: Annotated[
+        tuple[FilePath, ...],
+        ListOf(_ParameterFile(), bare=True),
+        "Files of parameters of that program, as ground stations write them: a later one wins, and the "
+        "`parameters` of the vehicle win over all.",
+    ] = ()
+    repeatable: Annotated[
+        bool,
+        OneOf((False, True)),
+        "Whether that program gives the same answers in each run; it keeps no log then.",
+    ] = False
+
+
+class _Autopilot(Shorter):
+    """The name of an autopilot, or a mapping."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> AutopilotText:
+        """See ``Syntax``. A problem of a name alone is one at *path*."""
+        if isinstance(node.value, dict):
+            read: AutopilotText = super().read(node, path, reading)
+            return read
+        return AutopilotText(AUTOPILOT.read(node, path, reading) or "")
+
+
+_AUTOPILOT = _Autopilot(Record(AutopilotText), key="is")
+
+
+def _project(text: AutopilotText, path: Path, reading: Reading) -> str:
+    return text.project
+
+
+@dataclass(frozen=True, slots=True)
 class Vehicle:
     """A drone or a rover with its autopilot.
 
+    ``firmware`` is the program of real firmware that flies it, None where a simulated one does.
     ``processor`` is where the node runs that serves it under MAVROS's names, None where no computer of the
     model does.
     """
 
     name: str
     kind: Annotated[str, OneOf(VEHICLE_KINDS), "Kind of vehicle."]
-    autopilot: Annotated[str, AUTOPILOT, "Firmware that flies it, such as `ardupilot`."]
+    autopilot: Annotated[
+        str,
+        _Resolved(_AUTOPILOT, _project),
+        "What flies it, such as `ardupilot`; a mapping for a program of its real firmware.",
+    ]
     at: Annotated[Place, PLACE, "Where it stands at the start."]
     heading_deg: Annotated[float, HEADING, "Heading at the start, clockwise from north."] = 0.0
     battery: Annotated[
@@ -471,7 +559,9 @@ class Vehicle:
         str,
         OneOf(VEHICLE_NAMES),
         "Whose ROS names the node that serves it has, below `/<vehicle>`: `mavros`, `roscopter` (with "
-        "`send_rc`), or for Paparazzi `pprzros`; the first that fits if it is not given.",
+        "`send_rc`), for Paparazzi `pprzros`, or those of its autopilot's own ROS 2 interface, `px4` (1.17) "
+        "and `ardupilot` (4.8) or an older one, which lie below `/` where one vehicle has them. The first "
+        "that fits if it is not given.",
     ] = ""
     transmitter: Annotated[
         Mapping[str, int],
@@ -487,6 +577,7 @@ class Vehicle:
     price: Annotated[
         Price | None, PRICE, "Its price without battery and computers; that of its airframe by default."
     ] = None
+    firmware: Firmware | None = None
     processor: str | None = None
     where: Location | None = field(default=None, compare=False)
 
@@ -518,12 +609,34 @@ class VehicleText(Vehicle):
     ] = Spacing()
 
 
+def _firmware(vehicle: Vehicle, node: Node, path: Path, reading: Reading) -> Firmware | None:
+    """Return the program that the `autopilot` of a vehicle states; None for a simulated autopilot."""
+    here = (*path, "autopilot")
+    text: AutopilotText = _AUTOPILOT.read(node.items["autopilot"], here, reading)
+    if not text.firmware:
+        for key in ("parameters", "repeatable"):
+            if getattr(text, key):
+                what = "this is of a program of real firmware: state it, too, as in `firmware: arducopter`"
+                reading.problems.add((*here, key), what)
+        return None
+    for key, word in (
+        ("version", "a version of its own; leave it out"),
+        ("features", "features of its own; leave them out"),
+    ):
+        if getattr(vehicle, key):
+            what = f"{text.firmware} has {word}"
+            reading.problems.add((*path, key), what)
+    program = str(reading.folder / text.firmware) if "/" in text.firmware else text.firmware
+    return Firmware(program, text.parameters, text.repeatable)
+
+
 class _Vehicle(Record):
     """A vehicle. A number of vehicles has been replaced by its copies when it is read."""
 
     def read(self, node: Node, path: Path, reading: Reading) -> Vehicle:
         """See ``Syntax``. An airframe must be one that the autopilot flies, with the payload."""
         made: Vehicle = super().read(node, path, reading)
+        made = replace(made, firmware=_firmware(made, node, path, reading))
         problems, airframe = reading.problems, made.airframe
         named = [one if isinstance(one, str) else one.named for one in made.added_sensors]
         for name in sorted({name for name in named if named.count(name) > 1}):
@@ -538,7 +651,7 @@ class _Vehicle(Record):
             )
         elif airframe is not None:
             flying = sorted(reading.vocabulary.airframes)
-            if made.autopilot not in flying:
+            if made.autopilot not in flying and made.firmware is None:
                 what = f"a simulated {made.autopilot} flies its own airframe; {choices(flying)} fly others"
                 problems.add((*path, "airframe"), what, reading.where((*path, "airframe", "file")))
             if made.payload_kg > airframe.spare_kg >= 0.0:
@@ -640,6 +753,9 @@ class Environment:
     ] = Workload()
     faults: Annotated[
         tuple[Fault, ...], MapOf(FAULT, values_only=True), "What breaks, and when. See the list of faults."
+    ] = ()
+    inputs: Annotated[
+        tuple[RecordedInput, ...], INPUTS, "Recordings that are played into the graph of a run, by name."
     ] = ()
 
     @property

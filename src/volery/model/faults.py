@@ -10,13 +10,15 @@ A new kind of fault: a class here with ``@fault``, its effect there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import Annotated, Any, TypeVar
 
+from volery.base import units
 from volery.base.errors import Location
 from volery.base.time import Ns
 from volery.model import rules
+from volery.model.added_sensors import ADDED_SENSORS, AddedSensor, Camera, RangingSensor
 from volery.model.airframes import FRAMES
 from volery.model.fields import (
     HEADING,
@@ -24,8 +26,10 @@ from volery.model.fields import (
     PROCESSOR,
     SHARE,
     SPEED,
+    TEXT,
     TIME,
     VEHICLE,
+    Duration,
     Record,
     Reference,
     Schema,
@@ -207,6 +211,115 @@ class BarometerStuck(VehicleFault):
 @dataclass(frozen=True, kw_only=True)
 class CompassStuck(VehicleFault):
     """The compass repeats its last value."""
+
+
+# -- sensors that a model adds
+
+
+def _names(sensors: Node | None, kinds: Collection[str] | None) -> list[str]:
+    """Return the names of the sensors in a vehicle's ``added_sensors``, of some kinds only."""
+    found = []
+    for one in sensors.value if sensors is not None and isinstance(sensors.value, list) else ():
+        kind, settings = one.value, None
+        if isinstance(one.value, dict) and len(one.items) == 1:
+            ((kind, settings),) = one.items.items()
+        name = settings.child("name") if settings is not None and isinstance(settings.value, dict) else None
+        if kinds is None or kind in kinds:
+            found.append(str(name.value if name is not None else kind))
+    return found
+
+
+@dataclass(frozen=True)
+class _AddedSensor(Syntax):
+    """The name of an added sensor of the vehicle that the fault names. ``kinds``: of these kinds only."""
+
+    noun: str
+    kinds: tuple[str, ...] | None = None
+
+    def read(self, node: Node, path: Path, reading: Reading) -> str:
+        """See ``Syntax``."""
+        name: str = TEXT.read(node, path, reading)
+        fault = reading.root.at(path[:-1])
+        vehicle = fault.child("vehicle") if fault else None
+        if vehicle is not None:
+            where = ("environment", "vehicles", str(vehicle.value), "added_sensors")
+            reading.known(path, name, self.noun, _names(reading.root.at(where), self.kinds))
+        return name
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": "string", "x-quantity": f"the name of a vehicle's {self.noun}"}
+
+
+SENSOR = _AddedSensor("added sensor")
+CAMERA = _AddedSensor("camera", (Camera.kind,))
+RANGING = _AddedSensor(
+    "sensor of distances",
+    tuple(kind for kind, cls in ADDED_SENSORS.items() if issubclass(cls, RangingSensor)),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AddedSensorFault(VehicleFault):
+    """A fault of a sensor that the model adds to a vehicle."""
+
+    sensor: Annotated[str, SENSOR, "The sensor: its `name`, or its kind if it has none."]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RangingFault(AddedSensorFault):
+    """A fault of an added sensor that measures distances."""
+
+    sensor: Annotated[str, RANGING, "The sensor: its `name`, or its kind if it has none."]
+
+
+def can_happen_to(kind: type[AddedSensorFault], sensor: AddedSensor | str) -> bool:
+    """Return whether a kind of fault can happen to an added sensor; text names one of another package."""
+    if issubclass(kind, RangingFault):
+        return isinstance(sensor, RangingSensor)
+    return isinstance(sensor, Camera) or not issubclass(kind, CameraBlack)
+
+
+@fault("sensor-silent")
+@dataclass(frozen=True, kw_only=True)
+class SensorSilent(AddedSensorFault):
+    """An added sensor gives no samples."""
+
+
+@fault("sensor-stuck")
+@dataclass(frozen=True, kw_only=True)
+class SensorStuck(AddedSensorFault):
+    """An added sensor repeats its last sample, with new stamps."""
+
+
+@fault("sensor-clock-off")
+@dataclass(frozen=True, kw_only=True)
+class SensorClockOff(AddedSensorFault):
+    """The stamps of an added sensor jump, and stay off by this time."""
+
+    by_ns: Annotated[
+        Ns, Duration(units.TIME), "What is added to its stamps; back in time if negative."
+    ] = -5_000_000_000
+
+
+@fault("camera-black")
+@dataclass(frozen=True, kw_only=True)
+class CameraBlack(AddedSensorFault):
+    """No light reaches an added camera: its pictures are black but for the noise of reading."""
+
+    sensor: Annotated[str, CAMERA, "The camera: its `name`, or `camera` if it has none."]
+
+
+@fault("ranges-maximum")
+@dataclass(frozen=True, kw_only=True)
+class RangesMaximum(RangingFault):
+    """Every beam of an added sensor reads the longest distance that it measures."""
+
+
+@fault("ranges-not-a-number")
+@dataclass(frozen=True, kw_only=True)
+class RangesNotANumber(RangingFault):
+    """Every beam of an added sensor reads NaN."""
 
 
 # -- the link between an autopilot and what commands it

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
-from math import isfinite
 from pathlib import Path as FilePath
 from typing import Annotated
 
@@ -20,10 +19,7 @@ from volery.base.elementary import sine_cosine
 from volery.base.errors import ModelError
 from volery.model.components import check_inside
 from volery.model.fields import (
-    NUMBER,
     TEXT,
-    ListOf,
-    OneOf,
     Quantity,
     Record,
     Schema,
@@ -32,12 +28,11 @@ from volery.model.fields import (
     WrongValueError,
     read_child,
 )
+from volery.model.map_file import MAP, MapPicture, parse_map, picture_of
 from volery.model.reading import Reading
-from volery.model.text import Node, Path, parse
+from volery.model.text import Node, Path
 
-MOST_CELLS = 25_000_000
 MOST_WALLS = 20_000
-_WHITE = 255.0
 
 Corners = tuple[tuple[float, float], ...]
 
@@ -59,18 +54,6 @@ class FloorPlan:
     walls: tuple[Corners, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _MapFile:
-    """The YAML file of a map. Keys of other programs are ignored."""
-
-    image: Annotated[str, TEXT, ""]
-    resolution: Annotated[float, NUMBER, ""]
-    origin: Annotated[tuple[float, ...], ListOf(NUMBER), ""]
-    negate: Annotated[int, OneOf((0, 1)), ""] = 0
-    occupied_thresh: Annotated[float, NUMBER, ""] = 0.65
-    mode: Annotated[str, OneOf(("trinary", "scale")), ""] = "trinary"
-
-
 class _FloorPlan(Syntax):
     """The name of a map's YAML file, or a mapping."""
 
@@ -82,21 +65,18 @@ class _FloorPlan(Syntax):
         check_inside(reading, path, stated.file)
         file = reading.folder / stated.file
         try:
-            tree = parse(file.read_text(encoding="utf-8"), str(file))
-        except OSError as error:
-            raise WrongValueError(f"no floor plan {stated.file}: {error.strerror}") from None
-        except UnicodeDecodeError:
-            raise WrongValueError(f"{stated.file} is not YAML; give the YAML file of the picture") from None
+            tree = parse_map(file)
+        except ValueError as error:
+            raise WrongValueError(f"{stated.file}: {error}") from None
         except ModelError as error:
             reading.problems.add(path, str(error), node.where)
             raise WrongValueError("") from None
-        known = {key: below for key, below in tree.items.items() if key in _MapFile.__annotations__}
-        right, plan = read_child(Record(_MapFile), Node(known, tree.where), path, reading)
+        right, plan = read_child(MAP, tree, path, reading)
         if not right:
             raise WrongValueError("")
         check_inside(reading, path, str(FilePath(stated.file).parent / plan.image))
         try:
-            walls = tuple(_walls(plan, file.parent / plan.image))
+            walls = tuple(_walls(picture_of(plan, file.parent / plan.image), plan.image))
         except ValueError as error:
             raise WrongValueError(f"{stated.file}: {error}") from None
         return FloorPlan(file.stem, stated.height_m, walls)
@@ -109,24 +89,16 @@ class _FloorPlan(Syntax):
 FLOOR_PLAN = _FloorPlan()
 
 
-def _walls(plan: _MapFile, picture: FilePath) -> Iterator[Corners]:
+def _walls(plan: MapPicture, name: str) -> Iterator[Corners]:
     """Yield the corners of each wall, in metres. Raise ``ValueError`` if the plan cannot be used."""
-    if not (isfinite(plan.resolution) and 0.001 <= plan.resolution <= 10.0):
-        raise ValueError(f"a resolution of {plan.resolution} m a cell; give one from 0.001 to 10")
-    if len(plan.origin) != 3 or not all(map(isfinite, plan.origin)):
-        raise ValueError("its origin is three numbers: x, y and yaw of the lower left corner")
-    shades = _read_shades(picture)
-    occupied = (shades if plan.negate else _WHITE - shades) > plan.occupied_thresh * _WHITE
-    if not occupied.any():
-        raise ValueError(f"no cell of {picture.name} is occupied: are negate and occupied_thresh right?")
+    if not plan.occupied.any():
+        raise ValueError(f"no cell of {name} is occupied: are negate and occupied_thresh right?")
     west, south, yaw = plan.origin
     sine, cosine = sine_cosine(yaw)
-    found = list(
-        islice(cover(occupied[::-1]), MOST_WALLS + 1)
-    )  # the first row of a picture is the northern one
+    found = list(islice(cover(plan.occupied), MOST_WALLS + 1))
     if len(found) > MOST_WALLS:
         raise ValueError(
-            f"more than {MOST_WALLS} rectangles cover what is occupied in {picture.name}: remove its "
+            f"more than {MOST_WALLS} rectangles cover what is occupied in {name}: remove its "
             "speckles, or give a coarser picture"
         )
     for left, bottom, right, top in found:
@@ -135,28 +107,6 @@ def _walls(plan: _MapFile, picture: FilePath) -> Iterator[Corners]:
             for x, y in ((left, bottom), (right, bottom), (right, top), (left, top))
         ]
         yield tuple((west + cosine * x - sine * y, south + sine * x + cosine * y) for x, y in scaled)
-
-
-def _read_shades(picture: FilePath) -> NDArray[np.float64]:
-    """Return the shades of a picture (rows, columns), 0 black to 255 white; what is transparent is white."""
-    from PIL import Image  # noqa: PLC0415  # only a model with a floor plan needs it
-
-    try:
-        with Image.open(picture) as image:
-            if image.width * image.height > MOST_CELLS:
-                size = f"{image.width} x {image.height} cells"
-                raise ValueError(f"{picture.name} has {size}, {MOST_CELLS} at most; give a coarser one")
-            if image.mode.startswith("I"):
-                return np.asarray(image, dtype=np.float64) / 257.0
-            if "A" in image.mode or "transparency" in image.info:
-                white = Image.new("RGBA", image.size, "white")
-                return np.asarray(Image.alpha_composite(white, image.convert("RGBA")).convert("L"), float)
-            return np.asarray(image.convert("L"), dtype=np.float64)
-    except Image.DecompressionBombError:
-        raise ValueError(f"{picture.name} has more than {MOST_CELLS} cells; give a coarser one") from None
-    except OSError as error:
-        what = "there is no such picture" if not picture.exists() else "this is no picture (PGM, PNG)"
-        raise ValueError(f"{picture.name}: {what}") from error
 
 
 def cover(occupied: NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:

@@ -78,13 +78,11 @@ def _no_catalogue(file: FilePath) -> Kinds:
 class Vocabulary:
     """Names that are defined outside the model. The caller supplies them; the model only checks against them.
 
-    ``languages`` are those that run today; a model may name others of ``LANGUAGES``. ``airframes`` are the
-    autopilots that fly an airframe of the model. ``read_catalogue``
-    returns the processors of a catalogue file that the model refers to, or raises ``ModelError``.
+    ``airframes`` are the autopilots that fly an airframe of the model. ``read_catalogue`` returns the
+    processors of a catalogue file that the model refers to, or raises ``ModelError``.
     """
 
     processors: Kinds
-    languages: frozenset[str]
     autopilots: frozenset[str]
     observables: tuple[Observable, ...] = ()
     read_catalogue: Callable[[FilePath], Kinds] = _no_catalogue

@@ -294,12 +294,6 @@ UNREACHABLE = _warning(
 # -- code
 
 NO_CODE = _warning("V701", "no-code", "A component without code: fidelity `code` needs it.", "Add a `path`.")
-LANGUAGE_UNSUPPORTED = _rule(
-    "V702",
-    "language-not-supported",
-    "A component with code in a language that does not run.",
-    "Use a language that runs.",
-)
 NO_TOOL_CHAIN = _warning(
     "V703",
     "no-tool-chain",
@@ -318,6 +312,13 @@ UNWRITTEN_CODE = _warning(
     "unwritten-code",
     "A component whose file is not there: everything but a run works without it.",
     "Correct the path, or write the file; without `path`, stated times run.",
+)
+
+NO_FIRMWARE = _rule(
+    "V706",
+    "no-firmware",
+    "Real firmware that is not on this machine, or that does not fly in virtual time.",
+    "Correct the program; `volery doctor` prints how one is built.",
 )
 
 # -- models of other tools

@@ -21,7 +21,7 @@ from volery.model.assembly import (
     model_file,
 )
 from volery.model.builder import ModelBuilder
-from volery.model.components import RUNNING_LANGUAGES, Figure
+from volery.model.components import Figure
 from volery.model.document import DOCUMENT, Document
 from volery.model.environment import Environment, Vehicle
 from volery.model.fields import TEXT, ListOf, read_child
@@ -35,12 +35,12 @@ FIDELITIES = ("times", "code", "firmware", "hardware")
 
 
 def check_code(system: System) -> None:
-    """Check that the files of all components are there, in languages that run.
+    """Check that the files of all components are there.
 
     Raises:
-        ModelError: A file is missing or does not run; all of them at once (``CollectedModelError``).
+        ModelError: A file is missing; all of them at once (``CollectedModelError``).
     """
-    found = [*_unwritten(system), *_foreign(system, RUNNING_LANGUAGES)]
+    found = list(_unwritten(system))
     if len(found) == 1:
         raise found[0]
     if found:
@@ -59,23 +59,14 @@ def _unwritten(system: System) -> Iterator[ModelError]:
             yield ModelError(what, at, stated.get(at, component.where), rules.UNWRITTEN_CODE.code)
 
 
-def _foreign(system: System, languages: Iterable[str]) -> Iterator[ModelError]:
-    for component in {one.component.name: one.component for one in system.instances}.values():
-        if component.path and component.language not in languages:
-            what = f"{component.language} components do not run yet; {choices(languages)} do"
-            code = rules.LANGUAGE_UNSUPPORTED.code
-            yield ModelError(what, f"components.{component.name}.language", component.where, code)
-
-
-def gaps(system: System, fidelity: str, vocabulary: Vocabulary) -> Iterator[ModelError]:
+def gaps(system: System, fidelity: str) -> Iterator[ModelError]:
     """Yield what is missing, component by component, in the order of the model."""
     yield from _unwritten(system)
     used = {instance.component.name: instance.component for instance in system.instances}
     for component in used.values():
-        if fidelity == "code" and not (component.path or component.package):
+        if fidelity != "times" and not (component.path or component.package):
             what = "it has no code: fidelity `code` needs a `path`; `times` runs without"
             yield ModelError(what, f"components.{component.name}", component.where, rules.NO_CODE.code)
-    yield from _foreign(system, vocabulary.languages)
     if fidelity == "times":
         for instance in system.instances:
             yield from _missing_figures(system, instance)

@@ -224,8 +224,10 @@ class Quoted(str):
     __slots__ = ()
 
 
-def parse(text: str, name: str) -> Node:
+def parse(text: str, name: str, *, merges: bool = False) -> Node:
     """Return the tree of a YAML text. *name* is the name of the file in messages.
+
+    A key that is there twice is an error, unless it *merges*: then both mappings hold, as in files of ROS.
 
     Raises:
         ModelError: it is not the YAML of a model.
@@ -248,7 +250,7 @@ def parse(text: str, name: str) -> Node:
             Location(name, 1),
             _NO_MODEL,
         )
-    return _Reading(name, yaml).node(root, ())
+    return _Reading(name, yaml, merges).node(root, ())
 
 
 def parse_value(text: str, where: Location) -> Node:
@@ -267,6 +269,7 @@ class _Reading:
 
     name: str
     yaml: YAML
+    merges: bool = False
     count: int = 0
     open: list[int] = field(default_factory=list)
 
@@ -286,7 +289,9 @@ class _Reading:
         if isinstance(raw, SequenceNode):
             value = [self.node(item, (*path, position)) for position, item in enumerate(raw.value)]
         else:
-            value = dict(self._entries(raw, path))
+            value = {}
+            for name, below in self._entries(raw, path):
+                value[name] = _merged(value[name], below) if name in value else below
         self.open.pop()
         return Node(value, where)
 
@@ -300,7 +305,7 @@ class _Reading:
             if name == "<<":
                 what = "merge keys (<<) are not read; repeat the entries"
                 raise ModelError(what, _dotted(path), where, _NO_MODEL)
-            if name in lines:
+            if name in lines and not self.merges:
                 here = _dotted((*path, name))
                 what = f"this key is here twice; first in line {lines[name]}"
                 raise ModelError(what, here, where, rules.DUPLICATE_KEY.code)
@@ -321,6 +326,16 @@ class _Reading:
             what = f"{raw.value!r} is no number"
             raise ModelError(what, _dotted(path), where, _NO_MODEL) from None
         return value
+
+
+def _merged(one: Node, other: Node) -> Node:
+    """Return two mappings in one, where the *other* wins; of anything else the other."""
+    if not isinstance(one.value, dict) or not isinstance(other.value, dict):
+        return other
+    value = dict(one.value)
+    for name, below in other.value.items():
+        value[name] = _merged(value[name], below) if name in value else below
+    return Node(value, one.where)
 
 
 def _dotted(path: Path) -> str:

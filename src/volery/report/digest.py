@@ -19,8 +19,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from volery.base.frames import quaternion_to_euler
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.report.grids import heading
+from volery.report.published_maps import PublishedMaps, TrueTrack
 from volery.requirements.record import DELIVERY_KIND
 from volery.trace.attachments import RunSetup, Scenery
 from volery.trace.events import (
@@ -34,6 +36,7 @@ from volery.trace.events import (
     Milestone,
     Omitted,
     Operation,
+    Published,
     Slice,
     Text,
     VehicleState,
@@ -97,7 +100,7 @@ def thin_curve(values: Floats, stretches: int) -> Indexes:
 
 _BIN: Ns = 500 * MS  # holds as many activations of the usual periods each time
 _MOST_BINS = 300
-_TRACK_TOLERANCE_M = 0.15
+TRACK_TOLERANCE_M = 0.15
 _CURVE_STRETCHES = 350
 _MOST_REMARKS = 400
 _MOST_SUBJECTS = 60  # of a kind of notes
@@ -113,7 +116,7 @@ class _Track:
 
     kind: str
     columns: dict[str, array[float]] = field(
-        default_factory=lambda: {name: array("d") for name in ("t", "x", "y", "z", "v", "battery")}
+        default_factory=lambda: {name: array("d") for name in ("t", "x", "y", "z", "yaw", "v", "battery")}
     )
     modes: list[tuple[float, str, bool]] = field(default_factory=list)
 
@@ -129,11 +132,17 @@ class _Track:
         columns["x"].append(x)
         columns["y"].append(y)
         columns["z"].append(z)
+        _, _, yaw = quaternion_to_euler((event.qw, event.qx, event.qy, event.qz))
+        columns["yaw"].append(yaw)
         columns["v"].append(hypot(event.vx, event.vy, event.vz))
         columns["battery"].append(event.battery)
 
     def column(self, name: str) -> Floats:
         return np.frombuffer(self.columns[name], dtype=np.float64)
+
+    def true_track(self) -> TrueTrack:
+        places = self.column("x") + 1j * self.column("y")
+        return TrueTrack(self.column("t"), places, self.column("yaw"))
 
 
 class Digest:
@@ -155,6 +164,7 @@ class Digest:
         self._lost: dict[str, list[int]] = {}
         self._omitted: dict[str, list[int]] = {}
         self._last: Ns = 0
+        self._maps = PublishedMaps()
         self.takers: dict[type[Any], Callable[[Any], None]] = {
             VehicleState: self._state,
             Slice: self._slice,
@@ -162,6 +172,7 @@ class Digest:
             Milestone: self._milestone,
             Message: self._message,
             Omitted: self._omission,
+            Published: self._maps,
             **dict.fromkeys((Collision, Failure, Operation, LinkState, Text), self._remark),
         }
         """What adds an event of each kind that matters."""
@@ -261,6 +272,7 @@ class Digest:
             "processors": [self._processor(name) for name in self._load],
             "notes": [self._notes(kind, subjects) for kind, subjects in self._noted.items()],
             "collisions": self._collisions,
+            **self._maps.data({name: track.true_track() for name, track in self._tracks.items()}),
             "remarks": sorted(self._remarks, key=lambda remark: float(remark["t"])),
             "left_out": self._left_out,
             "omitted": [
@@ -358,7 +370,8 @@ def _seconds(at: Ns) -> float:
     return round(at / S, 3)
 
 
-def _rounded(values: Floats, digits: int) -> list[float]:
+def rounded(values: Floats, digits: int) -> list[float]:
+    """Return values for JSON."""
     found: list[float] = np.round(values, digits).tolist()
     return found
 
@@ -366,24 +379,25 @@ def _rounded(values: Floats, digits: int) -> list[float]:
 def _vehicle(name: str, track: _Track) -> Json:
     times = track.column("t")
     points = np.column_stack([track.column("x"), track.column("y"), track.column("z")])
-    kept = thin_track(times, points, _TRACK_TOLERANCE_M)
+    kept = thin_track(times, points, TRACK_TOLERANCE_M)
     return {
         "name": name,
         "kind": track.kind,
-        "t": _rounded(times[kept], 2),
-        "x": _rounded(points[kept, 0], 2),
-        "y": _rounded(points[kept, 1], 2),
-        "z": _rounded(points[kept, 2], 2),
+        "t": rounded(times[kept], 2),
+        "x": rounded(points[kept, 0], 2),
+        "y": rounded(points[kept, 1], 2),
+        "z": rounded(points[kept, 2], 2),
         "modes": [[round(at, 2), mode, armed] for at, mode, armed in track.modes],
-        "height": _curve(times, track.column("z")),
-        "speed": _curve(times, track.column("v")),
-        "battery": _curve(times, 100.0 * track.column("battery")),
+        "height": curve_json(times, track.column("z")),
+        "speed": curve_json(times, track.column("v")),
+        "battery": curve_json(times, 100.0 * track.column("battery")),
     }
 
 
-def _curve(times: Floats, values: Floats) -> Json:
+def curve_json(times: Floats, values: Floats) -> Json:
+    """Return times and values of a curve for the charts, thinned; NaN is left out."""
     kept = thin_curve(values, _CURVE_STRETCHES)
-    return {"t": _rounded(times[kept], 2), "v": _rounded(values[kept], 2)}
+    return {"t": rounded(times[kept], 2), "v": rounded(values[kept], 2)}
 
 
 def _scenery(scenery: Scenery | None) -> Json | None:

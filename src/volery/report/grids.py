@@ -355,7 +355,7 @@ def _vehicle_row(name: str, one: VehicleRecord) -> tuple[Cell, ...]:
     return (
         Cell(name),
         Cell(one.kind, status="quiet"),
-        Cell(one.autopilot, status="quiet"),
+        Cell(f"{one.autopilot} ({one.firmware})" if one.firmware else one.autopilot, status="quiet"),
         Cell(number(one.distance_m)),
         Cell(number(one.armed_s)),
         Cell(number(one.airborne_s)),

@@ -1,4 +1,4 @@
-"""HTML documents: the report of a run and the comparison of several, each one file that needs no network.
+"""The report of a run as one HTML file that needs no network.
 
 A report is made from the events of a run: while it runs, or later from the trace of its folder alone. If the
 folder has a ``run.json``, its figures are shown, since only ``run.json`` has the wall time; else the accounts
@@ -8,21 +8,17 @@ are computed again from the trace, as for a run that was killed.
 from __future__ import annotations
 
 import json
-import os
 from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
-from rich.console import RenderableType
-
 from volery.base.errors import UsageError
 from volery.base.files import read_text, write_text
 from volery.base.installed import require_extra
-from volery.report.comparison import all_comparisons
 from volery.report.digest import Digest, Json
 from volery.report.grids import (
     Cell,
@@ -34,7 +30,6 @@ from volery.report.grids import (
     chains_grid,
     cost_grid,
     energy,
-    labels,
     last_states,
     laws_grid,
     moment,
@@ -49,7 +44,6 @@ from volery.report.grids import (
     vehicles_grid,
     widest_band,
 )
-from volery.report.terminal import comparison_table
 from volery.requirements.accounts import Accounts
 from volery.requirements.record import RUN_FILE, RunRecord, Status, read_record, write_record
 from volery.trace.attachments import WORLD_ATTACHMENT, RunSetup, scenery_from_json
@@ -172,7 +166,7 @@ def write_document(material: ReportContent, folder: Path) -> Path:
     return path
 
 
-SCRIPTS = ("stage", "map", "charts", "player")
+SCRIPTS = ("stage", "map", "charts", "pictures", "player")
 """Scripts of a page, in the order in which they run."""
 
 
@@ -213,6 +207,9 @@ def render(material: ReportContent) -> str:
             moving=bool(data["vehicles"]),
             computing=any(processor["components"] for processor in data["processors"]),
             end=data["end"],
+            maps=data["maps"],
+            layers=_layers(data),
+            pictures=[{"topic": one["topic"], "at": moment(one["t"])} for one in data["pictures"]],
             cost=cost_grid(record),
             chains=chains_grid(record),
             preemptions=preemptions_grid(record),
@@ -243,6 +240,23 @@ def _omitted(topics: list[Json]) -> list[str]:
         f"volery simulate --record {one['topic']} records their content, too"
         for one in topics
     ]
+
+
+def _layers(data: Json) -> list[dict[str, str]]:
+    """Return the legend of what nodes published of maps: colours and words."""
+    layers = []
+    for one in data["maps"]:
+        fit = f", within {100.0 * one['error']:.0f} cm of the track of {one['vehicle']}"
+        layers.append(_layer("ink", one, f"map{fit if one['vehicle'] else ''}"))
+    for one in data["paths"]:
+        layers.append(
+            _layer("accent", one, "way come") if one["past"] else _layer("warn", one, "planned path")
+        )
+    return layers + [_layer("noflight", one, "scan") for one in data["scans"]]
+
+
+def _layer(colour: str, one: Json, words: str) -> dict[str, str]:
+    return {"colour": colour, "text": f"{one['topic']} at {moment(one['t'])[:-4]}: {words}"}
 
 
 def embedded(data: Any) -> Markup:
@@ -371,78 +385,6 @@ def _remarks(remarks: list[Json]) -> Grid:
 def _footer(record: RunRecord) -> str:
     made = [f"{name} {version}" for name, version in record.versions.items()]
     return " · ".join(["volery: one model, simulated, priced and flown", *made])
-
-
-COMPARISON_FILE = "comparison.html"
-
-
-class Comparison(NamedTuple):
-    """Comparison of runs, as an HTML document and as a table for the terminal."""
-
-    html: str
-    table: RenderableType
-
-
-def compare(folders: Sequence[Path], beside: Path | None = None) -> Comparison:
-    """Compare runs.
-
-    Args:
-        folders: Run folders, at least two.
-        beside: Folder of the comparison, to which the links to the reports are relative; None for no links.
-
-    Raises:
-        UsageError: There are fewer than two folders, or one has no run.
-    """
-    if len(folders) < 2:
-        raise UsageError(f"a comparison takes at least two run folders, not {len(folders)}")
-    records = [_read_record(folder) for folder in folders]
-    names = [folder.resolve().name for folder in folders]
-    called = labels(records, names)
-    html = (
-        environment()
-        .get_template("comparison.html.j2")
-        .render(
-            title=" and ".join(dict.fromkeys(record.system or "a run" for record in records)),
-            subtitle=" · ".join(called),
-            grids=all_comparisons(called, records),
-            runs=[
-                {
-                    "label": label,
-                    "link": _link(folder, beside),
-                    "not_counted": record.not_counted,
-                    "warnings": record.warnings,
-                    "unserved": [str(one) for one in record.unserved],
-                }
-                for label, folder, record in zip(called, folders, records, strict=True)
-            ],
-            footer="volery: one model, simulated, priced and flown",
-        )
-    )
-    return Comparison(html, comparison_table(records, names))
-
-
-def write_comparison(folders: Sequence[Path], into: Path) -> Path:
-    """Write ``comparison.html`` into a folder and return its path. Raises as ``compare`` does."""
-    path = into / COMPARISON_FILE
-    text = compare(folders, into).html
-    try:
-        write_text(path, text)
-    except OSError as error:
-        raise UsageError(f"cannot write {path}: {error.strerror or error}") from error
-    return path
-
-
-def _read_record(folder: Path) -> RunRecord:
-    if (folder / RUN_FILE).exists():
-        return read_record(folder)
-    return gather(folder).record
-
-
-def _link(folder: Path, beside: Path | None) -> str:
-    report = folder / REPORT_FILE
-    if beside is None or not report.exists():
-        return ""
-    return Path(os.path.relpath(report.resolve(), beside.resolve())).as_posix()
 
 
 TIMELINE_FILE = "timeline.json"

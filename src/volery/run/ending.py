@@ -60,6 +60,10 @@ class Ending:
         self.reason = ""
         self.error: VoleryError | None = None
         self.begun = False
+        self.signalled = False
+        """Whether a signal has asked for the end, which begins when time passes next."""
+        self.status_by_signal: Status = "interrupted"
+        """Status of a run that a signal ends."""
         self._farewells: list[tuple[ExecutionContext, Callable[[], object]]] = []
         self._failures: list[str] = []
         self._landing: set[str] = set()
@@ -234,9 +238,10 @@ class Ending:
             if number != signal.SIGHUP and (second or (self.begun and not received)):
                 raise KeyboardInterrupt
             received.append(number)
+            self.signalled = True
             if not self.begun:
                 self._kernel.post(
-                    lambda: self.begin("interrupted", f"{signal.Signals(number).name} received")
+                    lambda: self.begin(self.status_by_signal, f"{signal.Signals(number).name} received")
                 )
 
         with on_ending_signals(handle):

@@ -19,6 +19,7 @@ from volery.components.programs import load_function
 from volery.components.virtual_stdlib import virtual_modules
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
+from volery.requirements.accounts import FRAMEWORK, WARNING
 from volery.run.assembly.vehicles import ObservedVehicles, OpenedVehicles, VehicleSettings, open_vehicles
 from volery.run.ending import Ending
 from volery.run.last_defence import LastDefence
@@ -32,7 +33,7 @@ from volery.trace.attachments import (
     VehicleSetup,
     to_json,
 )
-from volery.trace.events import Failure
+from volery.trace.events import Failure, Text
 from volery.trace.mcap_writer import Attachment
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import parse
@@ -94,6 +95,11 @@ def fly(
         UsageError: An address, the file or its definitions are wrong; nothing has started.
         CapabilityError: The vehicles cannot be flown together or in this way; nothing has started.
     """
+    if options.record_topics:
+        raise UsageError(
+            f"record {options.record}: a mission has no topics of its own; record those of a real graph "
+            "with `volery ros bag record`, and those of a model with `volery simulate --record`"
+        )
     urls = [on] if isinstance(on, str) else list(on)
     if not urls:
         raise UsageError("fly: no address is given; sim:ardupilot is one")
@@ -118,6 +124,8 @@ class _Flight:
             home=home_of(function),
             limits=restrictions.applied_to(_global_of(function, "LIMITS", Limits)),
             fence=restrictions.fence or _global_of(function, "FENCE", Fence),
+            run_folder=options.folder,
+            tell=options.tell,
         )
         named = names_of(urls)
         self._opened: OpenedVehicles = open_vehicles(named, dict.fromkeys(named, kind_of(function)), stated)
@@ -169,11 +177,16 @@ class _Flight:
         opened, path = self._opened, self._path
         vehicles = tuple(
             VehicleSetup(
-                vehicle.name, parse(url).driver, "multirotor" if isinstance(vehicle, Drone) else "rover"
+                vehicle.name,
+                parse(url).driver,
+                "multirotor" if isinstance(vehicle, Drone) else "rover",
+                opened.fleet.program(vehicle.name) if opened.fleet else "",
             )
             for vehicle, url in zip(opened.vehicles, urls, strict=True)
         )
-        fidelity = "code" if opened.fleet else "hardware"
+        fidelity = "hardware"
+        if opened.fleet is not None:
+            fidelity = "firmware" if any(one.firmware for one in vehicles) else "code"
         setup = RunSetup(path.stem if path else "mission", fidelity, seed=seed, vehicles=vehicles)
         attachments = []
         if opened.fleet is not None:
@@ -203,6 +216,8 @@ class _Flight:
                     vehicle.close()
                 self._opened.leave()
                 self._states.record_states()
+                for remark in self._opened.fleet.remarks() if self._opened.fleet else ():
+                    kernel.record(Text(kernel.now(), FRAMEWORK, WARNING, remark))
                 record = self._recording.finish(ending.status, ending.reason, kernel.now(), ())
         return Run(
             record,

@@ -79,7 +79,7 @@ class GoSettings:
 def has_transmitter(url: str) -> bool:
     """Return whether a vehicle may have a transmitter: a real one, or a simulated one with one."""
     address = parse(url)
-    simulated = address.transport == "sim"
+    simulated = address.in_virtual_time
     return not simulated or address.driver in SIMULATED_TRANSMITTERS or "transmitter" in address.options
 
 
@@ -99,7 +99,7 @@ def with_rates(url: str, switch: SwitchSettings | None) -> str:
     added = {name: value for name, value in RATES.items() if name in MAVLINK_OPTIONS}
     if switch is None:
         del added["rc"]
-    elif address.transport == "sim":
+    elif address.in_virtual_time:
         added["transmitter"] = f"{switch.channel}:{sum(switch.middle) // 2}"
     missing = [f"{name}={value}" for name, value in added.items() if name not in address.options]
     return f"{url}{'&' if '?' in url else '?'}{'&'.join(missing)}" if missing else url
@@ -127,7 +127,7 @@ def go(
     """
     manoeuvre = make()
     gains = GainsFile(settings.gains, manoeuvre) if settings.gains is not None else None
-    if settings.graph and options.pace is None and parse(on).transport == "sim":
+    if settings.graph and options.pace is None and parse(on).in_virtual_time:
         options = replace(options, pace=1.0)
 
     def mission(drone: Drone) -> None:

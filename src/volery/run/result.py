@@ -233,7 +233,8 @@ class Options:
     """Options of a run.
 
     Attributes:
-        fidelity: ``times`` (stated execution times) or ``code`` (cost of the components' own code).
+        fidelity: ``times`` (stated execution times), ``code`` (cost of the components' own code) or
+            ``firmware`` (that of ``code``, and vehicles on programs of real firmware).
         seed: Seed of every random stream.
         pace: Simulated seconds per wall second, or None for as fast as possible.
         out: Run folder, or None to keep nothing.

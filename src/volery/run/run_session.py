@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -21,9 +21,10 @@ from volery.ros.graph.graph_context import Recorded
 from volery.run.assembly.component_builder import Builder, BuiltComponents, with_executables
 from volery.run.assembly.computers import Platform, PowerFeed
 from volery.run.assembly.fault_effects import Affected, FleetLinks, inject, with_faulty_links
+from volery.run.assembly.firmware_programs import ProgramFolder, on_real_firmware
 from volery.run.assembly.model_checks import vocabulary
 from volery.run.assembly.place_services import serve_batteries, serve_loads
-from volery.run.assembly.simulated_fleet import SimulatedFleet, surroundings_of
+from volery.run.assembly.simulated_fleet import OutsideAutopilot, SimulatedFleet, surroundings_of
 from volery.run.distributed import (
     DistributedRun,
     GraphSettings,
@@ -57,8 +58,11 @@ NO_TRUTH = "its components are started by others, which cannot see the true stat
 PATIENCE_S = 30.0
 """Wall seconds that a component may compute without letting virtual time pass."""
 
-FIDELITIES = ("times", "code")
-LATER = ("firmware", "hardware")
+TIMES, CODE, FIRMWARE = FIDELITIES = ("times", "code", "firmware")
+LATER = ("hardware",)
+
+NO_LIMIT: Ns = 0
+"""Duration of a run that goes on until something ends it; no model states it."""
 
 GOAL_PERIOD: Ns = 100 * MS
 """Period at which the model's ``until`` is checked."""
@@ -88,6 +92,17 @@ def read_system(
     if not isinstance(model, System):
         model = load(model, vocabulary(), scenario, allocation, overrides)
     return with_executables(model)
+
+
+def _on_real_firmware(system: System) -> tuple[System, tuple[str, ...]]:
+    """Return a model whose vehicles fly on real firmware, and why some do not."""
+    vehicles = on_real_firmware(system.vehicles)
+    remarks = tuple(
+        f"{one.name} flies on the simulated {one.autopilot}: no real firmware of it flies in virtual time"
+        for one in vehicles
+        if one.firmware is None
+    )
+    return replace(system, environment=replace(system.environment, vehicles=vehicles)), remarks
 
 
 class RunSession:
@@ -126,6 +141,9 @@ class RunSession:
     ) -> None:
         check_fidelity(options.fidelity)
         self._system = read_system(model, scenario, allocation, overrides)
+        self._simulated: tuple[str, ...] = ()
+        if options.fidelity == FIRMWARE:
+            self._system, self._simulated = _on_real_firmware(self._system)
         self._options = options
         self._kernel = VirtualKernel(pace=options.pace, watchdog_s=PATIENCE_S)
         self._ending = Ending(self._kernel)
@@ -264,6 +282,10 @@ class RunSession:
         )
         return builder.build(options.fidelity, options.seed, options.traces)
 
+    def _outside(self) -> Mapping[str, OutsideAutopilot]:
+        """Return the autopilots that others bring, by vehicle."""
+        return {}
+
     def _recorded(self, topic: str) -> Recorded:
         """Return what is recorded of a topic when a node publishes it."""
         self._unpublished.discard(topic)
@@ -283,6 +305,8 @@ class RunSession:
             surroundings_of(environment),
             options.seed,
             through_bytes=with_faulty_links(environment),
+            programs=ProgramFolder(options.folder, options.tell),
+            outside=self._outside(),
         )
         self._opened.callback(self._fleet.close)
         self._fleet.on_collision = self._ending.vehicle_hit
@@ -326,9 +350,9 @@ class RunSession:
             return
         self._thread = current_thread()
         ending = self._ending
-        self._kernel.call_at(
-            self._system.limits.duration_ns, lambda: ending.begin("completed", "its time is up")
-        )
+        duration = self._system.limits.duration_ns
+        if duration != NO_LIMIT:
+            self._kernel.call_at(duration, lambda: ending.begin("completed", "its time is up"))
         self._start()
 
     def _check_thread(self) -> None:
@@ -348,7 +372,8 @@ class RunSession:
         self._built.finish()
         self._fleet.record_states()
         unpublished = (f"record {one}: no node published this topic" for one in sorted(self._unpublished))
-        for warning in (*self._built.warnings(), *self._log.finish(), *unpublished):
+        remarks = (*self._fleet.remarks(), *self._simulated)
+        for warning in (*self._built.warnings(), *self._log.finish(), *unpublished, *remarks):
             self._recording.stream(Text(now, WHO, WARNING, warning))
         for one in self._built.unserved():
             self._recording.stream(one)

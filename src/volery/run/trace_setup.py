@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 from volery.cost import NOT_COUNTED, Basis, ProcessorPrices
 from volery.model.components import CPP_LANGUAGES
-from volery.model.environment import Environment, Prism, Ways
+from volery.model.environment import Environment, Prism, Vehicle, Ways
 from volery.model.instances import Instance
 from volery.model.system import Processor, System
 from volery.run.assembly.computers import Platform
@@ -54,7 +55,7 @@ def setup_of(system: System, platform: Platform, seed: int, fidelity: str) -> Ru
         ),
         processors=tuple(_processor(model, platform.prices[model.name]) for model in system.processors),
         networks=tuple(NetworkSetup(one.name) for one in system.networks),
-        vehicles=tuple(VehicleSetup(one.name, one.autopilot, one.kind) for one in system.vehicles),
+        vehicles=tuple(_vehicle(one) for one in system.vehicles),
         chains=tuple(ChainSetup(one.name, one.topics) for one in system.chains),
         requirements=tuple(
             RequirementSetup(one.name, one.observe, one.relation, one.bound, one.unit)
@@ -78,6 +79,11 @@ def _component(instance: Instance) -> ComponentSetup:
         deadline=_or_none(activity.deadline_ns if activity else None),
         priority=activity.priority if activity else 0,
     )
+
+
+def _vehicle(vehicle: Vehicle) -> VehicleSetup:
+    firmware = Path(vehicle.firmware.program).name if vehicle.firmware else ""
+    return VehicleSetup(vehicle.name, vehicle.autopilot, vehicle.kind, firmware)
 
 
 def _or_none(value: int | None) -> int:
@@ -111,7 +117,7 @@ def _laws(system: System, platform: Platform, fidelity: str) -> Iterable[LawSetu
         first.setdefault(one.kind, one)
     for kind, model in first.items():
         prices = platform.prices[model.name]
-        code = _code_bases(system, prices, kind) if fidelity == "code" else ()
+        code = _code_bases(system, prices, kind) if fidelity != "times" else ()
         for basis in (*prices.ros_basis(), *code, *prices.power_basis()):
             yield LawSetup(basis.law, basis.source, basis.provenance, basis.validity, basis.warning)
 

@@ -46,7 +46,7 @@ def teleop(
 
     settings = GoSettings(by=by, height=height)
     limits = teleoperation.Limits(speed=speed_limit, turn=turn_limit)
-    pace = 1.0 if parse(url).transport == "sim" else None
+    pace = 1.0 if parse(url).in_virtual_time else None
     with ExitStack() as stack:
         source: Input
         if joystick is not None:

@@ -259,24 +259,38 @@ def _write_text(file: Path, text: str) -> None:
 def libraries(
     output: Output,
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Table to be written.")],
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LIBRARY", help="Measure only cv2, gtsam, small_gicp or autonomy; may be repeated."
+        ),
+    ] = None,
 ) -> int:
-    """Measure the times of calls of compiled libraries (numpy, json, re, ...) and write them as a table.
+    """Measure the times of calls of compiled libraries (numpy, json, re, cv2, ...) and write them as a table.
 
     The table that comes with volery is such a file; its times are scaled to other processors like those of
-    Python's operations.
+    Python's operations. `autonomy` are volery's own maps, paths and markers. OpenCV, gtsam and small_gicp are
+    measured where they are installed. With --only the other entries are those of volery's table.
     """
     from volery.calibration.host_machine import this_machine
-    from volery.calibration.library_times import TIMED_CALLS, measure_table
+    from volery.calibration.library_times import measure_table, measured_again
     from volery.calibration.timed_code import DEFAULT_ROUNDS
+    from volery.cost import library_table
 
     machine = this_machine("")
     with _progress_bar(output, "calibrating libraries", "timing programs") as update:
-        table = measure_table(
-            machine.description, DEFAULT_ROUNDS, lambda name, number: update(number, TIMED_CALLS, name)
-        )
+
+        def show(name: str, number: int, whole: int) -> None:
+            update(number, whole, name)
+
+        if only:
+            table = measured_again(library_table(), only, DEFAULT_ROUNDS, show)
+        else:
+            table = measure_table(machine.description, DEFAULT_ROUNDS, show)
     _write_text(file, table.as_text())
     output.note(
-        f"{file}: {len(table.calls)} functions; in programs numpy takes {table.in_context:.2f} times as long"
+        f"{file}: {len(table.calls)} functions, {len(table.work)} blocks of autonomy; "
+        f"in programs numpy takes {table.in_context:.2f} times as long"
     )
     return OK
 

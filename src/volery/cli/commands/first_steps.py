@@ -37,6 +37,12 @@ from volery.base.process import on_ending_signals
 from volery.cli.command import FAILED, OK, Commands
 from volery.cli.console import Output
 from volery.cli.options import Seed
+from volery.simulation.real_firmware.program_search import (
+    USUAL_PROGRAMS,
+    find_program,
+    how_to_get,
+    project_of,
+)
 
 if TYPE_CHECKING:
     from volery.cli.run_display import Drawings
@@ -85,7 +91,7 @@ def demo(
     require_extra("simulation", "simulated runs")
     from volery.cli.run_display import unmet
     from volery.model.system_loader import load
-    from volery.report.html_report import write_comparison
+    from volery.report.comparison_page import Comparison, read_side
     from volery.report.terminal import short_comparison
     from volery.run.assembly.model_checks import vocabulary
     from volery.run.recording import make_folder
@@ -108,8 +114,8 @@ def demo(
         for problem in outcome.problems:
             output.complain(f"volery: {name}: {problem}")
         output.note(f"report: {outcome.folder / 'report.html'}")
-    comparison = write_comparison([outcome.folder for outcome in outcomes.values()], out)
-    output.note(f"side by side: {comparison}")
+    comparison = Comparison([read_side(outcome.folder) for outcome in outcomes.values()])
+    output.note(f"side by side: {comparison.write(out)}")
     return OK if all(outcome.completed for outcome in outcomes.values()) else FAILED
 
 
@@ -323,6 +329,17 @@ def program(*names: str) -> Callable[[], str]:
     return lambda: next((found for name in names if (found := shutil.which(name))), "")
 
 
+def _firmware(name: str) -> Part:
+    def find() -> str:
+        try:
+            return str(find_program(name))
+        except UsageError:
+            return ""
+
+    enables = f"real firmware in virtual time: --fidelity firmware, firmware:{project_of(name)}"
+    return Part(name, find, enables, how_to_get(name))
+
+
 def _python() -> str:
     return platform.python_version() if sys.version_info >= MINIMUM_PYTHON else ""
 
@@ -365,7 +382,7 @@ PARTS: tuple[Part, ...] = (
     Part(
         "g++ or clang++",
         program("g++", "clang++"),
-        "components in C++ (language c++ or roscpp)",
+        "components in C++ (language c++, roscpp or rclcpp)",
         "apt install g++",
     ),
     Part(
@@ -374,6 +391,7 @@ PARTS: tuple[Part, ...] = (
         "cost of C++ code on another processor",
         "apt install clang-19 llvm-19",
     ),
+    *(_firmware(name) for name in USUAL_PROGRAMS),
     Part("addr2line", program("addr2line"), "the line where a C++ component crashed", "apt install binutils"),
     Part(
         "a browser",

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from os import W_OK, access
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.progress import track
@@ -33,23 +34,28 @@ def map(  # noqa: A001  # the name of the command
     out: Annotated[
         Path, typer.Option(help="Name of the map: NAME.pgm, NAME.yaml (map_server's) and NAME.csv (its way).")
     ] = Path("map"),
-    scan: Annotated[str, typer.Option(metavar="TOPIC", help="LaserScan topic of a bag with several.")] = "",
+    source: Annotated[
+        Literal["scanner", "camera"],
+        typer.Option("--from", help="Laser scans, or pictures of a camera in a bag: depths, or grey ones."),
+    ] = "scanner",
+    scan: Annotated[
+        str, typer.Option(metavar="TOPIC", help="LaserScan or Image topic of a bag with several.")
+    ] = "",
     odometry: Annotated[
         str, typer.Option(metavar="TOPIC", help="Odometry topic of a bag with several.")
     ] = "",
     resolution: Annotated[float, typer.Option(metavar="METRES", help="Side of a cell.")] = 0.05,
     allow_loss: AllowLoss = False,
 ) -> int:
-    """Make a map of a recording of planar laser scans: matching, loop closure, an occupancy grid."""
+    """Make a map of a recording of scans or pictures: matching, loop closure, an occupancy grid."""
     from volery.autonomy.laser_logs import read_laser_log
     from volery.autonomy.occupancy_grid import OccupancyGrid
-    from volery.autonomy.slam import BLIND, Slam, SlamSettings
+    from volery.autonomy.slam import Slam
 
-    if not out.parent.is_dir():
-        raise UsageError(f"--out {out}: there is no folder {out.parent}")
+    _check_names(out)
     grid = OccupancyGrid(resolution)
-    log = read_laser_log(recording, scan, odometry)
-    slam = Slam(SlamSettings() if log.odometry else BLIND)
+    log = read_laser_log(recording, scan, odometry, of_camera=source == "camera")
+    slam = Slam(log.settings)
     shown = track(
         log.steps, f"mapping {recording.name}", console=output.notes, disable=not output.shows_progress
     )
@@ -58,13 +64,19 @@ def map(  # noqa: A001  # the name of the command
         number += 1
         slam.add(step.odometry, step.scan)
     if not slam.scans:
-        raise UsageError(f"{recording}: none of its {number} scans has met anything")
+        why = [f"none of its {number} scans has met anything" if number else "no scan of it can be used"]
+        raise UsageError(f"{recording}: {'; '.join(why + log.damage)}")
     slam.finish()
     for kept, pose in zip(slam.scans, slam.poses, strict=True):
         grid.insert(pose, kept.scan)
-    picture, text = grid.save(out)
     way = out.with_name(f"{out.name}.csv")
-    _write_way(way, slam)
+    try:
+        picture, text = grid.save(out)
+        _write_way(way, slam)
+    except OSError as error:
+        raise UsageError(
+            f"--out {out}: {error.filename or way} cannot be written: {error.strerror}"
+        ) from None
     first, last = slam.scans[0].scan.time, slam.scans[-1].scan.time
     rows, columns = grid.log_odds.shape
     values = {
@@ -90,9 +102,21 @@ def map(  # noqa: A001  # the name of the command
     return LEFT_OUT if log.damage and not allow_loss else OK
 
 
+def _check_names(out: Path) -> None:
+    """Say before the map is made that it could not be written."""
+    if not out.name.strip("."):
+        raise UsageError(f"--out {str(out)!r}: give a name, such as --out {out / 'map'}")
+    if not out.parent.is_dir():
+        raise UsageError(f"--out {out}: there is no folder {out.parent}")
+    for suffix in ("pgm", "yaml", "csv"):
+        file = out.with_name(f"{out.name}.{suffix}")
+        if file.is_dir() or not access(file if file.exists() else out.parent, W_OK):
+            raise UsageError(f"--out {out}: {file} cannot be written; give another name")
+
+
 def _write_way(path: Path, slam: Slam) -> None:
     lines = ["# time_s, x_m, y_m, yaw_rad\n"]
     for kept, pose in zip(slam.scans, slam.poses, strict=True):
-        seconds, rest = divmod(kept.scan.time, 1_000_000_000)
-        lines.append(f"{seconds}.{rest:09d},{pose.x:.4f},{pose.y:.4f},{pose.yaw:.5f}\n")
+        sign, (seconds, rest) = "-" * (kept.scan.time < 0), divmod(abs(kept.scan.time), 1_000_000_000)
+        lines.append(f"{sign}{seconds}.{rest:09d},{pose.x:.4f},{pose.y:.4f},{pose.yaw:.5f}\n")
     path.write_text("".join(lines), encoding="utf-8")

@@ -1,8 +1,8 @@
-"""``volery model import`` and ``export``: models of other tools to YAML, and back."""
+"""``volery model import`` and ``export``: models of other tools and launch files to YAML, and back."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,7 +14,11 @@ from volery.cli.console import Output
 from volery.cli.options import AllowLoss, Model
 
 if TYPE_CHECKING:
-    from volery.exchange.uml.context import Note
+    from volery.exchange.convert import ImportedLaunch
+    from volery.exchange.launch.launch_model import Computer
+    from volery.exchange.notes import Note
+    from volery.exchange.uml.uml_model import Imported
+    from volery.model.reading import ProcessorKind
 
 commands = Commands("model")
 
@@ -27,25 +31,49 @@ Processors = Annotated[
     ),
 ]
 
+Search = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--search", metavar="DIR", help="Folder in which packages of a launch file are; may be repeated."
+    ),
+]
+
 
 @commands.add("quiet", "json", "debug", name="import")
 def import_(
     output: Output,
-    source: Annotated[Path, typer.Argument(metavar="FILE.uml", help="UML model with MARTE or S3D.")],
+    source: Annotated[
+        Path, typer.Argument(metavar="FILE", help="UML model with MARTE or S3D, or a launch file of ROS.")
+    ],
+    arguments: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME:=VALUE]...", help="Arguments of a launch file.")
+    ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="FILE", help="Model to write.")] = Path("model.yaml"),
     processors: Processors = None,
+    search: Search = None,
     replace: Annotated[bool, typer.Option("--replace", help="Write over a model that exists.")] = False,
     allow_loss: AllowLoss = False,
 ) -> int:
-    """Write the YAML of a UML model with MARTE and S3D, as Papyrus stores it.
+    """Write the YAML of a UML model with MARTE and S3D, or of a launch file of ROS 1 or ROS 2.
 
-    The exit status is 3 if something of the file was left out.
+    A launch file (XML, YAML or Python) is read and never executed. The exit status is 3 if something of the
+    file was left out.
     """
-    from volery.exchange.convert import import_model
+    from volery.components.package_search import PackageSearch
+    from volery.exchange.convert import import_launch, import_model, is_launch_file
     from volery.run.assembly.model_checks import vocabulary
 
-    known = vocabulary().processors
-    imported = import_model(source, out, known, _pairs(processors or (), known), replace=replace)
+    imported: ImportedLaunch | Imported
+    words = vocabulary().processors
+    if is_launch_file(source):
+        given = _launch_arguments(arguments or ())
+        packages = PackageSearch(_folders(search or ()))
+        computer = _computer(processors or (), words)
+        imported = import_launch(source, out, given, packages, computer, replace=replace)
+    else:
+        if arguments or search:
+            raise UsageError(f"{source} is no launch file: NAME:=VALUE and --search are for one")
+        imported = import_model(source, out, words, _pairs(processors or (), words), replace=replace)
     counts = [
         f"{len(imported.tree.get(key) or {})} {key}" for key in ("interfaces", "components", "application")
     ]
@@ -55,22 +83,62 @@ def import_(
     return _status(imported.notes, allow_loss)
 
 
+def _launch_arguments(texts: Iterable[str]) -> dict[str, str]:
+    given = {}
+    for text in texts:
+        name, mark, value = text.partition(":=")
+        if not mark or not name:
+            raise UsageError(f"{text}: an argument of a launch file is NAME:=VALUE")
+        given[name] = value
+    return given
+
+
+def _computer(processors: Iterable[str], words: Mapping[str, ProcessorKind]) -> Computer:
+    """Return the computer of the nodes of a launch file, at its greatest frequency."""
+    from volery.exchange.launch.launch_model import COMPUTER, Computer
+
+    stated = _pairs(processors, words)
+    if stated.keys() - {COMPUTER}:
+        listed = ", ".join(sorted(stated.keys() - {COMPUTER}))
+        raise UsageError(f"--processor {listed}: the computer of a launch file's nodes is {COMPUTER}=KIND")
+    kind = stated.get(COMPUTER, _USUAL)
+    return Computer(kind, words[kind].greatest_hz, assumed=not stated)
+
+
+_USUAL = "rpi4-cortex-a72"
+"""The computer of a launch file's nodes if none is stated."""
+
+
+def _folders(search: Iterable[Path]) -> list[Path]:
+    folders = list(search)
+    for one in folders:
+        if not one.is_dir():
+            raise UsageError(f"--search {one}: there is no such folder")
+    return folders
+
+
 @commands.add("quiet", "json", "debug")
 def export(
     output: Output,
     model: Model,
-    to: Annotated[Path, typer.Option("--to", metavar="FILE", help="FILE.uml, FILE.aadl or FILE.sysml.")],
+    to: Annotated[
+        Path,
+        typer.Option(
+            "--to", metavar="FILE", help="FILE.uml, .aadl, .sysml, .launch, .launch.xml or .launch.py."
+        ),
+    ],
     allow_loss: AllowLoss = False,
 ) -> int:
-    """Write a model as UML with MARTE and S3D, AADL or SysML v2; list what has no place there.
+    """Write a model as UML with MARTE and S3D, AADL, SysML v2 or a launch file; list what has no place there.
 
     A .uml file that exists is updated: its ids, its diagrams and what volery does not know stay valid. The
     exit status is 3 if something of the model was left out.
     """
+    from volery.components.package_search import PackageSearch
     from volery.exchange.convert import export_model
     from volery.run.assembly.model_checks import vocabulary
 
-    notes = export_model(model, to, vocabulary())
+    notes = export_model(model, to, vocabulary(), PackageSearch())
     output.show(f"{to} is written")
     _notes(output, notes)
     output.give({"file": str(to), "notes": [str(one) for one in notes]})

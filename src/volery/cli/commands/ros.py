@@ -263,30 +263,43 @@ def _progress_bar(output: Output, total: float, words: str) -> Iterator[Callable
 
 commands = Commands("ros", "Put vehicles and models on real ROS; look at graphs and recordings.")
 
+ROS_2 = 2
+
 
 @commands.add("quiet", "debug")
 def bridge(
     output: Output,
-    url: Annotated[
-        str,
+    words: Annotated[
+        list[str] | None,
         typer.Argument(
-            metavar="URL", help="Address of the vehicle, such as ardupilot+serial:///dev/ttyUSB0 or sim:px4."
+            metavar="[URL] [ROS ARGUMENTS]...",
+            help="Address of the vehicle, such as ardupilot+serial:///dev/ttyUSB0 or sim:px4; what roslaunch "
+            "and ros2 launch add (__name:=, _fcu_url:=, --ros-args) with MAVROS's parameters.",
         ),
-    ],
-    graph: Annotated[str, typer.Option(metavar="ros1|ros2", help="ROS graph.")] = "ros1",
+    ] = None,
+    graph: Annotated[
+        str,
+        typer.Option(metavar="ros1|ros2", help="ROS graph; by default ros1, and ros2 after --ros-args."),
+    ] = "",
     names: Annotated[
         str,
         typer.Option(
-            metavar="mavros|roscopter|pprzros",
-            help="Names of topics and services. pprzros is for Paparazzi only.",
+            metavar="mavros|roscopter|pprzros|px4|ardupilot",
+            help="Names of topics and services. pprzros is for Paparazzi only, px4 (of 1.17; of older "
+            "versions px4-1.16, px4-1.15 and px4-1.14) for PX4, ardupilot (of 4.8; also ardupilot-4.5) for "
+            "ArduPilot.",
         ),
     ] = "",
     namespace: Annotated[
         str, typer.Option(metavar="/NAME", help="Namespace of the names, such as /mavros.")
     ] = "",
     rate: Annotated[
-        int, typer.Option(help="Rate that is requested from the autopilot, Hz; 0 requests nothing.")
-    ] = 10,
+        int | None,
+        typer.Option(
+            help="Rate that is requested from the autopilot, Hz; 0 requests nothing. By default 10, and 50 "
+            "under PX4's own names, 30 under ArduPilot's."
+        ),
+    ] = None,
     enable_control: Annotated[
         bool,
         typer.Option(
@@ -302,16 +315,21 @@ def bridge(
     ] = 1.0,
     seed: Seed = 1,
 ) -> int:
-    """Put a vehicle on a real ROS graph under the names of MAVROS, roscopter or pprzros, until Ctrl-C.
+    """Put a vehicle on a real ROS graph under names of MAVROS, roscopter, pprzros or its own, until Ctrl-C.
 
     Works in real time over serial lines (57600 baud unless the address says ?baud=...), UDP and TCP. A link
     that breaks is opened again.
     """
     from volery.run.bridge import Bridge, BridgeOptions
+    from volery.run.node_arguments import mavros_options, node_arguments, with_server_parameters
 
+    given = node_arguments(words or ())
+    url, *rest = given.words or ("",)
+    if rest:
+        raise UsageError(f"{rest[0]}: one address is expected, and {url} is one already")
     options = BridgeOptions(
         url=url,
-        graph=graph,
+        graph=graph or ("ros2" if given.ros == ROS_2 else "ros1"),
         names=names,
         namespace=namespace,
         rate=rate,
@@ -321,10 +339,15 @@ def bridge(
         speed=speed,
         seed=seed,
     )
+    if given.ros or not url:
+        given = with_server_parameters(given) if options.graph == "ros1" else given
+        options = mavros_options(options, given, output.note)
     notes = BridgeNotes(output)
     made = Bridge(options, notes.record)
     below = made.namespace.rstrip("/")
-    output.show(f"bridging {url} to {graph} under {made.names}'s names, {below}/...; Ctrl-C stops it")
+    output.show(
+        f"bridging {options.url} to {options.graph} under {made.names}'s names, {below}/...; Ctrl-C stops it"
+    )
     made.every(S, lambda: notes.status(made.kernel.now(), made.status))
     try:
         made.run()

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -16,8 +17,12 @@ import typer
 from volery.base.errors import UsageError, did_you_mean
 from volery.cli.command import OK, Commands
 from volery.cli.console import Output, file_size, make_table, number_column
+from volery.cli.options import Seed
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from volery.report.comparison_page import Comparison
     from volery.report.html_report import Recovered
     from volery.requirements.record import RunRecord
 
@@ -163,25 +168,151 @@ def report(
     return OK
 
 
+ADDRESS = re.compile(r"[A-Za-z][\w.-]*(\+\w+)?:")
+MOST_PHASES, MOST_ROWS = 40, 12
+"""Rows of the tables of phases, and of each one of answers or texts, that the terminal shows."""
+
+
 @commands.add("quiet", "json", "debug")
 def compare(
     output: Output,
-    folders: Annotated[list[Path], typer.Argument(metavar="FOLDER...", help="Run folders, at least two.")],
+    records: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="RECORD...",
+            help="Run folders, tlogs, DataFlash logs or ULogs, at least two; with `--between` the mission "
+            "that is flown on an address.",
+        ),
+    ] = None,
+    between: Annotated[
+        tuple[str, str] | None,
+        typer.Option(
+            metavar="A B",
+            help="Compare two, each an address such as sim:px4, on which the mission is flown first, a run "
+            "folder or a log.",
+        ),
+    ] = None,
+    within: Annotated[
+        float, typer.Option(metavar="METRES", help="Distance between the ways of phases that are alike.")
+    ] = 2.0,
+    seed: Seed = 1,
 ) -> int:
-    """Compare runs side by side, in the terminal and as a page in the folder that contains them."""
-    from volery.report.html_report import recover, write_comparison
-    from volery.report.terminal import comparison_table
+    """Compare runs and flight logs side by side and phase by phase, in the terminal and as a page.
 
-    if len(folders) < 2:
-        raise UsageError(f"give a second run to compare {folders[0]} with")
-    found = [recover(folder) for folder in folders]
-    output.show(comparison_table([one.record for one in found], [folder.name for folder in folders]))
-    output.give(f"[{', '.join(map(_as_json, found))}]")
-    for one in found:
-        _note_report(output, one)
-    common = Path(os.path.commonpath([folder.resolve().parent for folder in folders]))
-    output.note(f"side by side: {write_comparison(folders, Path(os.path.relpath(common)))}")
+    The page is written into the folder that contains the run folders, of logs alone into the current one.
+    Exit status: 0, however they differ.
+    """
+    from volery.report.comparison_page import Comparison, Side, read_side
+    from volery.report.html_report import recover
+
+    if not within > 0.0:
+        raise UsageError(f"--within {within:g}: give a distance in metres above 0")
+    given = records or []
+    names = _checked_sides(given, between)
+    sides: dict[int, Side] = {}
+    for number, name in enumerate(names):
+        if not _is_address(name):
+            sides[number] = read_side(Path(name))
+    for number, name in enumerate(names):
+        if number not in sides:
+            sides[number] = read_side(_fly(output, Path(given[0]), name, seed), name)
+    compared = Comparison([sides[number] for number in range(len(names))], within)
+    output.show(*_shown(compared))
+    output.give(compared.plain())
+    folders = [side.path for side in compared.sides if side.record is not None]
+    for folder in folders:
+        _note_report(output, recover(folder))
+    common = os.path.commonpath([folder.resolve().parent for folder in folders]) if folders else Path.cwd()
+    output.note(f"side by side: {compared.write(Path(os.path.relpath(common)))}")
     return OK
+
+
+def _is_address(name: str) -> bool:
+    return ADDRESS.match(name) is not None and not Path(name).exists()
+
+
+def _checked_sides(given: Sequence[str], between: tuple[str, str] | None) -> Sequence[str]:
+    """Return what is compared, once nothing is missing that a flight would need.
+
+    Raises:
+        UsageError: A side or the mission is missing, is none, or is too many.
+    """
+    for name in between or given:
+        if not _is_address(name) and not Path(name).exists():
+            raise UsageError(
+                f"there is no {name!r}; give a run folder, a flight log or an address as sim:px4"
+            )
+    if between is not None:
+        _check_mission(given, [name for name in between if _is_address(name)])
+        return between
+    for name in given:
+        if _is_address(name) or name.endswith(".py"):
+            hint = "volery runs compare MISSION.py --between sim:px4 sim:ardupilot"
+            raise UsageError(f"{name} is to be flown: write `{hint}`")
+    if len(given) < 2:
+        raise UsageError(
+            f"give a second run or log to compare {given[0]} with"
+            if given
+            else "give two run folders or flight logs, or a mission and --between ADDRESS ADDRESS"
+        )
+    return given
+
+
+def _check_mission(given: Sequence[str], addresses: Sequence[str]) -> None:
+    """Raise ``UsageError`` unless there is one mission for the addresses, and none without an address."""
+    from volery.vehicles.address import parse
+
+    if len(given) > 1:
+        raise UsageError(f"--between compares two, with one mission before it; {given[1]} is too much")
+    if addresses and not given:
+        raise UsageError(f"{addresses[0]} is an address: give the mission to fly on it before --between")
+    if given and not addresses:
+        raise UsageError(f"{given[0]} would not be flown, since neither side is an address: leave it out")
+    for address in addresses:
+        parse(address)
+    if addresses and not Path(given[0]).is_file():
+        expected = "a Python file with `def mission(drone: Drone)` is expected"
+        raise UsageError(f"there is no file {given[0]!r}; {expected}")
+
+
+def _fly(output: Output, mission: Path, address: str, seed: int) -> Path:
+    """Fly a mission into a new run folder and return it; how it ends is part of the comparison."""
+    from volery.cli.run_display import recorded_folder, run_progress
+    from volery.run.fly import fly
+    from volery.run.result import TRACE, Options
+
+    with (
+        recorded_folder(None, mission.stem, TRACE) as folder,
+        run_progress(output, f"{mission.name} on {address}") as show,
+    ):
+        assert folder is not None  # it is recorded
+        run = fly(mission, address, Options("hardware", seed, out=folder, show=show, tell=output.note))
+    if run.record.outcome.status == "interrupted":
+        raise UsageError(f"interrupted on {address}; the run is kept in {folder}")
+    if not run.completed:
+        output.complain(f"volery: {address}: {run.record.outcome.status}: {run.record.outcome.reason}")
+    return folder
+
+
+def _shown(compared: Comparison) -> Iterator[RenderableType]:
+    """Yield the tables of a comparison for the terminal."""
+    from rich.text import Text
+
+    from volery.report.flight_comparison import answer_grid, phase_grid, text_grid
+    from volery.report.terminal import GridTable
+
+    yield from map(GridTable, compared.run_grids)
+    flights = compared.all_flights
+    if sum(len(one.phases) for one in flights) <= MOST_PHASES:
+        for one in flights:
+            yield GridTable(phase_grid(one))
+            for grid in filter(None, (answer_grid(one), text_grid(one))):
+                yield GridTable(replace(grid, rows=grid.rows[:MOST_ROWS]))
+                if len(grid.rows) > MOST_ROWS:
+                    yield Text(f"and {len(grid.rows) - MOST_ROWS} more on the page", style="dim")
+    for one in flights:
+        alike = all(phase.alike for phase in one.phases)
+        yield Text(one.verdict, style="green" if alike else "yellow")
 
 
 def _as_json(found: Recovered) -> str:

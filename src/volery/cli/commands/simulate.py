@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
@@ -24,9 +26,6 @@ from volery.cli.options import (
     Speed,
     parse_speed,
 )
-
-if TYPE_CHECKING:
-    pass
 
 commands = Commands()
 
@@ -51,6 +50,14 @@ def simulate(
         bool,
         typer.Option(help="With --graph: others start the components, from packages of `volery ros deploy`."),
     ] = False,
+    bags: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--bag",
+            metavar="RECORDING",
+            help="Play a rosbag or an MCAP file into the run from its start; may be repeated.",
+        ),
+    ] = None,
     out: Out = None,
     record: Record = "trace",
     log_file: LogFile = None,
@@ -62,6 +69,7 @@ def simulate(
     """
     require_extra("simulation", "simulated runs")
     from volery.cli.run_display import read_log_options, recorded_folder, run_progress, show_outcome
+    from volery.model.recorded_inputs import with_recordings
     from volery.model.system_loader import load
     from volery.run.assembly.model_checks import vocabulary
     from volery.run.result import NOTHING, TRACE, Options
@@ -71,6 +79,8 @@ def simulate(
     if deployed and not graph:
         raise UsageError("--deployed: name the graph of the components, too: --graph ros1 or --graph ros2")
     system = load(model, vocabulary(), scenario, allocation, overrides or ())
+    inputs = with_recordings(system.environment.inputs, bags or ())
+    system = replace(system, environment=replace(system.environment, inputs=inputs))
     title = " · ".join(filter(None, (system.name, system.allocation, system.scenario)))
     with recorded_folder(out, system.name, record) as folder, run_progress(output, title) as show:
         options = Options(

@@ -87,26 +87,29 @@
     return redraw;
   }
 
-  function curves(id, key, name, unit) {
+  // Curves of the vehicles, or of others that have a name, a colour and the same keys.
+  function curves(id, key, name, drawn = data.vehicles) {
     const holder = document.getElementById(id);
     if (!holder) return;
-    const all = data.vehicles.flatMap((vehicle) => vehicle[key].v);
-    let low = Math.min(0, all.reduce((a, b) => Math.min(a, b), 0)), high = all.reduce((a, b) => Math.max(a, b), 1) * 1.06;
-    const values = data.vehicles.map((vehicle, index) => ({
-      label: vehicle.name,
-      ink: series(index),
+    const ink = (one, index) => series(one.colour === undefined ? index : one.colour);
+    const dashed = (one, index) => (one.colour === undefined ? index : one.colour) >= 8;
+    const all = drawn.flatMap((one) => one[key].v);
+    let low = all.reduce((a, b) => Math.min(a, b), 0) * 1.06, high = all.reduce((a, b) => Math.max(a, b), 1) * 1.06;
+    const values = drawn.map((one, index) => ({
+      label: one.name,
+      ink: ink(one, index),
       value: (time) => {
-        const found = at(vehicle[key].t, vehicle[key].v, time);
+        const found = at(one[key].t, one[key].v, time);
         return Number.isNaN(found) ? "" : tenths(found);
       },
     }));
-    frame(holder, name, [low, high], unit, (context, place) => {
-      data.vehicles.forEach((vehicle, index) => {
-        const { t, v } = vehicle[key];
-        context.strokeStyle = colour(series(index));
+    frame(holder, name, [low, high], "", (context, place) => {
+      drawn.forEach((one, index) => {
+        const { t, v } = one[key];
+        context.strokeStyle = colour(ink(one, index));
         context.lineWidth = 1.7;
         context.lineJoin = "round";
-        context.setLineDash(index >= 8 ? [5, 3] : []);
+        context.setLineDash(dashed(one, index) ? [5, 3] : []);
         context.beginPath();
         t.forEach((time, point) => context.lineTo(place.x(time), place.y(v[point])));
         context.stroke();
@@ -176,8 +179,10 @@
     })));
   }
 
-  curves("height", "height", "height", "");
-  curves("speed", "speed", "speed", "");
+  for (const key of ["height", "speed", "roll", "pitch", "yaw", "battery", "distance"]) {
+    curves(key, key, key);
+    curves(key + "-difference", key, "difference of " + key, data.differences);
+  }
   if (document.getElementById("processors")) {
     data.processors.filter((processor) => processor.components.length).forEach(load);
   }

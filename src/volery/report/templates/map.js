@@ -9,9 +9,28 @@
   let followed = null;
   let size = [1, 1];
 
+  // The corners of what is known of a map.
+  function corners(map) {
+    let left = map.columns, right = 0, bottom = map.rows, top = 0;
+    for (let cell = 0, index = 0; index < map.runs.length; cell += map.runs[index + 1], index += 2) {
+      if (map.runs[index] < 0) continue;
+      const last = cell + map.runs[index + 1] - 1;
+      const row = Math.floor(cell / map.columns), end = Math.floor(last / map.columns);
+      bottom = Math.min(bottom, row);
+      top = Math.max(top, end + 1);
+      left = Math.min(left, row === end ? cell % map.columns : 0);
+      right = Math.max(right, row === end ? last % map.columns + 1 : map.columns);
+    }
+    if (left >= right) return [];
+    const cosine = Math.cos(map.yaw) * map.side, sine = Math.sin(map.yaw) * map.side;
+    return [[left, bottom], [right, bottom], [right, top], [left, top]].map(
+      ([x, y]) => [map.x + cosine * x - sine * y, map.y + sine * x + cosine * y]);
+  }
+
   function bounds() {
     const xs = data.vehicles.flatMap((vehicle) => vehicle.x), ys = data.vehicles.flatMap((vehicle) => vehicle.y);
     for (const [, x, y] of scenery.places) { xs.push(x); ys.push(y); }
+    for (const map of data.maps) for (const [x, y] of corners(map)) { xs.push(x); ys.push(y); }
     if (!xs.length) for (const [, , outline] of scenery.areas) for (const [x, y] of outline) { xs.push(x); ys.push(y); }
     const low = (list) => list.reduce((a, b) => Math.min(a, b), Infinity);
     const high = (list) => list.reduce((a, b) => Math.max(a, b), -Infinity);
@@ -87,6 +106,61 @@
       if (Math.max(...xs) - Math.min(...xs) < 36) continue; // its name would hide it
       label(context, name, toX(x), toY(y) - 6, colour(kind === "no-fly" ? "noflight" : "soft"), taken, 0);
     }
+  }
+
+  const parts = (name) => [1, 3, 5].map((start) => parseInt(colour(name).slice(start, start + 2), 16));
+  const painted = {};
+
+  // A map as a picture of a pixel a cell, south on top; drawn anew when the colours change.
+  function paint(index) {
+    const map = data.maps[index], free = parts("surface"), occupied = parts("ink");
+    const key = String([...free, ...occupied]);
+    if (painted[index] && painted[index].key === key) return painted[index].canvas;
+    const canvas = document.createElement("canvas");
+    canvas.width = map.columns;
+    canvas.height = map.rows;
+    const picture = new ImageData(map.columns, map.rows);
+    for (let cell = 0, index = 0; index < map.runs.length; index += 2) {
+      const level = map.runs[index], end = cell + map.runs[index + 1];
+      if (level >= 0) {
+        const shade = [0, 1, 2].map((part) => free[part] + (occupied[part] - free[part]) * level / 10);
+        for (let at = cell; at < end; at++) picture.data.set([...shade, 255], 4 * at);
+      }
+      cell = end;
+    }
+    canvas.getContext("2d").putImageData(picture, 0, 0);
+    painted[index] = { key, canvas };
+    return canvas;
+  }
+
+  const layer = document.getElementById("layer");
+
+  function drawMap(context) {
+    if (!layer || layer.value === "") return;
+    const map = data.maps[layer.value], side = map.side * view.scale;
+    context.save();
+    context.translate(toX(map.x), toY(map.y));
+    context.rotate(-map.yaw);
+    context.scale(side, -side);
+    context.imageSmoothingEnabled = side < 1;
+    context.drawImage(paint(layer.value), 0, 0);
+    context.restore();
+  }
+
+  function drawPaths(context) {
+    for (const { points, past } of data.paths) {
+      context.strokeStyle = colour(past ? "accent" : "warn");
+      context.lineWidth = past ? 1.5 : 2;
+      context.setLineDash(past ? [2, 4] : [9, 5]);
+      path(context, points);
+      context.stroke();
+    }
+    context.setLineDash([]);
+  }
+
+  function drawScans(context) {
+    context.fillStyle = colour("noflight");
+    for (const { points } of data.scans) for (const [x, y] of points) context.fillRect(toX(x) - 1, toY(y) - 1, 2, 2);
   }
 
   // Words with a halo, where they do not cover earlier ones.
@@ -307,8 +381,11 @@
       view.y = spot.y;
     }
     const taken = [];
+    drawMap(context);
     drawScenery(context, taken);
+    drawScans(context);
     data.vehicles.forEach((vehicle, index) => drawTrail(context, vehicle, colour(series(index)), time));
+    drawPaths(context);
     drawPlaces(context, taken);
     data.vehicles.forEach((vehicle, index) => drawVehicle(context, vehicle, colour(series(index)), time));
     drawNotes(context, time);
@@ -322,6 +399,7 @@
     drawScale(context);
   });
   stage.onTime(redraw);
+  if (layer) layer.onchange = redraw;
 
   function zoom(factor, x = size[0] / 2, y = size[1] / 2) {
     const mapX = view.x + (x - size[0] / 2) / view.scale, mapY = view.y - (y - size[1] / 2) / view.scale;

@@ -45,14 +45,17 @@ from volery.run.assembly.component_ends import ComponentEnds
 from volery.run.assembly.computers import Platform, commanded_by, is_node
 from volery.run.assembly.cpp import CppPrograms, compile_all, is_cpp
 from volery.run.assembly.fences import fence_of
+from volery.run.assembly.recorded_input import recorded_input
 from volery.run.assembly.sensor_node import SensorNode, frames_of
 from volery.run.assembly.vehicle_nodes import (
-    ROSCOPTER_NAMES,
+    NAMES_OF,
     NodeNames,
+    at_root,
     graph_access,
     names_of,
     node_name,
     serve_on_graph,
+    topics_below,
 )
 from volery.run.ending import Ending, Landable
 from volery.trace.events import Unserved
@@ -161,17 +164,21 @@ def library_warnings(steps: StepCounter, imported: Collection[str]) -> list[str]
         what = f"what components computed inside libraries was not counted: {', '.join(unknown)}"
         found.append(f"{what}; state it with volery.add_time()")
     if calls is not None and calls.steps:
-        table = library_table()
-        shares = [f"{name} {spent / max(steps.taken, 1):.0%}" for name, spent in sorted(calls.steps.items())]
-        found.append(
-            f"share of library calls in the counted time: {', '.join(shares)}; by a table, error "
-            f"{table.mean_error:.0%} on average, {table.worst_error:.0%} at worst "
-            f"over {table.programs} programs"
-        )
+        shares = [
+            f"{name} {spent / max(steps.taken, 1):.0%} ({_error_words(name)})"
+            for name, spent in sorted(calls.steps.items())
+        ]
+        found.append(f"share of library calls in the counted time, by a table: {', '.join(shares)}")
     if calls is not None and calls.unpriced:
         names = [f"{name} ({count})" for name, count in sorted(calls.unpriced.items())]
         found.append(f"calls without an entry of their own in that table: {', '.join(names)}")
     return found
+
+
+def _error_words(library: str) -> str:
+    error = library_table().error_of(library)
+    programs = "one program" if error.programs == 1 else f"{error.programs} programs"
+    return f"error {error.mean:.0%} on average, {error.worst:.0%} at worst over {programs}"
 
 
 Truth = Callable[[], Position]
@@ -239,7 +246,7 @@ class Builder:
             ModelError: A file is missing or does not fit its component.
         """
         check_code(replace(self._system, instances=self._models))
-        steps = StepCounter(libraries=library_table()) if fidelity == "code" else None
+        steps = StepCounter(libraries=library_table()) if fidelity != "times" else None
         workspace = Workspace()
         for model in self._system.instances:  # the trace has the messages of other processes, too
             if model.component.path and model.component.language in PYTHON_ROS:
@@ -256,7 +263,11 @@ class Builder:
             host=self._ends,
         )
         self._instances = {model.name: self._instance(model, steps) for model in self._models}
-        starters = (*self._vehicle_nodes(), *(self._starter(model, loader) for model in self._models))
+        starters = (
+            *self._vehicle_nodes(),
+            *self._inputs(),
+            *(self._starter(model, loader) for model in self._models),
+        )
         doubts = tuple(self._cpp.warnings(self._models))
         return BuiltComponents(starters, loader, self._instances, doubts, self._unserved, self._cpp.finish)
 
@@ -308,6 +319,8 @@ class Builder:
 
     def _starter(self, model: InstanceModel, loader: Loader) -> Callable[[], object]:
         instance = self._instances[model.name]
+        if model.component.language == "python":
+            instance.join_graph = partial(self._join, model)
         program = self._program(model, loader)
         given = self._given(model)
         if not isinstance(program, ScriptProgram):  # a script reads its parameters from ROS
@@ -336,7 +349,8 @@ class Builder:
         """Return the components that publish topics in the names of a vehicle."""
         if not isinstance(self._graph, EmbeddedGraph):
             return set()
-        below = f"{graph_access(self._autopilot(vehicle), vehicle).namespace.rstrip('/')}/"
+        namespace = graph_access(self._autopilot(vehicle), vehicle).namespace.rstrip("/")
+        below = f"{'' if self._at_root(vehicle) else namespace}/{topics_below(self._served[vehicle])}"
         nodes = {
             name
             for topic in self._graph.topics()
@@ -394,11 +408,7 @@ class Builder:
 
     def _connect(self, model: InstanceModel, commands: Iterable[Connection]) -> dict[str, Any]:
         """Join the graph and return the vehicles that the instance commands, by port."""
-        node = self._nodes.get(model.name)
-        if node is None:
-            label = node_label(model.node_name or model.name)
-            node = self._graph.node(label, model.namespace, remaps=model.remap)
-            self._nodes[model.name] = node
+        node = self._join(model)
         found: dict[str, Any] = {}
         for connection in commands:
             vehicles = [
@@ -406,6 +416,15 @@ class Builder:
             ]
             found[connection.port] = vehicles if connection.many else vehicles[0]
         return found
+
+    def _join(self, model: InstanceModel) -> Node:
+        """Return the node of an instance, which joins the graph with the first call, in its own task."""
+        node = self._nodes.get(model.name)
+        if node is None:
+            label = node_label(model.node_name or model.name)
+            node = self._graph.node(label, model.namespace, remaps=model.remap)
+            self._nodes[model.name] = node
+        return node
 
     def _vehicle(self, node: Node, name: str, interface: str) -> Drone | Rover:
         vehicle = self._open(node, name, interface)
@@ -441,12 +460,23 @@ class Builder:
                 context = ExecutionContext(node_name(vehicle.name), None)
                 yield self._sensor_node(self._fleet, vehicle.name, context).serve
 
+    def _inputs(self) -> Iterable[Callable[[], object]]:
+        if self._fleet is not None:  # in the process of the world
+            for stated in self._system.environment.inputs:
+                yield recorded_input(self._system, stated, self._graph)
+
     def _add_unattended(self, name: str, interface: str) -> None:
         opened: Callable[[Node], Vehicle] = partial(self._open, name=name, interface=interface)
-        if self._served[name] == ROSCOPTER_NAMES:  # which have no service to land it
+        if self._on_link_at_end(name):
             opened = partial(self._open_on_link, name=name, interface=interface)
         self._landable[name] = UnattendedVehicle(self._graph, name, opened)
         self._ending.vehicles = tuple(self._landable.values())
+
+    def _on_link_at_end(self, name: str) -> bool:
+        """Return whether a vehicle is landed over its link, because its names are not those of its driver."""
+        assert self._fleet is not None, "vehicles are served in the process that simulates them"
+        codec = self._fleet.family(name).codec
+        return codec is not None and self._served[name] != NAMES_OF[codec.name][0]
 
     def _open_on_link(self, _: Node, name: str, interface: str) -> Drone | Rover:
         assert self._fleet is not None, "vehicles are served in the process that simulates them"
@@ -459,6 +489,10 @@ class Builder:
     def _autopilot(self, vehicle: str) -> str:
         return next(one.autopilot for one in self._system.vehicles if one.name == vehicle)
 
+    def _at_root(self, vehicle: str) -> bool:
+        [found] = [one for one in self._system.vehicles if one.name == vehicle]
+        return at_root(found, self._system.vehicles)
+
     def _serve(self, fleet: SimulatedFleet, name: str, processor: str | None) -> None:
         """Serve a vehicle in the root scope: its node outlives the components, for the landing."""
         context = ExecutionContext(
@@ -467,14 +501,14 @@ class Builder:
         access = graph_access(self._autopilot(name), name)
         ros2 = any(model.component.language == "rclpy" for model in self._system.instances)
         sensors = self._sensor_node(fleet, name, context)
-        names = NodeNames(self._served[name], ros2, not sensors.moves_frames)
+        names = NodeNames(self._served[name], ros2, not sensors.moves_frames, self._at_root(name))
         serve_on_graph(self._graph, fleet, name, access, context, names)
         sensors.serve()
 
     def _sensor_node(self, fleet: SimulatedFleet, name: str, context: ExecutionContext) -> SensorNode:
         vehicle = next(one for one in self._system.vehicles if one.name == name)
         prefix = frames_of(self._system.vehicles).get(name, "")
-        return SensorNode(self._graph, fleet.flights[name], vehicle, context, prefix)
+        return SensorNode(self._graph, fleet.flights[name], vehicle, context, fleet.alterations[name], prefix)
 
 
 def with_executables(system: System) -> System:

@@ -185,7 +185,7 @@ class Platform:
         if instance.processor is None:
             return FREE
         component, prices = instance.component, self.prices[instance.processor]
-        if self._fidelity == "code" and component.path:
+        if self._fidelity != "times" and component.path:
             if component.language not in CPP_LANGUAGES:
                 pricing = prices.python_code()
                 self.warnings.update(dict.fromkeys(pricing.warnings))

@@ -45,16 +45,18 @@ from volery.model.components import CPP_LANGUAGES, ENVIRONMENT_INTERFACE, VEHICL
 from volery.model.instances import Instance
 from volery.model.instances import Instance as InstanceModel
 from volery.model.system import System
-from volery.ros.client_libraries import roscpp
+from volery.ros.client_libraries import rclcpp, roscpp
 from volery.ros.client_libraries.abi_codec import RequestHandlers
+from volery.ros.client_libraries.cpp.message_structs import NOT_OFFERED
 from volery.ros.client_libraries.library_base import Launch
 from volery.ros.graph import Node, RosGraph
+from volery.run.assembly.vehicle_nodes import use_message_versions
 
 if TYPE_CHECKING:
     from volery.cost.native import Program
 
 
-_FRAMEWORK_SYMBOL = re.compile(r'"?_ZNK?(?:6volery|3ros)')
+_FRAMEWORK_SYMBOL = re.compile(r'"?_ZNK?(?:6volery|3ros|6rclcpp|13rclcpp_action|16rclcpp_lifecycle|7tf2_ros)')
 """Symbols of the framework and of client libraries, whose calls have prices of their own."""
 
 
@@ -65,7 +67,7 @@ def core_of(system: System, fidelity: str, instance: Instance) -> CoreLaw | None
     processor, or if the catalogue has no model of the core.
     """
     component = instance.component
-    counts = fidelity == "code" and component.path and component.language in CPP_LANGUAGES
+    counts = fidelity != "times" and component.path and component.language in CPP_LANGUAGES
     if not counts or instance.processor is None:
         return None
     known = load_catalogue(*system.catalogues).processors.get(system.processor(instance.processor).kind)
@@ -123,19 +125,21 @@ class CountingCompiler:
     ) -> None:
         from volery.cost.native import instrument
 
-        new = made.with_suffix(".new.o")
-        found = instrument(sources, self._law, new, compiler_options(include, flags))
-        costs = found.costs
-        charged = np.array([not _FRAMEWORK_SYMBOL.match(name) for name in found.functions])
-        np.savez(
-            made.with_suffix(".npz"),
-            cycles=costs.cycles,
-            memory=costs.memory,
-            charged=charged,
-            key=found.key,
-            estimated=found.estimated,
-        )
-        new.replace(made)
+        with TemporaryDirectory(dir=made.parent) as scratch:  # another run may make the same
+            new, new_costs = Path(scratch, "new.o"), Path(scratch, "new.npz")
+            found = instrument(sources, self._law, new, compiler_options(include, flags))
+            costs = found.costs
+            charged = np.array([not _FRAMEWORK_SYMBOL.match(name) for name in found.functions])
+            np.savez(
+                new_costs,
+                cycles=costs.cycles,
+                memory=costs.memory,
+                charged=charged,
+                key=found.key,
+                estimated=found.estimated,
+            )
+            new_costs.replace(made.with_suffix(".npz"))
+            new.replace(made)
 
     def to_steps(self) -> ToSteps:
         """Return the conversion of counts into steps, once compiled. Whole numbers: nothing is rounded."""
@@ -182,13 +186,19 @@ class TracingCompiler:
         library.function("volery_trace_into")(str(file).encode(), each, of)
 
 
-LANGUAGES = ("c++", "roscpp")
-_ROSCPP = ClientLibrary((roscpp.INCLUDE,), roscpp.FALLBACK, roscpp.generate_headers, roscpp.NOT_OFFERED)
+_LIBRARIES = {
+    "c++": ClientLibrary(),
+    "roscpp": ClientLibrary((roscpp.INCLUDE,), roscpp.FALLBACK, roscpp.generate_headers, NOT_OFFERED),
+    "rclcpp": ClientLibrary(
+        (rclcpp.INCLUDE,), rclcpp.FALLBACK, rclcpp.generate_headers, NOT_OFFERED, rclcpp.main_of
+    ),
+}
+"""Headers of the client library by language."""
 
 
 def is_cpp(component: Component) -> bool:
     """Return True if the component has C++ code."""
-    return bool(component.path) and component.language in LANGUAGES
+    return bool(component.path) and component.language in _LIBRARIES
 
 
 def has_cpp(system: System) -> bool:
@@ -230,6 +240,7 @@ def compile_all(
     """
     if fidelity == "times" and not has_compiler():
         return {}
+    use_message_versions(system.vehicles)
     return {
         one.name: _compile(
             system, one, None if traced else tell, TracingCompiler(core) if traced and core else core
@@ -247,7 +258,7 @@ def _compile(
     how: CoreLaw | TracingCompiler | None,
 ) -> CompiledInstance:
     component = instance.component
-    library = _ROSCPP if component.language == "roscpp" else ClientLibrary()
+    library = _LIBRARIES[component.language]
     description = describe_component(system, component)
     if how is None or instance.processor is None:
         return CompiledInstance(compile_component(description, library, tell))
@@ -276,6 +287,7 @@ def describe_component(system: System, component: Component) -> CppComponent:
         tuple(_from_model(system, flag) for flag in component.build.flags),
         component.build.libraries,
         component.where,
+        component.class_name if component.language == "rclcpp" and component.stated_class else "",
     )
 
 
@@ -287,6 +299,8 @@ def _from_model(system: System, flag: str) -> str:
 
 def _class_of(component: Component, system: System) -> str:
     """Return the class of a component, empty for a program with its own ``main``."""
+    if component.language == "rclcpp":
+        return ""  # its main() is generated where there is none
     if component.stated_class:
         return component.class_name
     sources = find_sources(system.file_of(component), component.where)
@@ -337,7 +351,7 @@ class CppPrograms:
     def program(self, model: InstanceModel) -> CppProgram:
         """Return the program of an instance."""
         compiled, counting, tracing = self._ready[model.name]
-        library = partial(self._join, model) if model.component.language == "roscpp" else None
+        library = None if model.component.language == "c++" else partial(self._join, model)
         made = CppProgram(self._kernel, model.name, compiled, library, model.arguments)
         if counting is not None:
             made.count(self.meters[model.name], counting.to_steps())
@@ -347,6 +361,9 @@ class CppPrograms:
 
     def _join(self, model: InstanceModel) -> tuple[RequestHandlers, Callable[[], None]]:
         launch = self._launches.get(model.name, Launch())
+        if model.component.language == "rclcpp":
+            ros2 = rclcpp.Session(self._graph, model.name, launch, self._nodes)
+            return rclcpp.request_handlers(ros2), ros2.end
         session = roscpp.Session(self._graph, model.name, launch, self._nodes)
         return roscpp.request_handlers(session), session.end
 

@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import radians
+from math import nan, radians
 from typing import Any, Protocol
+
+import numpy as np
 
 from volery.base.elementary import cos, sin
 from volery.base.errors import CapabilityError, ModelError
@@ -22,9 +24,11 @@ from volery.kernel.task import ExecutionContext
 from volery.links.wire_faults import WireFaults
 from volery.model.environment import Environment, Wind
 from volery.model.faults import (
+    AddedSensorFault,
     BarometerStuck,
     BatteryCellDead,
     BatteryLow,
+    CameraBlack,
     CompassStuck,
     ComputerSlowed,
     ComputerStopped,
@@ -38,12 +42,22 @@ from volery.model.faults import (
     NetworkDegraded,
     NetworkFault,
     ProcessorFault,
+    RangesMaximum,
+    RangesNotANumber,
+    SensorClockOff,
+    SensorSilent,
+    SensorStuck,
     VehicleFault,
     WindChange,
 )
 from volery.run.assembly.computers import LOAD_PERIOD, LOAD_PRIORITY, load_name
+from volery.run.assembly.sensor_node import Alteration
 from volery.run.assembly.simulated_fleet import SimulatedFleet, wind_of
+from volery.simulation.added_sensors.beams import BeamSensor
 from volery.simulation.autopilots.fleet_autopilot import firmwares
+from volery.simulation.real_firmware.lock_step import RealFirmware
+from volery.simulation.real_firmware.outside_program import OutsideProgram
+from volery.simulation.world.sensors import Measurement, SampledSensor
 from volery.trace.events import Text
 
 WARNING = 4
@@ -125,7 +139,8 @@ def inject(faults: Iterable[Fault], affected: Affected) -> None:
     """Schedule every fault and its end, both of which are recorded in the trace.
 
     Raises:
-        CapabilityError: this run does not model what a fault happens to.
+        CapabilityError: this run does not model what a fault happens to, or a program of real firmware cannot
+            be given it.
     """
     kernel = affected.kernel
     for fault in faults:
@@ -136,6 +151,10 @@ def inject(faults: Iterable[Fault], affected: Affected) -> None:
                 f"fault {fault.name}: {fault.subject} is not modelled in this run; "
                 "faults of computers and networks need the embedded graph"
             )
+        if isinstance(fault, VehicleFault):
+            autopilot = affected.fleet.autopilots[fault.vehicle]
+            if isinstance(autopilot, RealFirmware | OutsideProgram):
+                autopilot.require(fault.kind, fault.name)
         kernel.call_at(fault.at_ns, partial(_happen, fault, affected, True))
         if fault.duration_ns is not None:
             kernel.call_at(fault.at_ns + fault.duration_ns, partial(_happen, fault, affected, False))
@@ -173,6 +192,44 @@ def _drift(flight: Any, fault: GpsDrift, active: bool) -> None:
 def _drain(flight: Any, fault: BatteryLow, active: bool) -> None:
     if active:
         flight.set_charge(fault.charge)
+
+
+def _sensor_effect(
+    alteration: Callable[[Any, SampledSensor | None], Alteration],
+) -> Callable[[Any, Affected, bool], None]:
+    """Return the effect of a fault that alters the samples of an added sensor on their way to the graph."""
+
+    def effect(fault: AddedSensorFault, affected: Affected, active: bool) -> None:
+        present = affected.fleet.alterations[fault.vehicle].setdefault(fault.sensor, {})
+        present.pop(fault.name, None)
+        if active:
+            mounted = affected.fleet.flights[fault.vehicle].added_sensors()
+            sensor = next((one for one in mounted if one.name == fault.sensor), None)
+            present[fault.name] = alteration(fault, sensor)
+
+    return effect
+
+
+def _repeat(fault: SensorStuck, sensor: SampledSensor | None) -> Alteration:
+    first: list[Measurement] = []
+
+    def repeated(sample: Measurement) -> Measurement:
+        first.append(sample)
+        del first[1:]
+        return Measurement(sample.time, first[0].values)
+
+    return repeated
+
+
+def _read_everywhere(value: float | None) -> Callable[[Any, SampledSensor | None], Alteration]:
+    """Return what makes each beam read a distance [m], or the longest one if it is None."""
+
+    def alteration(fault: AddedSensorFault, sensor: SampledSensor | None) -> Alteration:
+        assert isinstance(sensor, BeamSensor), "the model's reader checks it"
+        distance = sensor.ranging.most if value is None else value
+        return lambda sample: Measurement(sample.time, np.full(np.shape(sample.values), distance))
+
+    return alteration
 
 
 def _cut_link(fault: LinkCut, affected: Affected, active: bool) -> None:
@@ -246,6 +303,16 @@ EFFECTS: Mapping[type[Fault], Callable[[Any, Affected, bool], None]] = {
     GpsDrift: _flight_effect(_drift),
     BarometerStuck: _flight_effect(lambda flight, fault, active: flight.block_barometer(active)),
     CompassStuck: _flight_effect(lambda flight, fault, active: flight.block_compass(active)),
+    SensorSilent: _sensor_effect(lambda fault, sensor: lambda sample: None),
+    SensorStuck: _sensor_effect(_repeat),
+    SensorClockOff: _sensor_effect(
+        lambda fault, sensor: lambda sample: Measurement(sample.time + fault.by_ns, sample.values)
+    ),
+    CameraBlack: _sensor_effect(
+        lambda fault, sensor: lambda sample: Measurement(sample.time, sample.values._replace(lux=0.0))
+    ),
+    RangesMaximum: _sensor_effect(_read_everywhere(None)),
+    RangesNotANumber: _sensor_effect(_read_everywhere(nan)),
     LinkCut: _cut_link,
     LinkDegraded: _degrade_link,
     NetworkCut: _degrade_network,

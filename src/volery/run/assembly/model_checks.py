@@ -8,7 +8,7 @@ each vehicle has to be there in its version and with its features.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from volery.base.errors import ModelError, UsageError, VoleryError
@@ -18,7 +18,7 @@ from volery.components.programs import ScriptProgram
 from volery.components.virtual_stdlib import virtual_modules
 from volery.cost import load_catalogue
 from volery.kernel.virtual import VirtualKernel
-from volery.model.components import RUNNING_LANGUAGES
+from volery.model import rules
 from volery.model.instances import Instance
 from volery.model.reading import ProcessorKind, Vocabulary
 from volery.model.system import System
@@ -34,6 +34,7 @@ from volery.run.assembly.component_builder import (
     with_executables,
 )
 from volery.run.assembly.cpp import compile_all, describe_component, is_cpp
+from volery.run.assembly.firmware_programs import check_autopilot
 from volery.run.ending import Ending
 from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.simulation.world.sensors import sensors
@@ -44,7 +45,6 @@ def vocabulary() -> Vocabulary:
     autopilots = frozenset(firmwares.names())
     return Vocabulary(
         _kinds(),
-        frozenset(RUNNING_LANGUAGES),
         autopilots,
         all_observables(),
         _kinds,
@@ -65,30 +65,26 @@ def _kinds(*more: Path) -> dict[str, ProcessorKind]:
     }
 
 
-def check_components(system: System, languages: Iterable[str]) -> None:
+def check_components(system: System) -> None:
     """Load the components of *system* and compare them with the model; find the firmware of each vehicle.
-
-    Args:
-        system: The model.
-        languages: Languages that run; components in others are left out.
 
     Raises:
         ModelError: A file cannot be loaded or does not fit; all of them at once (``CollectedModelError``).
     """
-    known = frozenset(languages)
-    found = {str(error): error for error in _faults(system, known)}
+    found = {str(error): error for error in _faults(system)}
     if len(found) == 1:
         raise next(iter(found.values()))
     if found:
         raise CollectedModelError(found.values())
 
 
-def _faults(system: System, languages: frozenset[str]) -> Iterator[ModelError]:
+def _faults(system: System) -> Iterator[ModelError]:
     for vehicle in system.environment.vehicles:
         try:
-            firmwares.load(vehicle.autopilot).of_version(vehicle.version).with_features(vehicle.features)
+            check_autopilot(vehicle)
         except UsageError as error:
-            yield ModelError(str(error), f"environment.vehicles.{vehicle.name}", vehicle.where)
+            code = rules.NO_FIRMWARE.code if vehicle.firmware else ""
+            yield ModelError(str(error), f"environment.vehicles.{vehicle.name}", vehicle.where, code)
     try:
         system = with_executables(system)
     except ModelError as error:
@@ -99,7 +95,7 @@ def _faults(system: System, languages: frozenset[str]) -> Iterator[ModelError]:
     loader = Loader({**virtual_modules(kernel, seed=0), **modules})
     for instance in system.instances:
         component = instance.component
-        if component.language not in languages or not component.path:
+        if not component.path:
             continue
         if not system.file_of(component).exists():  # it is a warning of the model
             continue

@@ -7,24 +7,27 @@ Frames: sensors with a place on the body are below ``base_link`` (``/tf_static``
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 from volery.base.frames import Quaternion, Vector, attitude_ned_to_enu, frd_to_flu, world_to_body
-from volery.base.time import S
+from volery.base.time import Ns, S
 from volery.bridge.motion_publishers import TF, TF_MESSAGE, TF_STATIC, ros_quaternion, transform
 from volery.bridge.node_interface import BODY, stamped
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import sleep
 from volery.model.added_sensors import Odometry
 from volery.model.environment import Vehicle
-from volery.ros.graph import DEFAULT, LATCHED, Node, QoS, RosGraph
+from volery.ros.graph import DEFAULT, LATCHED, EmbeddedGraph, Node, QoS, RosGraph
 from volery.ros.messages import new
 
 if TYPE_CHECKING:
     from volery.simulation.autopilots.flight_stack.flight import Estimate, Flight
-    from volery.simulation.world.sensors import SampledSensor
+    from volery.simulation.world.sensors import Measurement, SampledSensor
+
+Alteration: TypeAlias = "Callable[[Measurement], Measurement | None]"
+"""What a fault makes of a sample on its way to the graph; None: it is lost."""
 
 NODE = "sensors"
 ODOM = "odom"
@@ -45,6 +48,7 @@ class SensorNode(NamedTuple):
         flight: The vehicle's flight.
         vehicle: The vehicle in the model.
         context: What the drivers' work is charged to: the computer on board.
+        alterations: What faults make of the samples at present: by sensor, in the order of the faults.
         prefix: What the names of its frames begin with.
     """
 
@@ -52,6 +56,7 @@ class SensorNode(NamedTuple):
     flight: Flight
     vehicle: Vehicle
     context: ExecutionContext
+    alterations: Mapping[str, Mapping[str, Alteration]]
     prefix: str = ""
 
     @property
@@ -90,6 +95,16 @@ class SensorNode(NamedTuple):
         if places:
             node.advertise(TF_STATIC, TF_MESSAGE, LATCHED).publish(new(TF_MESSAGE, transforms=places))
 
+    def _altered(self, sensor: str, sample: Measurement) -> Measurement | None:
+        """Return a sample as faults leave it."""
+        altered: Measurement | None = sample
+        for alter in self.alterations.get(sensor, {}).values():
+            altered = alter(altered) if altered is not None else None
+        return altered
+
+    def _stamp(self, sample: Measurement) -> Ns:
+        return max(self.graph.epoch + sample.time, 0)
+
     def _drive(self, node: Node, sensor: SampledSensor) -> None:
         """Publish the samples of one sensor as they come."""
         advertised = [(one, node.advertise(one.topic, one.type, DEFAULT)) for one in sensor.publications()]
@@ -100,16 +115,26 @@ class SensorNode(NamedTuple):
             remaining = sample.time + sensor.latency - self.graph.kernel.now()
             if remaining > 0:
                 sleep(self.graph.kernel, remaining)
+            altered = self._altered(sensor.name, sample)
+            if altered is None:
+                continue
             for publication, publisher in advertised:
+                if publication.on_demand and not self._is_heard(publisher.topic):
+                    continue
                 message = new(publication.type)
                 if hasattr(message, "header"):
-                    message.header = stamped(self.graph.epoch + sample.time, f"{self.prefix}{sensor.frame}")
-                publication.fill(message, sample.values)
+                    message.header = stamped(self._stamp(altered), f"{self.prefix}{sensor.frame}")
+                publication.fill(message, altered.values)
                 publisher.publish(message)
+
+    def _is_heard(self, topic: str) -> bool:
+        """Return whether the content of a topic is used, or may be on a real graph."""
+        return not isinstance(self.graph, EmbeddedGraph) or self.graph.uses_content(topic)
 
     def _drive_odometry(self, node: Node, odometry: Odometry) -> None:
         """Publish where the vehicle is by its own reckoning, also as a transform."""
-        from volery.simulation.world.world import STEP  # noqa: PLC0415  # a real vehicle has no simulation
+        from volery.simulation.world.sensors import Measurement  # noqa: PLC0415  # a real vehicle has none
+        from volery.simulation.world.world import STEP  # noqa: PLC0415
 
         publisher = node.advertise(odometry.topic("odom"), _ODOMETRY, DEFAULT)
         transforms = node.advertise(TF, TF_MESSAGE, QoS(100))
@@ -122,11 +147,14 @@ class SensorNode(NamedTuple):
                 estimate = self.flight.estimate()
                 if not estimate.position_ok:
                     continue
-                time, found, sigmas = estimate.time, _reckoned(estimate), estimate.sigmas
+                sample, sigmas = Measurement(estimate.time, _reckoned(estimate)), estimate.sigmas
             else:
-                time, found = self.flight.measurement(odometry.named)
-            at = self.graph.epoch + time
-            position, attitude, velocity, rates = found
+                sample = self.flight.measurement(odometry.named)
+            altered = self._altered(odometry.named, sample)
+            if altered is None:
+                continue
+            at = self._stamp(altered)
+            position, attitude, velocity, rates = altered.values
             turn = ros_quaternion(attitude)
             message = new(_ODOMETRY, header=stamped(at, parent), child_frame_id=child)
             pose, twist = message.pose.pose, message.twist.twist

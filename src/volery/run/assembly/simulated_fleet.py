@@ -6,7 +6,7 @@ it inside functions, or for type checking only.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle
 from math import pi, radians
@@ -28,10 +28,19 @@ from volery.model.environment import Marker as MarkerModel
 from volery.model.environment import Vehicle as VehicleModel
 from volery.model.environment import Wind as WindModel
 from volery.run.assembly.bodies import body_of
+from volery.run.assembly.firmware_programs import (
+    ProgramFolder,
+    check_programs,
+    family_of,
+    parameters_of,
+    remark_on,
+)
+from volery.run.assembly.sensor_node import Alteration
 from volery.run.assembly.simulated_vehicles import LINK_DELAY, SimulatedVehicle
 from volery.run.result import SAMPLING_PERIOD, VehicleProgress
-from volery.simulation.autopilots.fleet_autopilot import AutopilotFamily, FleetAutopilot, firmwares
+from volery.simulation.autopilots.fleet_autopilot import AutopilotFamily, FleetAutopilot
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
+from volery.simulation.real_firmware.lock_step import RealFirmware
 from volery.simulation.world.environment_models import Wind
 from volery.simulation.world.scene import DAY_LUX, DUSK_LUX, Marker, Scene, Solid
 from volery.simulation.world.world import World
@@ -53,15 +62,21 @@ class Surroundings(NamedTuple):
     scene: Scene | None = None
 
 
+OutsideAutopilot = Callable[[Flight], FleetAutopilot]
+"""Returns the autopilot of a body."""
+
+
 class SimulatedFleet:
     """Simulated vehicles in one world, by name, in the order of the model.
 
     System ids count from 1, except for the vehicles in *systems*. The links of the vehicles in
     *through_bytes* can be given faults: see ``faulty_links``. With *logging* the autopilots keep
-    logs of their flights.
+    logs of their flights. The vehicles in *outside* have autopilots that are not made here.
+
+    Programs of real firmware run where *programs* says, by default in a temporary folder.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913  # each is an option
         self,
         kernel: Kernel,
         vehicles: Sequence[VehicleModel],
@@ -71,7 +86,11 @@ class SimulatedFleet:
         systems: Mapping[str, int] | None = None,
         through_bytes: Collection[str] = (),
         logging: bool = False,
+        programs: ProgramFolder | None = None,
+        outside: Mapping[str, OutsideAutopilot] | None = None,
     ) -> None:
+        check_programs(vehicles)
+        self._programs = programs or ProgramFolder()
         self._kernel = kernel
         self._seed = seed
         self._faulty: dict[str, list[FaultyLink]] = {vehicle: [] for vehicle in through_bytes}
@@ -91,6 +110,8 @@ class SimulatedFleet:
         self._collisions = dict.fromkeys((vehicle.name for vehicle in vehicles), 0)
         self.on_collision: Callable[[Collision], object] = ignore
         """Called with each collision, when it is recorded."""
+        self.alterations: dict[str, dict[str, dict[str, Alteration]]] = {one.name: {} for one in vehicles}
+        """What faults make of the samples of added sensors: by vehicle, sensor and fault."""
         self.flights: dict[str, Flight] = {}
         self.autopilots: dict[str, FleetAutopilot] = {}
         self._families: dict[str, AutopilotFamily] = {}
@@ -98,14 +119,18 @@ class SimulatedFleet:
         try:
             for vehicle, flight in zip(vehicles, flights, strict=True):
                 self.flights[vehicle.name] = flight
-                family = firmwares.load(vehicle.autopilot).of_version(vehicle.version)
-                family = family.with_features(vehicle.features)
+                if outside is not None and vehicle.name in outside:
+                    self.autopilots[vehicle.name] = outside[vehicle.name](flight)
+                    continue
+                if vehicle.firmware is not None:
+                    self._programs.prepare(vehicle)
+                family = family_of(vehicle, self._programs, seed)
                 self._families[vehicle.name] = family
                 self.autopilots[vehicle.name] = family.create(
                     kernel,
                     flight,
                     system=ids[vehicle.name],
-                    parameters=vehicle.parameters,
+                    parameters=parameters_of(vehicle),
                     warm=vehicle.started == "warm",
                     name=vehicle.name,
                     logging=logging,
@@ -211,10 +236,22 @@ class SimulatedFleet:
         state, truth = self.autopilots[name].state(), self.flights[name].truth()
         return VehicleProgress(name, state.mode, state.armed, truth.position[2] - truth.ground)
 
+    def program(self, vehicle: str) -> str:
+        """Return the name of the program of real firmware that flies *vehicle*; empty: it is simulated."""
+        autopilot = self.autopilots[vehicle]
+        return autopilot.process.program if isinstance(autopilot, RealFirmware) else ""
+
+    def remarks(self) -> Iterator[str]:
+        """Yield, for each program of real firmware, what flew and which sensors were its own."""
+        for name, autopilot in self.autopilots.items():
+            if isinstance(autopilot, RealFirmware):
+                yield remark_on(name, self._families[name].name, autopilot)
+
     def close(self) -> None:
         """End the autopilots; their states can still be read."""
         for autopilot in self.autopilots.values():
             autopilot.close()
+        self._programs.close()
 
     def record_states(self) -> None:
         """Record the present state of every vehicle."""
@@ -280,13 +317,27 @@ def wind_of(model: WindModel) -> Wind:
     )
 
 
-def fleet_of(kernel: Kernel, wanted: Sequence[SimulatedVehicle], seed: int) -> SimulatedFleet:
+def fleet_of(
+    kernel: Kernel,
+    wanted: Sequence[SimulatedVehicle],
+    seed: int,
+    *,
+    programs: ProgramFolder | None = None,
+) -> SimulatedFleet:
     """Return a fleet of these vehicles. The origin and the wind of its world are those of the first."""
     first = wanted[0]
     vehicles = [_placed(one.vehicle, first.frame) for one in wanted]
     systems = {one.vehicle.name: one.system for one in wanted if one.system is not None}
     around = Surroundings(first.frame, first.wind)
-    fleet = SimulatedFleet(kernel, vehicles, around, seed, systems=systems, logging=True)
+    fleet = SimulatedFleet(
+        kernel,
+        vehicles,
+        around,
+        seed,
+        systems=systems,
+        logging=True,
+        programs=programs,
+    )
     for one in wanted:
         for at, channel, pulse in one.transmitter:
             fleet.move_transmitter(one.vehicle.name, at, channel, pulse)

@@ -1,19 +1,21 @@
-"""Simulated vehicles as ``sim:`` addresses describe them.
+"""Vehicles of the simulated world as ``sim:`` and ``firmware:`` addresses describe them.
 
-This module describes them only and imports nothing of the simulation; see ``simulated_fleet`` for that.
+This module describes them only and imports nothing that simulates; see ``simulated_fleet`` for that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from volery.base.errors import UsageError, choices
 from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns, from_seconds
 from volery.links.wire_faults import FAULT_OPTIONS, WireFaults, parse_wire_faults
-from volery.model.environment import SENSOR_SETS, STARTS, VEHICLE_KINDS, Place, Vehicle, Wind
+from volery.model.environment import SENSOR_SETS, STARTS, VEHICLE_KINDS, Firmware, Place, Vehicle, Wind
+from volery.simulation.real_firmware.program_search import PROGRAMS
 from volery.vehicles.address import Address
 
 HOME = Position(46.0825, -103.8995, AMSL(900))
@@ -40,6 +42,12 @@ OPTIONS = (
     *FAULT_OPTIONS,
 )
 """Options of ``sim:AUTOPILOT?``."""
+_OF_PROGRAM = ("file", "program", "repeatable")
+_NOT_OF_PROGRAM = ("features", "names", "version")
+FIRMWARE_OPTIONS = tuple(
+    sorted((*_OF_PROGRAM, *(option for option in OPTIONS if option not in _NOT_OF_PROGRAM)))
+)
+"""Options of ``firmware:AUTOPILOT?``."""
 
 WIRE_MODES = ("values", "bytes")
 
@@ -81,22 +89,27 @@ class SimulatedVehicle:
 def parse_simulated(
     address: Address, name: str, kind: str = "multirotor", home: Position = HOME
 ) -> SimulatedVehicle:
-    """Parse a ``sim:`` address.
+    """Parse a ``sim:`` or a ``firmware:`` address.
 
     Options: ``home=LAT,LON,AMSL``, ``heading=DEG``, ``kind=multirotor|rover``, ``sensors=consumer|rtk``,
     ``start=warm|cold``, ``system=ID``, ``version`` of the firmware, its ``features=all|NAME,...``,
     ``wind=SPEED,FROM_DEG,GUSTS``, ``parameters=NAME:VALUE,...`` of the autopilot, ``names`` of its ROS node,
     ``transmitter=CHANNEL:PULSE@SECONDS,...``, ``rate``, ``attitude`` and ``rc`` in Hz, ``wire=values|bytes``
-    and, with bytes, the faults of ``volery.links.wire_faults``. Raises ``UsageError``.
+    and, with bytes, the faults of ``volery.links.wire_faults``.
+
+    A ``firmware:`` address has no version, features and names, but ``program`` (a path or a name, by default
+    the usual one of the project), ``file=PARAMETERS,...`` and ``repeatable=0|1``. Raises ``UsageError``.
     """
-    address.only(*OPTIONS)
+    real = address.transport == "firmware"
+    address.only(*(FIRMWARE_OPTIONS if real else OPTIONS))
     stated = address.numbers("home", 3)
     if stated is not None:
         home = Position(stated[0], stated[1], AMSL(stated[2]))
     latitude, longitude, amsl = home.latitude, home.longitude, home.altitude.metres
+    kind = _one_of(address, "kind", VEHICLE_KINDS, kind)
     vehicle = Vehicle(
         name=name,
-        kind=_one_of(address, "kind", VEHICLE_KINDS, kind),
+        kind=kind,
         autopilot=address.driver,
         at=Place("home", latitude, longitude, amsl, 0.0, 0.0, "home"),
         heading_deg=address.number("heading", 0.0),
@@ -105,6 +118,7 @@ def parse_simulated(
         parameters=_parameters(address),
         version=address.options.get("version", ""),
         features=address.options.get("features", ""),
+        firmware=_firmware(address, kind) if real else None,
     )
     wind = Wind(*(address.numbers("wind", 3) or ()))
     frame = LocalFrame(latitude, longitude, amsl)
@@ -119,6 +133,13 @@ def parse_simulated(
         {name: value for name, value in address.options.items() if name in RATE_OPTIONS},
         _transmitter(address),
     )
+
+
+def _firmware(address: Address, kind: str) -> Firmware:
+    usual = PROGRAMS[address.driver].programs if address.driver in PROGRAMS else {}
+    program = address.options.get("program") or usual.get(kind, address.driver)
+    files = tuple(Path(one) for one in address.options.get("file", "").split(",") if one)
+    return Firmware(program, files, _one_of(address, "repeatable", ("0", "1"), "0") == "1")
 
 
 def _transmitter(address: Address) -> tuple[tuple[Ns, int, int], ...]:

@@ -17,7 +17,7 @@ which are numbered and have a checksum:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from random import Random
@@ -125,11 +125,19 @@ def private_graph(kernel: Kernel, wire: GraphWire, *, as_bytes: bool) -> Embedde
 
 
 class NodeNames(NamedTuple):
-    """Whose names a vehicle's node has, ``mavros`` by default, whether as in ROS 2, and with ``/tf``."""
+    """How a vehicle's node is named.
+
+    Attributes:
+        whose: Whose names it has; empty for ``mavros``.
+        ros2: Whether as in ROS 2.
+        pose_transform: Whether it publishes the pose on ``/tf``.
+        at_root: Whether its names lie below ``/``, else below ``/<vehicle>``.
+    """
 
     whose: str = ""
     ros2: bool = False
     pose_transform: bool = True
+    at_root: bool = False
 
 
 _DEFAULT_NAMES = NodeNames()
@@ -141,12 +149,12 @@ Serve = Callable[[RosGraph, Link, str, ExecutionContext, LocalFrame, NodeNames],
 def _mavros(
     graph: RosGraph, link: Link, vehicle: str, context: ExecutionContext, origin: LocalFrame, names: NodeNames
 ) -> object:
-    from volery.bridge import ROSCOPTER, VehicleNodeOptions, serve_vehicle  # loads all messages
+    from volery.bridge import MAVLINK_SCHEMES, VehicleNodeOptions, serve_vehicle  # loads all messages
 
     options = VehicleNodeOptions(origin=origin, best_effort=names.ros2, pose_transform=names.pose_transform)
-    if names.whose == ROSCOPTER_NAMES:
-        options = VehicleNodeOptions(names=ROSCOPTER, control=True)
-    return serve_vehicle(graph, link, vehicle, context, options)
+    if names.whose not in ("", MAVROS_NAMES):
+        options = VehicleNodeOptions(names=MAVLINK_SCHEMES[names.whose], control=True)
+    return serve_vehicle(graph, link, "" if names.at_root else vehicle, context, options)
 
 
 def _pprzros(
@@ -160,9 +168,46 @@ def _pprzros(
 NODES: Mapping[str, Serve] = {"MAVLink": _mavros, "pprzlink": _pprzros}
 """By the name of the codec."""
 
-ROSCOPTER_NAMES = "roscopter"
-NAMES_OF = {"MAVLink": ("mavros", ROSCOPTER_NAMES), "pprzlink": ("pprzros",)}
+MAVROS_NAMES, ROSCOPTER_NAMES = "mavros", "roscopter"
+NAMES_OF = {"MAVLink": (MAVROS_NAMES, ROSCOPTER_NAMES), "pprzlink": ("pprzros",)}
 """Whose names that node can have; the first is the default."""
+OWN_NAMES = {
+    "px4": ("px4", "px4-1.16", "px4-1.15", "px4-1.14"),
+    "ardupilot": ("ardupilot", "ardupilot-4.5"),
+}
+"""Names of an autopilot's own ROS 2 interface, which its node can have as well."""
+
+
+def own_names(names: str) -> bool:
+    """Return whether these are names of an autopilot's own ROS 2 interface."""
+    return any(names in valid for valid in OWN_NAMES.values())
+
+
+def use_message_versions(vehicles: Iterable[Vehicle]) -> None:
+    """Define messages as the firmwares have them whose own names the nodes of *vehicles* have.
+
+    It is done before anything uses messages: before components are compiled, and when a node begins.
+    """
+    names = [one.names for one in vehicles if own_names(one.names)]
+    if names:
+        from volery.bridge import MAVLINK_SCHEMES  # loads all messages
+
+        for one in names:
+            MAVLINK_SCHEMES[one].prepare()
+
+
+def topics_below(names: str) -> str:
+    """Return the beginning of the topics of an autopilot's own interface; empty for other names."""
+    return {"px4": "fmu/", "ardupilot": "ap/"}.get(names.partition("-")[0], "")
+
+
+def at_root(vehicle: Vehicle, vehicles: Iterable[Vehicle]) -> bool:
+    """Return whether the names of the node of a vehicle lie below ``/``.
+
+    Those of an autopilot's own interface do, as on an aircraft, unless several of *vehicles* have them.
+    """
+    return own_names(vehicle.names) and sum(own_names(one.names) for one in vehicles) == 1
+
 
 SIMULATED_LINK_OPTIONS = {"texts": "unrecorded"}
 """Driver options for a simulated vehicle on a link: its autopilot records its status texts itself."""
@@ -202,7 +247,7 @@ def names_of(vehicle: Vehicle, codec: Codec | None, commanded: bool) -> str:
     Raises:
         ModelError: The names do not fit its protocol, or components command it, which takes the default.
     """
-    valid = NAMES_OF[codec.name] if codec else ()
+    valid = (*NAMES_OF[codec.name], *OWN_NAMES.get(vehicle.autopilot, ())) if codec else ()
     if vehicle.names and vehicle.names not in valid:
         there = f"its node can have {choices(valid)}" if valid else "it is a node with names of its own"
         what = f"{vehicle.name}: {vehicle.names}'s names do not fit {vehicle.autopilot}: {there}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import nan, radians
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from volery.base.errors import CapabilityError, UsageError, VoleryError, choices
@@ -22,7 +23,7 @@ from volery.kernel.wall import WallKernel
 from volery.links.in_process_link import SharedLink
 from volery.links.link import Link
 from volery.run.assembly.ros_graphs import GRAPHS, open_graph
-from volery.run.result import SAMPLING_PERIOD, VehicleProgress
+from volery.run.result import SAMPLING_PERIOD, Tell, VehicleProgress
 from volery.trace.events import VehicleState
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import Address, open_link, parse
@@ -67,6 +68,8 @@ class VehicleSettings:
         home: Home position of simulated vehicles, or None for the default.
         limits: Limits that every operation must keep.
         fence: Geofence that every operation must keep.
+        run_folder: Folder of the run, in which programs of real firmware have theirs.
+        tell: Receives single lines that the user should read at once.
     """
 
     seed: int = 1
@@ -74,6 +77,8 @@ class VehicleSettings:
     home: Position | None = None
     limits: Limits | None = None
     fence: Fence | None = None
+    run_folder: Path | None = None
+    tell: Tell | None = None
 
 
 def open_vehicles(
@@ -93,7 +98,7 @@ def open_vehicles(
     addresses = {name: parse(url) for name, url in urls.items()}
     for address in addresses.values():
         drivers.load(address.driver)  # report an unknown name before anything else
-    if any(address.transport != "sim" for address in addresses.values()):
+    if not all(address.in_virtual_time for address in addresses.values()):
         return _open_real(addresses, kinds, stated)
     return _open_simulated(addresses, kinds, stated)
 
@@ -102,6 +107,7 @@ def _open_simulated(
     addresses: Mapping[str, Address], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
 ) -> OpenedVehicles:
     require_extra("simulation", "simulated vehicles")
+    from volery.run.assembly.firmware_programs import ProgramFolder
     from volery.run.assembly.simulated_fleet import fleet_of
     from volery.run.assembly.simulated_vehicles import HOME, parse_simulated
 
@@ -112,7 +118,8 @@ def _open_simulated(
     for one in wanted:
         _check_home(one, stated.fence)
     kernel = VirtualKernel(pace=stated.pace)
-    fleet = fleet_of(kernel, wanted, stated.seed)
+    programs = ProgramFolder(stated.run_folder, stated.tell)
+    fleet = fleet_of(kernel, wanted, stated.seed, programs=programs)
     vehicles = [_simulated_vehicle(kernel, fleet, one, kinds[one.vehicle.name], stated) for one in wanted]
     return OpenedVehicles(kernel, tuple(vehicles), fleet, fleet.close)
 
@@ -145,7 +152,7 @@ def _open_real(
     addresses: Mapping[str, Address], kinds: Mapping[str, type[Vehicle]], stated: VehicleSettings
 ) -> OpenedVehicles:
     for address in addresses.values():
-        if address.transport == "sim":
+        if address.in_virtual_time:
             raise CapabilityError(
                 f"{address}: simulated and real vehicles have different clocks; fly them in separate runs"
             )
@@ -193,6 +200,8 @@ class RealGraphs:
         """Return the driver of the vehicle *name*; the path of the address is the namespace."""
         factory = drivers.load(address.driver)
         open_driver = factory.on_graph
+        if address.transport == "ros2" and factory.on_ros2 is not None:
+            open_driver = factory.on_ros2
         if open_driver is None:
             raise UsageError(f"{address}: {address.driver} is reached over a link, not over a ROS graph")
         node = self.graph(address.transport).node(

@@ -7,10 +7,8 @@ from collections.abc import Collection
 from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
-from volery.base.errors import CapabilityError, choices
 from volery.components.instance import Allocation
 from volery.cost import FREE, Pricing
-from volery.model.components import RUNNING_LANGUAGES
 from volery.model.instances import Instance
 from volery.model.system import Bound, System
 from volery.ros.graph.interface import full_node_name
@@ -52,20 +50,8 @@ BY_TRUTH = frozenset(("landing_offset",))
 
 
 def worker_instances(system: System) -> tuple[Instance, ...]:
-    """Return the instances of the application, which get their own processes.
-
-    Raises:
-        CapabilityError: A component is in a language that is not supported there.
-    """
-    found = tuple(one for one in system.instances if not one.is_environment)
-    for one in found:
-        language = one.component.language
-        if language not in RUNNING_LANGUAGES:
-            raise CapabilityError(
-                f"{one.name}: a component in {language} cannot be a process on a real graph yet; "
-                f"there is {choices(RUNNING_LANGUAGES)}"
-            )
-    return found
+    """Return the instances of the application, which get their own processes."""
+    return tuple(one for one in system.instances if not one.is_environment)
 
 
 def without_computers(system: System) -> tuple[System, tuple[str, ...]]:

@@ -15,6 +15,7 @@ from functools import partial
 from typing import Any, Protocol
 
 from volery.base.errors import ComponentError, UsageError, VoleryError
+from volery.base.time import Ns, S
 from volery.components.instance import Instance
 from volery.components.loader import SHARED_MODULE_PREFIX, USER_MODULE_PREFIX
 from volery.components.ports import Port, invoke
@@ -253,6 +254,10 @@ class CallFormats:
         return self._json
 
 
+_DISCOVERY: Ns = 10 * S
+"""Longest wait for the server of an operation before its first call."""
+
+
 class RemotePort(Port):
     """Port to a component of another process.
 
@@ -270,12 +275,16 @@ class RemotePort(Port):
         super().__init__(kernel, caller, callee, None, None)
         self._clients = clients
         self._formats = formats
+        self._met: set[str] = set()  # operations whose server was discovered
 
     def _execute(self, task: Task, operation: str, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
         written = self._formats[operation]
         asked = written.request(args, kwargs, f"the arguments of {self.component}.{operation}")
+        client = self._clients[operation]
+        if operation not in self._met and client.wait(_DISCOVERY):  # ROS 2 may know of it after the start
+            self._met.add(operation)
         try:
-            answer = self._clients[operation].call(asked)
+            answer = client.call(asked)
         except ServiceError as error:
             raise ComponentError(self.component, f"{operation} failed: {error.what}") from error
         if not answer.done:

@@ -240,6 +240,8 @@ class VehicleRules:
     """Return whether the landed detector of a vehicle in flight reports the ground."""
     position_kept: float = 10.0
     """Time for which a position counts after the receiver has lost its fix [s]."""
+    pose_kept: float = 7.0
+    """Time for which it counts after the last external pose [s]; by default posRetryTimeNoVel_ms of EKF3."""
     return_point: Callable[[Vehicle], Vector | None] = do_nothing
     """Return where a return ends and its least height, north, east, down [m]; ``None``: home."""
     height_above_ground: Callable[[Vehicle], float] = height_above_home
@@ -367,6 +369,8 @@ class Vehicle:
     def position_ok(self) -> bool:
         """Whether the estimator has a position that counts."""
         estimate = self.estimate
+        if estimate.by_poses:
+            return estimate.position_ok and estimate.gps_age < self.rules.pose_kept
         fresh = estimate.gps_age < self.rules.position_kept
         return estimate.position_ok and (fresh or estimate.fix_type >= FIX_3D)
 

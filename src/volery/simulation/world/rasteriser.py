@@ -2,7 +2,7 @@
 
 * A depth buffer says which surface each sight line meets; where on it is solved for the line itself, so that
   the edges of markers are exact under any lens. A pixel of a marker is the mean over its footprint.
-* The ground is level at a given height. It and the tops of solids have a texture; sides are shaded flat.
+* The ground is level at a given height. It, the tops of solids and their sides have a texture.
 * Motion blur is along the image motion of each pixel during the exposure (Longuet-Higgins and Prazdny, Proc.
   R. Soc. Lond. B 208, 1980). All rows are exposed at once.
 * Noise follows EMVA 1288: of the photons and of reading. Light that the longest exposure does not gather is
@@ -45,14 +45,14 @@ _BLACK, _WHITE = 0.04, 0.85
 _SUN = (0.36, -0.48, 0.8)  # unit vector to the sun: east, north, up
 _AMBIENT = 0.45
 _TILE = 256  # texels along a side of the texture
-_FINE, _COARSE = 0.02, 0.7  # [m] side of a texel
+_FINE, _COARSE, _PLASTER = 0.02, 0.7, 0.03  # [m] side of a texel; the last: of sides
 _MOST_SAMPLES = 24  # along the motion of a pixel
 _FULL_LUX_S = 10_000.0 * 0.0005  # exposure of a white surface that nearly saturates a pixel at gain 1
 _WELL = 10_000.0  # [electrons] that saturate a pixel at gain 1
 _READ = 5.0  # [electrons] standard deviation of reading a pixel
 
 # Columns of a triangle, of a marker, and of the settings of a picture.
-_REFLECTANCE, _LEVEL, _TRIANGLE = 9, 10, 11
+_REFLECTANCE, _LEVEL, _ALONG, _TRIANGLE = 9, 10, 11, 13
 _COS, _SIN, _SIDE, _CELLS, _FIRST_CELL, _MARKER = 3, 4, 5, 6, 7, 8
 _VELOCITY, _RATES = 0, 3
 _FOCAL, _CENTRE_X, _CENTRE_Y, _HEIGHT, _TIME, _GAIN, _SIGNAL, _SETTINGS = range(8)
@@ -209,7 +209,10 @@ class Rasteriser:
 
 
 def _triangles(solids: Sequence[Solid]) -> Array:
-    """Return the triangles of solids (triangles, 11): corners anticlockwise, reflectance, level or not."""
+    """Return the triangles of solids (triangles, 13).
+
+    Corners anticlockwise, reflectance, level or not, unit vector (east, north) along which the texture lies.
+    """
     rows: list[tuple[float, ...]] = []
     for solid in solids:
         low, top = solid.floor, min(solid.ceiling, max(solid.floor, 0.0) + _TALLEST)
@@ -225,15 +228,16 @@ def _triangles(solids: Sequence[Solid]) -> Array:
             shade = _WALL * (_AMBIENT + (1.0 - _AMBIENT) * lit)
             a, b = (x, y, low), (to_x, to_y, low)
             c, d = (to_x, to_y, top), (x, y, top)
-            rows += [(*a, *b, *c, shade, 0.0), (*a, *c, *d, shade, 0.0)]
+            along = (to_x - x) / length, (to_y - y) / length
+            rows += [(*a, *b, *c, shade, 0.0, *along), (*a, *c, *d, shade, 0.0, *along)]
         for part in get_parts(constrained_delaunay_triangles(Polygon(corners).buffer(0.0))):
             one, two, three = part.exterior.coords[:3]
             across = (two[0] - one[0]) * (three[1] - one[1]) - (two[1] - one[1]) * (three[0] - one[0])
             if across < 0.0:
                 two, three = three, two
-            rows.append((*one[:2], top, *two[:2], top, *three[:2], top, _TOP, 1.0))
+            rows.append((*one[:2], top, *two[:2], top, *three[:2], top, _TOP, 1.0, 0.0, 0.0))
             if low > 0.0:
-                rows.append((*one[:2], low, *three[:2], low, *two[:2], low, _WALL * _AMBIENT, 0.0))
+                rows.append((*one[:2], low, *three[:2], low, *two[:2], low, _WALL * _AMBIENT, 0.0, 1.0, 0.0))
     return np.array(rows, dtype=np.float64).reshape(-1, _TRIANGLE)
 
 
@@ -378,6 +382,14 @@ def _textured(texture: Array, east: float, north: float, side: float) -> float:
 
 
 @numeric
+def _plaster(texture: Array, along: Array, east: float, north: float, up: float, scale: float) -> float:
+    """Return the factor of the texture at a place [m] of a side, seen at a scale [pixels/m]."""
+    value = _textured(texture, along[0] * east + along[1] * north, up, _PLASTER) - 1.0
+    factor: float = 1.0 + value * min(1.0, _PLASTER * scale)
+    return factor
+
+
+@numeric
 def _marked(  # noqa: PLR0917  # numbers
     markers: Array, cells: NDArray[np.uint8], at: int, across: float, up: float, wide: float, tall: float
 ) -> tuple[float, float]:
@@ -476,8 +488,18 @@ def _shade(  # noqa: PLR0913, PLR0917  # see draw_picture
                 level, value = True, _GROUND * lit
             elif inverse > 0.0:
                 level, value = triangles[index, _LEVEL] != 0.0, triangles[index, _REFLECTANCE]
-                if level:
-                    value *= lit
+                value *= (
+                    lit
+                    if level
+                    else _plaster(
+                        texture,
+                        triangles[index, _ALONG:],
+                        pose[0] + to_east / inverse,
+                        pose[1] + to_north / inverse,
+                        pose[2] + to_up / inverse,
+                        focal * inverse,
+                    )
+                )
             if level:
                 distance = 1.0 / inverse
                 east, north = pose[0] + to_east * distance, pose[1] + to_north * distance

@@ -321,11 +321,13 @@ class Publication(NamedTuple):
         topic: Name of the topic, below that of the vehicle.
         type: ROS type of the messages, such as ``sensor_msgs/msg/Range``.
         fill: ``fill(message, values)`` writes a sample into a new message, whose header is there already.
+        on_demand: Whether it is published only while a node subscribes to it or its content is recorded.
     """
 
     topic: str
     type: str
     fill: Callable[[Any, Any], None]
+    on_demand: bool = False
 
 
 Sampler = Callable[[SensorInput, int], Any]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from struct import Struct, pack_into
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -58,6 +58,7 @@ from volery.simulation.world.state_layout import (
     U_GUST,
     U_MOTOR_HEALTH,
     U_PAYLOAD,
+    U_THROTTLE,
     U_WIND,
     WORLD,
     Array,
@@ -127,6 +128,16 @@ class Collision(NamedTuple):
     speed: float
     position: Vector
     collisions: int
+
+
+class Attendant(Protocol):
+    """What is called at grid steps of a body, such as a firmware in lock step."""
+
+    next_step: int
+    """Grid step of the next call."""
+
+    def attend(self) -> None:
+        """Act at ``next_step``, which the body has reached and not left, and set the next one."""
 
 
 class _PendingInput:
@@ -220,6 +231,7 @@ class World:
             for body, spec in enumerate(self.specs)
             if spec.added_sensors
         }
+        self._attendants: dict[int, Attendant] = {}
         self._advance()
         for body in self._mounted:
             self._sample_mounted(body)
@@ -238,6 +250,20 @@ class World:
         """Set inputs of *body*, from *column* of its row on, with effect from the next grid step."""
         pending = self._pending.setdefault(body, deque())
         pending.append(_PendingInput(self.now() // STEP + 1, column, values))
+
+    def attend(self, body: int, attendant: Attendant | None) -> None:
+        """Let *attendant* act at grid steps of *body* from now on, in place of another; ``None``: none does.
+
+        It is called while the body is caught up for any reader, so its calls do not depend on who reads.
+        """
+        if attendant is None:
+            self._attendants.pop(body, None)
+        else:
+            self._attendants[body] = attendant
+
+    def command_motors(self, body: int, commands: Sequence[float]) -> None:
+        """Set the motor commands of the step that *body* is about to take; for its attendant."""
+        pack_into(f"{len(commands)}d", self._octets, self._row_octets * body + OCTETS * U_THROTTLE, *commands)
 
     def payload_power(self, body: int, watts: float) -> None:
         """Set the electrical power of the computers on *body* [W], from the next grid step on."""
@@ -313,24 +339,29 @@ class World:
 
     def _catch_up(self, step: int) -> None:
         """Advance every active body to *step*: those with stops one by one, then all in one call."""
-        if self._pending or self._mounted:
-            for body in [*self._pending, *(self._mounted.keys() - self._pending.keys())]:
+        if self._pending or self._mounted or self._attendants:
+            for body in dict.fromkeys((*self._pending, *self._mounted, *self._attendants)):
                 if step - self._read[body] < ACTIVE_STEPS:
                     self._catch_up_by_stops(body, step)
         self._advance_span(0, len(self.specs), step)
 
     def _catch_up_by_stops(self, body: int, step: int) -> None:
-        """Advance *body* to its last stop up to *step*; at a stop an input or a sample of it is due."""
+        """Advance *body* to its last stop up to *step*; at a stop an input, a sample or a call is due."""
         while True:
             stops = [sensor.next_step for sensor in self._mounted.get(body, {}).values()]
             if body in self._pending:
                 stops.append(self._pending[body][0].step)
+            attendant = self._attendants.get(body)
+            if attendant is not None:
+                stops.append(attendant.next_step)
             stop = min(stops, default=step + 1)
             if stop > step:
                 return
             self._advance_span(body, body + 1, stop)
             self._sample_mounted(body)
             self._apply_inputs(body)
+            if attendant is not None and attendant.next_step == stop:
+                attendant.attend()
 
     def _advance_span(self, first: int, end: int, step: int) -> None:
         """Advance the active ones of the bodies from *first* to before *end* in one compiled call."""

@@ -110,8 +110,8 @@ def report_field_elevation(vehicle: Vehicle) -> None:
 
 
 def report_gps_use(vehicle: Vehicle, units: Sequence[int]) -> None:
-    """Report that these estimator units use GPS."""
-    for unit in units:
+    """Report that these estimator units use GPS, unless they use external poses."""
+    for unit in () if vehicle.estimate.by_poses else units:
         vehicle.send_text(INFO, f"EKF3 IMU{unit} is using GPS")
 
 

@@ -98,8 +98,9 @@ POSITION = round(41.45 * S)
 EACH_SECOND = round(0.285 * S)
 
 ARMING_TEXTS = ("Arming motors", "Disarming motors")
-LANDED_TO_DISARM = 200 * MS
-"""Recorded: disarming 2.07 s after touch-down, most of it in the landed detector."""
+LANDED_TO_DISARM = 800 * MS
+"""Time in which the motors spool down. Recorded: disarming 2.07 s after touch-down, 1.3 s of it in the landed
+detector."""
 RUDDER_HOLD = 2 * S
 OPTION_MODES = {
     4: 6,

@@ -1,7 +1,8 @@
 """Sources of ArduPilot's estimator: sets chosen by command or switch, and glitches of the satellites.
 
-EK3_SRCn_POSXY of the chosen set decides whether satellites are used; it is read when the set is chosen. The
-other sources a set may name do not exist here, so that such a set has no position.
+EK3_SRCn_POSXY of the chosen set decides whether satellites are used; it is read when the set is chosen.
+External poses are those of ``external_navigation``. The other sources that a set may name do not exist here,
+so that such a set has no position.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from dataclasses import dataclass, replace
 from volery.base.time import Ns, S
 from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Kept
 from volery.simulation.autopilots.ardupilot.modes import CRITICAL
-from volery.simulation.autopilots.ardupilot.parameter_checks import GPS, SETS
+from volery.simulation.autopilots.ardupilot.parameter_checks import EXTERNAL, GPS, SETS
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, Command, Fields
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -26,6 +27,8 @@ GLITCHING = 1 << 15
 class SourceState:
     """Satellites as the estimator uses them. Times in ns."""
 
+    number: int = 1
+    """The chosen set."""
     ignored: bool = False
     """Whether the chosen set of sources has no satellites."""
     glitching: bool = False
@@ -39,12 +42,17 @@ sources_of = Kept(SourceState)
 
 def choose_sources(vehicle: Vehicle, number: int) -> None:
     """Use the sources of a set, from 1; before the estimator has an origin nothing changes."""
-    ignored = vehicle.parameters[f"EK3_SRC{number}_POSXY"] != GPS
+    source = vehicle.parameters[f"EK3_SRC{number}_POSXY"]
+    ignored = source != GPS
     started = vehicle.uptime() > vehicle.rules.startup.origin_after
     sources = sources_of(vehicle)
-    if started and ignored != sources.ignored:
+    if not started:
+        return
+    sources.number = number
+    if ignored != sources.ignored:
         sources.ignored = ignored
-        vehicle.flight.use_gps(not ignored)
+        if source != EXTERNAL or not vehicle.parameters["VISO_TYPE"]:
+            vehicle.flight.use_gps(not ignored)
 
 
 def on_set_sources(vehicle: Vehicle, command: Command) -> int:

@@ -19,6 +19,7 @@ from volery.simulation.autopilots.ardupilot.modes import (
 )
 from volery.simulation.autopilots.autopilot import Failsafe
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
+from volery.simulation.autopilots.manoeuvres.to_point import Land
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -27,6 +28,8 @@ LOST_FOR: Ns = S
 WARNED_EVERY: Ns = 30 * S
 LAND_IN_ANY_MODE = 3
 """Value of FS_EKF_ACTION."""
+LANDS_AFTER: Ns = 4 * S
+"""Time for which LAND by a failsafe holds its height first (LAND_WITH_DELAY_MS)."""
 BATTERY_FAILSAFES = frozenset({"battery low", "battery critical"})
 
 CONTINUE_MISSION_ON_RADIO, CONTINUE_MISSION_ON_STATION = 1 << 0, 1 << 1
@@ -128,7 +131,17 @@ def _report_cleared(vehicle: Vehicle, what: str) -> None:
 
 def _enter_first(vehicle: Vehicle, modes: tuple[int, ...]) -> None:
     """Enter the first of these modes that is possible."""
-    any(change_mode(vehicle, mode) for mode in modes)
+    any(_change_mode(vehicle, mode) for mode in modes)
+
+
+def _change_mode(vehicle: Vehicle, number: int) -> bool:
+    """Enter a mode if that is possible; a landing that begins so waits first. Return whether it is flown."""
+    before = vehicle.mode
+    if not change_mode(vehicle, number):
+        return False
+    if vehicle.mode is not before and isinstance(vehicle.manoeuvre, Land):
+        vehicle.manoeuvre.waits_until = vehicle.kernel.now() + LANDS_AFTER
+    return True
 
 
 # -- copter
@@ -246,7 +259,7 @@ def _on_estimator_lost(vehicle: Vehicle) -> None:
     if not vehicle.armed or not (vehicle.mode.needs_position or action == LAND_IN_ANY_MODE):
         return
     mode = {1: LAND, 2: ALT_HOLD, LAND_IN_ANY_MODE: LAND}.get(action)
-    if mode is not None and change_mode(vehicle, mode):
+    if mode is not None and _change_mode(vehicle, mode):
         vehicle.send_text(CRITICAL, f"EKF Failsafe: changed to {vehicle.mode.name} Mode")
 
 

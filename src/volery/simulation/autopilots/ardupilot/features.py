@@ -38,6 +38,7 @@ ORDER = (
     Entry("rally", ON),
     Entry("fence", ON),
     Entry("estimator_sources", ON),
+    Entry("external_navigation", ON),
     Entry("proximity", ON),
     Entry("precision_landing", ON),
     Entry("range_finder", ON),

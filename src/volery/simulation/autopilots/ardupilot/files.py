@@ -9,6 +9,7 @@ import struct
 from collections.abc import Mapping
 from functools import partial
 
+from volery.base.time import S
 from volery.simulation.autopilots.autopilot_parameters import INT8, INT16, INT32, Parameters
 from volery.simulation.autopilots.mavlink.file_service import Content, Encode, FilePolicy
 from volery.simulation.autopilots.vehicle_state import Vehicle
@@ -53,4 +54,5 @@ FILES = FilePolicy(
     taken=_FAIL,
     unknown=_FAIL,
     own_session=False,
+    expires=3 * S,
 )

@@ -197,6 +197,8 @@ def aim(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
 def _descent(vehicle: Vehicle, place: Vector, rate: float) -> float:
     """Return the rate of descent [m/s] over a target, of a landing that would descend at *rate*."""
     here, farthest = vehicle.estimate.position, vehicle.parameters["PLND_XY_DIST_MAX"]
+    if rate <= 0.0:
+        return 0.0
     error = hypot(place[0] - here[0], place[1] - here[1])
     if error > farthest > 0.0:
         return 0.0

@@ -2,7 +2,8 @@
 
 * Attitude and rates, every grid step: the attitude error as a quaternion, limited by a square-root law, gives
   rates; a PID on each rate has its derivative on the measurement. The mixer gives roll and pitch precedence
-  over yaw, and yaw over collective. Motor output is linear in thrust through ArduPilot's thrust curve
+  over yaw, and yaw over collective; in a descent torques hardly raise the collective, so that a vehicle on
+  the ground stays there. Motor output is linear in thrust through ArduPilot's thrust curve
   (MOT_THST_EXPO, MOT_SPIN_MIN, MOT_SPIN_MAX), and independent of the voltage where C_FULL_VOLTS is above 0
   (MOT_BAT_VOLT_MAX, MOT_BAT_VOLT_MIN: apply_thrust_curve_and_volt_scaling of AP_MotorsMulticopter).
 * Where C_YAW_P is above 0 yaw is ArduCopter's, which swings: angle gain ATC_ANG_YAW_P, its braking limited to
@@ -22,6 +23,7 @@ from volery.base.elementary import atan2, sine_cosine
 from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
     C_ACCEL,
+    C_CLIMB,
     C_COASTS,
     C_CONTROL,
     C_FULL_VOLTS,
@@ -42,6 +44,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     C_YAW_MODE,
     C_YAW_P,
     C_YAW_RATE,
+    CLIMB,
     DRIVE,
     IDLE,
     K_ACCEL,
@@ -73,8 +76,10 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_YAW_SPEED,
     MOTOR,
     OFF,
+    POSITION_CLIMB,
     RATE,
     STEER,
+    VELOCITY,
 )
 from volery.simulation.autopilots.flight_stack.guidance import GUIDE_S, approach, ramp
 from volery.simulation.world.arithmetic import clip, wrap_angle
@@ -112,6 +117,7 @@ _SPIN_MAX = 0.95
 _EXPO = 0.65
 _VOLTS_FILTER = STEP_S / (STEP_S + 1.0 / (2.0 * pi * 0.5))  # AP_MOTORS_BATT_VOLT_FILT_HZ: 0.5 Hz
 _SPOOL_TIME = 0.5  # [s]
+_THROTTLE_MIX = 0.1  # ATC_THR_MIX_MIN: share of the hover throttle up to which torques raise the collective
 _YAW_ROOM = 0.2  # of full thrust that yaw may always have
 
 
@@ -226,6 +232,14 @@ def _volts_share(row: Array) -> float:
 
 
 @numeric
+def _sinks(row: Array, control: int) -> bool:
+    """Return whether a descent is demanded."""
+    if control == VELOCITY:
+        return bool(row[C_VELOCITY + 2] > 0.0)
+    return control in (CLIMB, POSITION_CLIMB) and bool(row[C_CLIMB] < 0.0)
+
+
+@numeric
 def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
     """Write motor commands from three torques and the collective."""
     reach = 1e-9
@@ -238,8 +252,11 @@ def _mix(row: Array, roll: float, pitch: float, yaw: float) -> None:
         row[K_MOTORS + i] = share
         low, high = min(low, share), max(high, share)
     scale = 1.0 if high - low <= 1.0 else 1.0 / (high - low)
-    low, high = low * scale, high * scale
     target = row[K_THROTTLE] * row[K_SPOOL]
+    room = target + max(0.0, _THROTTLE_MIX * (row[K_HOVER_THROTTLE] - target))
+    if -low * scale > room and _sinks(row, int(row[C_CONTROL])):
+        scale = room / -low
+    low, high = low * scale, high * scale
     collective = clip(target, -low, max(1.0 - high, -low))
     row[K_AT_LOWER_LIMIT] = 1.0 if target <= 0.01 - low else 0.0
     share = _volts_share(row)

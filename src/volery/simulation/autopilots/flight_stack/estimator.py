@@ -4,7 +4,8 @@ Attitude: gyroscope integration, corrected by the magnetometer's heading and by 
 the position filter finds (without satellites: by the accelerometer's direction), with a gyro bias. Position:
 three axes, each with a Kalman filter of position, velocity and acceleration bias (Brown and Hwang,
 Introduction to Random Signals and Applied Kalman Filtering, 4.2), fed by satellites horizontally and by the
-barometer in height, or by satellites alone where they are better (a real-time kinematic fix).
+barometer in height, or by satellites alone where they are better (a real-time kinematic fix). External poses
+come as innovations, in place of satellites and, if commanded, of barometer and compass.
 """
 
 from __future__ import annotations
@@ -14,10 +15,18 @@ from math import sqrt
 from volery.base.elementary import atan2
 from volery.base.numeric_code import numeric
 from volery.simulation.autopilots.flight_stack.flight_state import (
+    BY_POSES,
     C_AIDED,
     C_GPS_GATE,
     C_GPS_RADIUS,
     C_GPS_SIGMA,
+    C_POSE,
+    C_POSE_COUNT,
+    C_POSE_SIGMA,
+    C_POSE_TURN,
+    C_POSE_USE,
+    C_POSE_YAW,
+    FUSE,
     K_ACCEL,
     K_ACCEL_BIAS,
     K_AIDED,
@@ -39,7 +48,9 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_USED_BARO,
     K_USED_GPS,
     K_USED_MAG,
+    K_USED_POSE,
     K_VELOCITY,
+    RESET,
     W_DCM,
 )
 from volery.simulation.world.arithmetic import wrap_angle
@@ -247,7 +258,7 @@ def _reset_covariance(row: Array, axis: int, position: float, velocity: float) -
 def _switch_aiding(row: Array) -> None:
     """Begin or end the use of satellites as commanded by C_AIDED."""
     commanded = row[C_AIDED] > 0.5
-    if commanded and row[K_AIDED] < 0.5 and row[M_GPS_FIX] > 2.5:
+    if commanded and row[C_AIDED] != BY_POSES and row[K_AIDED] < 0.5 and row[M_GPS_FIX] > 2.5:
         row[K_AIDED] = 1.0
         row[K_GPS_AGE] = 0.0
         for axis in range(3):
@@ -324,11 +335,56 @@ def _fuse_gps(row: Array) -> None:
         _fuse_position(row, 2, row[M_GPS + 2] - row[K_POSITION + 2], _variance(row, P_GPS_VERTICAL_ERROR))
         row[K_BARO_OFFSET] = row[M_BARO] + row[K_POSITION + 2]
     _fuse_velocity(row, 2, row[M_GPS_VELOCITY + 2] - row[K_VELOCITY + 2], 4.0 * speed)
+    _level(row)
+    row[K_GPS_AGE] = 0.0
+
+
+@numeric
+def _level(row: Array) -> None:
+    """Correct the tilt by part of the estimated acceleration bias."""
     share = _TILT_GAIN * min(row[K_GPS_AGE], _STALE)
     north, east = share * row[K_ACCEL_BIAS], share * row[K_ACCEL_BIAS + 1]
     row[K_ACCEL_BIAS] -= north
     row[K_ACCEL_BIAS + 1] -= east
     _correct_attitude(row, east / row[P_GRAVITY], -north / row[P_GRAVITY], 0.0, _TILT_INTEGRAL / _TILT_GAIN)
+
+
+@numeric
+def _use_pose(row: Array) -> None:
+    """Use a new external pose: its distance from the estimate was judged when it came."""
+    variance = row[C_POSE_SIGMA] * row[C_POSE_SIGMA]
+    resets = row[C_POSE_USE] == RESET
+    starts = resets and row[K_AIDED] < 0.5
+    row[K_GPS_INNOVATION] = max(abs(row[C_POSE]), abs(row[C_POSE + 1])) / sqrt(row[K_COVARIANCE] + variance)
+    if row[C_POSE_USE] < FUSE or not (resets or row[K_AIDED] > 0.5):
+        return
+    for axis in range(2):
+        if not resets:
+            _fuse_position(row, axis, row[C_POSE + axis], variance)
+            continue
+        speed = row[K_COVARIANCE + 6 * axis + 3]
+        row[K_POSITION + axis] += row[C_POSE + axis]
+        row[K_TARGET + axis] += row[C_POSE + axis]
+        if starts:
+            row[K_VELOCITY + axis] = row[K_ACCEL_BIAS + axis] = 0.0
+            speed = 1.0
+        _reset_covariance(row, axis, variance, speed)
+    row[K_AIDED] = 1.0
+    if row[C_POSE_SIGMA + 1] > 0.0:
+        if resets:
+            row[K_POSITION + 2] += row[C_POSE + 2]
+            row[K_TARGET + 2] += row[C_POSE + 2]
+        else:
+            _fuse_position(row, 2, row[C_POSE + 2], row[C_POSE_SIGMA + 1] * row[C_POSE_SIGMA + 1])
+        row[K_BARO_OFFSET] = row[M_BARO] + row[K_POSITION + 2]
+    if row[C_POSE_YAW] > 0.5:
+        row[K_HEADING_ERROR] = -row[C_POSE_TURN]
+        if starts:
+            _correct_attitude(row, 0.0, 0.0, row[C_POSE_TURN], 0.0)
+        else:
+            _correct_heading(row, row[C_POSE_TURN])
+    if not starts:
+        _level(row)
     row[K_GPS_AGE] = 0.0
 
 
@@ -349,7 +405,34 @@ def _fuse_heading(row: Array) -> None:
     declination = atan2(row[P_MAGNETIC_FIELD + 1], row[P_MAGNETIC_FIELD])
     error = wrap_angle(atan2(east, north) - declination)
     row[K_HEADING_ERROR] = error
-    _correct_attitude(row, 0.0, 0.0, -_HEADING_GAIN * _FUSE_S * error, _HEADING_INTEGRAL / _HEADING_GAIN)
+    _correct_heading(row, -error)
+
+
+@numeric
+def _correct_heading(row: Array, turn: float) -> None:
+    """Correct the heading by a share of what it is measured to be off, clockwise [rad]."""
+    _correct_attitude(row, 0.0, 0.0, _HEADING_GAIN * _FUSE_S * turn, _HEADING_INTEGRAL / _HEADING_GAIN)
+
+
+@numeric
+def _fuse_height(row: Array) -> None:
+    """Correct the height by the barometer, unless better satellites are used."""
+    if row[M_GPS_FIX] >= RTK_FIX and row[K_AIDED] > 0.5 and row[C_AIDED] != BY_POSES:
+        return
+    missed = row[K_BARO_OFFSET] - row[M_BARO] - row[K_POSITION + 2]
+    _fuse_position(row, 2, missed, _variance(row, P_BARO_ERROR))
+
+
+@numeric
+def _fuse_place(row: Array) -> None:
+    """Fuse a new pose or fix, whichever is used."""
+    if row[C_AIDED] == BY_POSES:
+        if row[C_POSE_COUNT] != row[K_USED_POSE]:
+            row[K_USED_POSE] = row[C_POSE_COUNT]
+            _use_pose(row)
+    elif row[M_GPS_COUNT] != row[K_USED_GPS] and row[K_AIDED] > 0.5:
+        row[K_USED_GPS] = row[M_GPS_COUNT]
+        _fuse_gps(row)
 
 
 @numeric
@@ -362,15 +445,12 @@ def _fuse(row: Array) -> None:
             _propagate_covariance(row, axis)
     if row[M_BARO_COUNT] != row[K_USED_BARO]:
         row[K_USED_BARO] = row[M_BARO_COUNT]
-        if not (row[M_GPS_FIX] >= RTK_FIX and row[K_AIDED] > 0.5):
-            missed = row[K_BARO_OFFSET] - row[M_BARO] - row[K_POSITION + 2]
-            _fuse_position(row, 2, missed, _variance(row, P_BARO_ERROR))
+        _fuse_height(row)
     if row[M_MAG_COUNT] != row[K_USED_MAG]:
         row[K_USED_MAG] = row[M_MAG_COUNT]
-        _fuse_heading(row)
-    if row[M_GPS_COUNT] != row[K_USED_GPS] and row[K_AIDED] > 0.5:
-        row[K_USED_GPS] = row[M_GPS_COUNT]
-        _fuse_gps(row)
+        if row[C_POSE_YAW] < 0.5:
+            _fuse_heading(row)
+    _fuse_place(row)
     if row[K_AIDED] < 0.5 or row[K_GPS_AGE] > _STALE:
         _fuse_gravity(row, row[P_GRAVITY])
     for index in range(2):

@@ -19,18 +19,22 @@ from volery.base.frames import LocalFrame, Vector
 from volery.base.time import Ns
 from volery.simulation.autopilots.flight_stack.control_loops import thrust_share
 from volery.simulation.autopilots.flight_stack.flight_state import (
+    BY_POSES,
     C_AIDED,
     C_COASTS,
     C_CONTROL,
     C_FULL_VOLTS,
     C_GPS_GATE,
     C_HOVER_KEPT,
+    C_POSE_COUNT,
     C_STICK,
     C_YAW_P,
     EXTERNAL,
     FLIGHT,
     HOLD_HEADING,
+    K_BARO_OFFSET,
     K_HOVER_THROTTLE,
+    K_ORIGIN,
     K_POSITION,
     K_RATE_TUNING,
     K_STORED_HOVER,
@@ -67,7 +71,7 @@ from volery.simulation.world.state_layout import (
     U_WIND,
     W_ROTATION,
 )
-from volery.simulation.world.world import STEP, Collision, Truth, World
+from volery.simulation.world.world import STEP, Attendant, Collision, Truth, World
 
 __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
@@ -244,6 +248,7 @@ class Flight:
         self._converted: tuple[Vector, Vector] = (_NOWHERE, _NOWHERE)
         self.gripper: int | None = None
         """What the gripper has done last: 0 released, 1 grabbed; ``None``: nothing yet."""
+        self._poses = 0
         self.estimate_error: Sequence[float] = ()
         """Error that the firmware's own estimator adds to the estimate, or empty: of the position [m], then
         of the velocity [m/s], each north, east, down. The inner loops fly without it."""
@@ -300,6 +305,30 @@ class Flight:
             self._world.set_input(self._body, C_CONTROL, *self._driven)
         inputs = commands if self.flying else (-commands[0], commands[1])
         self._world.set_input(self._body, U_THROTTLE, *inputs)
+
+    def attend(self, attendant: Attendant | None) -> None:
+        """Let *attendant* give the motor commands and read ``row`` at grid steps of its own: a firmware.
+
+        ``drive_motors`` comes before it, and says what the motors do until its first call.
+        """
+        self._world.attend(self._body, attendant)
+
+    def command_motors(self, commands: Sequence[float]) -> None:
+        """Set the motor commands of the step that the body is about to take; for its attendant.
+
+        Args:
+            commands: Of each motor, 0..1; of a rover steering, left positive, and throttle, both -1..1.
+        """
+        self._world.command_motors(self._body, commands)
+
+    def advance(self) -> None:
+        """Let the body and its attendant reach the present."""
+        self._world.advance_to_now(self._body)
+
+    @property
+    def row(self) -> Sequence[float]:
+        """The state row of the grid step that the body has reached, by the columns of ``state_layout``."""
+        return self._row
 
     @property
     def mass(self) -> float:
@@ -361,11 +390,47 @@ class Flight:
 
     def forget_origin(self) -> None:
         """Stop using satellites, as after a restart of the autopilot."""
+        self._airframe.place(None)
         self._world.set_input(self._body, C_AIDED, 0.0)
 
     def use_gps(self, used: bool) -> None:
-        """Stop using satellites, or use them again with the origin as it was; the receiver works on."""
+        """Stop using satellites, or use them again with the origin as it was; the receiver works on.
+
+        They are the measure of degrees then: an origin that a user has placed does not count any more.
+        """
+        if used:
+            self._airframe.place(None)
         self._world.set_input(self._body, C_AIDED, 2.0 if used else 0.0)
+
+    def use_poses(self) -> None:
+        """Use external poses in place of satellites, with the origin as it is."""
+        self._world.set_input(self._body, C_AIDED, float(BY_POSES))
+
+    def use_pose(
+        self, use: int, off: Vector, turn: float, sigmas: tuple[float, float], *, by_heading: bool
+    ) -> None:
+        """Use an external pose while these are in use.
+
+        Args:
+            use: ``REFUSE``, ``FUSE`` or ``RESET`` of ``flight_state``: note it, fuse it, or begin with it.
+            off: The pose less the estimate at its time, north, east, down [m].
+            turn: Likewise its yaw, clockwise [rad].
+            sigmas: Its standard deviations, horizontal and vertical [m]; vertical 0: the barometer counts.
+            by_heading: Whether its yaw counts in place of the compass.
+        """
+        self._poses += 1
+        pose = (float(self._poses), float(use), *off, turn, *sigmas, float(by_heading))
+        self._world.set_input(self._body, C_POSE_COUNT, *pose)
+
+    def place_origin(self, latitude: float, longitude: float, amsl: float) -> None:
+        """Set the estimator's origin, about which the position stays what it is: before it is aided."""
+        estimate = self.estimate()
+        _, _, before = estimate.origin_ned
+        self._airframe.place(LocalFrame(latitude, longitude, amsl))
+        self._world.set_input(self._body, K_ORIGIN, 0.0, 0.0, 0.0)
+        self._world.set_input(self._body, K_POSITION, *estimate.position)
+        self._world.set_input(self._body, K_BARO_OFFSET, self._row[K_BARO_OFFSET] - before)
+        self._latest, self._converted = None, (_NOWHERE, _NOWHERE)
 
     def set_gps_gate(self, gate: float, sigma: float, radius: float) -> None:
         """Let the estimator refuse fixes that are far from its position, as EKF3 of ArduPilot does.
@@ -492,9 +557,10 @@ class Flight:
 
     def to_ned(self, latitude: float, longitude: float, amsl: float) -> Vector:
         """Convert degrees and metres AMSL to north, east, down about the estimator's present origin [m]."""
-        north, east, down = self.frame.to_ned(latitude, longitude, amsl)
+        local = self._airframe.local
+        north, east, down = local.to_ned(latitude, longitude, amsl)
         if max(abs(north), abs(east), abs(down)) > _FAR:
-            north, east, down = self.frame.to_ned_flat(latitude, longitude, amsl)
+            north, east, down = local.to_ned_flat(latitude, longitude, amsl)
         origin = self.estimate().origin_ned
         return north - origin[0], east - origin[1], down - origin[2]
 
@@ -503,7 +569,7 @@ class Flight:
         origin = self.estimate().origin_ned
         point = ned[0] + origin[0], ned[1] + origin[1], ned[2] + origin[2]
         if point != self._converted[0]:  # a target is reported again and again
-            self._converted = point, self.frame.from_ned(point)
+            self._converted = point, self._airframe.local.from_ned(point)
         return self._converted[1]
 
     @property

@@ -66,6 +66,10 @@ class Control(IntEnum):
 OFF, IDLE, ATTITUDE, CLIMB, VELOCITY, POSITION, POSITION_CLIMB, VELOCITY_HEIGHT = range(8)
 STEER, DRIVE, MOTOR, RATE, EXTERNAL = range(8, 13)
 
+BY_POSES = 3
+"""Value of ``C_AIDED``."""
+REFUSE, FUSE, RESET = range(3)
+"""Values of ``C_POSE_USE``."""
 HOLD_HEADING, YAW_ANGLE, YAW_RATE, YAW_ANGLE_AND_RATE = range(4)
 """Values of ``C_YAW_MODE``."""
 
@@ -101,7 +105,9 @@ C_MOTOR = _add("C_MOTOR", "1", "MOTOR: number of the motor, from 0")
 C_ROLL_RATE = _add("C_ROLL_RATE", "rad/s", "RATE: body rate about the forward axis")
 C_PITCH_RATE = _add("C_PITCH_RATE", "rad/s", "RATE: body rate about the right axis")
 C_AIDED = _add(
-    "C_AIDED", "1", "1: use satellites; the origin is the position then; 2: with the origin as it is"
+    "C_AIDED",
+    "1",
+    "1: use satellites; the origin is the position then; 2: with the origin as it is; 3: external poses",
 )
 C_YAW_P = _add("C_YAW_P", "s", "gain of the yaw rate loop on a filtered error; 0: another loop, unfiltered")
 C_YAW_I = _add("C_YAW_I", "1", "integral gain of that loop")
@@ -119,6 +125,12 @@ C_FULL_VOLTS = _add(
 )
 C_LEAST_VOLTS = _add("C_LEAST_VOLTS", "V", "least voltage that counts for that")
 C_HOVER_KEPT = _add("C_HOVER_KEPT", "1", "1: the hover throttle is not learnt")
+C_POSE_COUNT = _add("C_POSE_COUNT", "1", "number of external poses so far")
+C_POSE_USE = _add("C_POSE_USE", "1", "REFUSE, FUSE or RESET: what is done with the last one")
+C_POSE = _add("C_POSE", "m", "the last one less the estimate at its time", 3, NED)
+C_POSE_TURN = _add("C_POSE_TURN", "rad", "its yaw less the estimated one at its time")
+C_POSE_SIGMA = _add("C_POSE_SIGMA", "m", "its sigmas; 0: the height is not used", 2, "horizontal, vertical")
+C_POSE_YAW = _add("C_POSE_YAW", "1", "1: the heading is that of the poses, not of the compass")
 
 # --- memory that ``Estimate`` shows ---
 K_POSITION = _add("K_POSITION", "m", "estimated, about the world's origin", 3, NED)
@@ -128,9 +140,9 @@ K_EULER = _add("K_EULER", "rad", "estimated attitude as angles", 3, RPY)
 K_RATES = _add("K_RATES", "rad/s", "estimated body rates", 3, FRD)
 K_ACCEL = _add("K_ACCEL", "m/s^2", "estimated acceleration without gravity", 3, NED)
 K_ORIGIN = _add("K_ORIGIN", "m", "the estimator's origin about the world's", 3, NED)
-K_AIDED = _add("K_AIDED", "1", "1 once satellites are used and positions are valid")
+K_AIDED = _add("K_AIDED", "1", "1 once satellites or poses are used and positions are valid")
 K_ALIGNED = _add("K_ALIGNED", "1", "1 once tilt and heading are initialised")
-K_GPS_AGE = _add("K_GPS_AGE", "s", "time since a fix was last fused")
+K_GPS_AGE = _add("K_GPS_AGE", "s", "time since a fix or a pose was last fused")
 K_SIGMA = _add(
     "K_SIGMA",
     "m, m/s",
@@ -159,6 +171,7 @@ K_COVARIANCE = _add(
     "K_COVARIANCE", "mixed", "of position p, velocity v and bias b", 18, "per axis of NED: pp pv pb vv vb bb"
 )
 K_USED_GPS = _add("K_USED_GPS", "1", "M_GPS_COUNT of the last fix fused")
+K_USED_POSE = _add("K_USED_POSE", "1", "C_POSE_COUNT of the last pose used")
 K_USED_BARO = _add("K_USED_BARO", "1", "M_BARO_COUNT of the last sample fused")
 K_USED_MAG = _add("K_USED_MAG", "1", "M_MAG_COUNT of the last sample fused")
 K_CONTROL = _add("K_CONTROL", "1", "the Control in force")
@@ -226,12 +239,23 @@ class Airframe:
     rotors: int
     capacity_as: float
     sensors: SensorSuite
+    placed: LocalFrame | None = None
+    """Frame of an origin that a user has placed, about which the estimator's positions are then."""
     _origin: tuple[Vector, Vector] | None = None
+
+    @property
+    def local(self) -> LocalFrame:
+        """Frame of the estimator's positions."""
+        return self.placed or self.frame
+
+    def place(self, frame: LocalFrame | None) -> None:
+        """Let the estimator's positions be about an origin that a user places, or about the world's again."""
+        self.placed, self._origin = frame, None
 
     def origin_at(self, ned: Vector) -> Vector:
         """Return latitude, longitude [degrees] and height AMSL [m] of an origin [m], which seldom changes."""
         if self._origin is None or self._origin[0] != ned:
-            self._origin = ned, self.frame.from_ned(ned)
+            self._origin = ned, self.local.from_ned(ned)
         return self._origin[1]
 
 
@@ -308,7 +332,7 @@ class Estimate:
     def geodetic(self) -> Vector:
         """Estimated latitude and longitude [degrees] and height AMSL [m]."""
         if self._geodetic is None:
-            self._geodetic = self._about.frame.from_ned(self._vector(K_POSITION))
+            self._geodetic = self._about.local.from_ned(self._vector(K_POSITION))
         return self._geodetic
 
     @property
@@ -353,13 +377,18 @@ class Estimate:
 
     @property
     def position_ok(self) -> bool:
-        """Whether horizontal position and velocity are aided by satellites, or were within ten seconds."""
+        """Whether horizontal position and velocity are aided, or were within ten seconds."""
         return self._row[K_AIDED] > 0.5 and self._row[K_GPS_AGE] < 10.0
 
     @property
     def gps_age(self) -> float:
-        """Time since the estimator last fused a fix [s]."""
+        """Time since the estimator last fused a fix or a pose [s]."""
         return self._row[K_GPS_AGE]
+
+    @property
+    def by_poses(self) -> bool:
+        """Whether the horizontal position is that of external poses, not of satellites."""
+        return self._row[C_AIDED] > BY_POSES - 0.5
 
     @property
     def sigmas(self) -> tuple[float, float, float, float]:

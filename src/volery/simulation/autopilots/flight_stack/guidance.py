@@ -44,6 +44,7 @@ from volery.simulation.autopilots.flight_stack.flight_state import (
     K_ATTITUDE,
     K_CONTROL,
     K_EULER,
+    K_FILTERED_ACCEL,
     K_HOVER_THROTTLE,
     K_LANDED,
     K_LAST_MISS,
@@ -87,6 +88,8 @@ _FILTER_SHARE = GUIDE_S / (GUIDE_S + 1.0 / (2.0 * pi * 5.0))  # PSC_VELXY_FLTE, 
 _ERROR_BRAKE = 2.5  # [m/s^2] with which the position loop closes a large error
 _CLIMB_GAIN = 5.0  # PSC_VELZ_P
 _CLIMB_INTEGRAL = 1.5
+_HELD = 2.0  # [m/s^2] by which a vehicle falls short of its acceleration downwards while something holds it
+_HELD_INTEGRAL = 2.8  # [1/s] PSC_ACCZ_I of 1.0 over a hover throttle of 0.35
 _APPROACH_SHARE = 0.5  # share of the acceleration limit, and of jerk over acceleration, to approach a point
 _LEASH = 20.0  # [m] largest horizontal distance of target and vehicle, against run-away in strong wind
 _HEIGHT_LEASH = 2.0  # [m] the same in height: on the ground the target waits
@@ -350,13 +353,22 @@ def _horizontal_accel(row: Array) -> tuple[float, float]:
 
 
 @numeric
-def _vertical_accel(row: Array) -> float:
-    """Return the acceleration down [m/s^2] that the position and climb loops request."""
+def _vertical_accel(row: Array, control: int) -> float:
+    """Return the acceleration down [m/s^2] that the position and climb loops request.
+
+    In a descent that the ground has ended, the integral of ArduPilot's acceleration loop closes the throttle:
+    recorded 0.6 s after touch-down. In flight the vehicle has the acceleration that it is given.
+    """
     miss = _speed_miss(row, 2)
-    if row[K_AT_LOWER_LIMIT] < 0.5:
+    quick = row[K_TARGET_ACCEL + 2] + _CLIMB_GAIN * miss
+    held = quick + row[K_VELOCITY_INTEGRAL + 2] - row[K_FILTERED_ACCEL + 2]
+    if held > _HELD and control in (CLIMB, POSITION_CLIMB) and row[C_CLIMB] < 0.0:
+        grown = row[K_VELOCITY_INTEGRAL + 2] + _HELD_INTEGRAL * held * GUIDE_S
+        row[K_VELOCITY_INTEGRAL + 2] = clip(grown, -4.0, 4.0)
+    elif row[K_AT_LOWER_LIMIT] < 0.5:
         grown = row[K_VELOCITY_INTEGRAL + 2] + _CLIMB_INTEGRAL * miss * GUIDE_S
         row[K_VELOCITY_INTEGRAL + 2] = clip(grown, -4.0, 4.0)
-    accel: float = row[K_TARGET_ACCEL + 2] + _CLIMB_GAIN * miss + row[K_VELOCITY_INTEGRAL + 2]
+    accel: float = quick + row[K_VELOCITY_INTEGRAL + 2]
     return accel
 
 
@@ -466,7 +478,7 @@ def _follow_horizontal(row: Array, control: int) -> None:
 def _follow_vertical(row: Array, control: int) -> None:
     """Set the collective so that the vehicle follows the vertical target."""
     _shape_vertical(row, control)
-    down = _vertical_accel(row)
+    down = _vertical_accel(row, control)
     lift = clip(_GRAVITY - down, 0.0, _MAX_LIFT * _GRAVITY)
     row[K_THROTTLE] = clip(row[K_HOVER_THROTTLE] * lift / _GRAVITY / _cos_tilt(row), 0.0, 1.0)
     _learn_hover_throttle(row)

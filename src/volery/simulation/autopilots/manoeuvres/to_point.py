@@ -206,6 +206,8 @@ class Land(Manoeuvre):
         super().__init__(vehicle)
         self.landing = True
         self.point = point
+        self.waits_until: Ns = 0
+        """Time before which it does not sink."""
 
     def enter(self) -> None:
         """Take the stopping point where no point was given."""
@@ -217,6 +219,8 @@ class Land(Manoeuvre):
     def sink(self) -> float:
         """Return the descent rate at the present height [m/s]."""
         tuning = self.vehicle.tuning
+        if self.vehicle.kernel.now() < self.waits_until:
+            return 0.0
         height = self.vehicle.rules.height_above_ground(self.vehicle)
         above = height - tuning.land_slow_below
         return max(tuning.land_speed, min(tuning.land_speed_high, root_speed(above, tuning.accel_z)))
@@ -225,7 +229,8 @@ class Land(Manoeuvre):
         """Descend over the point."""
         vehicle, tuning, sink = self.vehicle, self.vehicle.tuning, self.sink()
         if not vehicle.has_position or self.point is None:
-            vehicle.drive(Setpoint(Control.CLIMB, climb=-sink, speed_down=sink, accel_z=tuning.accel_z))
+            most = max(sink, tuning.land_speed)
+            vehicle.drive(Setpoint(Control.CLIMB, climb=-sink, speed_down=most, accel_z=tuning.accel_z))
             return
         vehicle.drive(
             Setpoint(

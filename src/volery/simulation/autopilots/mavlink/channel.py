@@ -10,7 +10,7 @@ from volery.base.errors import UsageError
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.frame import Frame
-from volery.links.link import ByteLink, Link, SelectiveLink
+from volery.links.link import ByteLink, FillingLink, Link, SelectiveLink
 from volery.links.mavlink_messages import MessageStreams
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.trace.events import LinkState
@@ -139,6 +139,7 @@ class MavlinkChannel:
         """Frames that wait to be handled, by their sender."""
         self._reported: set[str] = set()
         self._selective = link if isinstance(link, SelectiveLink) else None
+        self._filling = link if isinstance(link, FillingLink) else None
 
     @property
     def usual(self) -> Mapping[str, Ns]:
@@ -151,6 +152,10 @@ class MavlinkChannel:
     def is_wanted(self, name: str) -> bool:
         """Return whether the other end uses the message called *name*, as far as it has stated that."""
         return self._selective is None or self._selective.is_wanted(name)
+
+    def has_room(self) -> bool:
+        """Return whether the link takes more now than telemetry; long answers wait for that."""
+        return self._filling is None or self._filling.has_room()
 
     def send(self, name: str, fields: dict[str, Any]) -> None:
         """Send a message as the autopilot, while the channel is open."""

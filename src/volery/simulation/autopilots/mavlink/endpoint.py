@@ -362,3 +362,5 @@ class MavlinkEndpoint:
     def _on_timesync(self, peer: Peer, fields: dict[str, Any]) -> None:
         if fields["tc1"] == 0:
             peer.channel.send("TIMESYNC", {"tc1": self._vehicle.uptime(), "ts1": fields["ts1"]})
+        elif "TIMESYNC" in self.firmware.commands.handlers:
+            self.firmware.commands.handlers["TIMESYNC"](self._vehicle, fields, peer.system)

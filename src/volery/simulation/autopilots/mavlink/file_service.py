@@ -60,6 +60,8 @@ class FilePolicy(NamedTuple):
     """Error code of an operation that there is not."""
     own_session: bool
     """Whether sessions are numbered by the autopilot, from 0, and cannot be ended twice."""
+    expires: Ns
+    """Time without a request after which a file gives way to the next that is opened; 0 for never."""
 
 
 @dataclass(frozen=True)
@@ -93,18 +95,28 @@ class FileService:
         self._encode = encode
         self._open: bytes | None = None
         self._session = 0
+        self._asked_at: Ns = 0
         self._timer: Handle | None = None
-        self._last: tuple[int, Peer, list[int]] | None = None
+        self._last: tuple[tuple[Peer, int, int, int], list[int]] | None = None
 
     def on_request(self, peer: Peer, fields: dict[str, Any]) -> None:
-        """Handle FILE_TRANSFER_PROTOCOL; a request that is sent again is answered as before."""
+        """Handle FILE_TRANSFER_PROTOCOL; a request that is sent again is answered as before.
+
+        Clients number their requests modulo 256, some anew in each session.
+        """
         octets = bytes(int(byte) for byte in fields["payload"]).ljust(SIZE, b"\0")
         sequence, session, operation, size, _, _, offset = _HEAD.unpack_from(octets)
         asked = _Request(sequence, session, operation, size, offset, octets[HEADER : HEADER + size])
-        if self._last is not None and self._last[0] == sequence and self._last[1] == peer:
-            self._send(peer, self._last[2])
+        said = peer, sequence, session, operation
+        if self._last is not None and self._last[0] == said:
+            self._send(peer, self._last[1])
             return
+        self._last = None
         self._stop()
+        now = self._vehicle.kernel.now()
+        idle, self._asked_at = now - self._asked_at, now
+        if operation == OPEN and self._policy.expires and idle > self._policy.expires:
+            self._open = None  # who opened it has gone without an END, or it was lost
         try:
             if size > PIECE:
                 raise _RefusedError(BAD_SIZE)
@@ -116,7 +128,7 @@ class FileService:
         except _RefusedError as error:
             data, code = bytes((error.code,)), error.code
         payload = self._payload(asked, data, refused=code is not None)
-        self._last = (sequence, peer, payload) if len(data) <= 4 else None
+        self._last = (said, payload) if len(data) <= 4 else None
         self._send(peer, payload)
 
     # -- operations
@@ -200,11 +212,16 @@ class FileService:
         return data
 
     def _burst(self, peer: Peer, asked: _Request, place: int, sent: int) -> None:
-        """Send what is due of a burst: up to the end of the file, or of as many replies as are in one."""
+        """Send what is due of a burst: up to the end of the file, or of as many replies as are in one.
+
+        As ArduPilot does, it waits while the link is full: a client that reads slowly asks again meanwhile.
+        """
         file, size = self._open, asked.size or PIECE
         if file is None:
             return
         for _ in range(AT_ONCE):
+            if not peer.channel.has_room():
+                break
             if place >= len(file):
                 self._send(peer, self._payload(asked, bytes((END_OF_FILE,)), sent, place, refused=True))
                 return

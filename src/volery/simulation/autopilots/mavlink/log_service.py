@@ -1,7 +1,7 @@
 """MAVLink's log protocol of one vehicle: list, data, end and erase.
 
-A log is sent in pieces of 90 bytes, some at a time so that telemetry goes on beside. What does not exist is
-not answered, as by the originals.
+A log is sent in pieces of 90 bytes, some at a time so that telemetry goes on beside, and only while the link
+has room. What does not exist is not answered, as by the originals.
 """
 
 from __future__ import annotations
@@ -107,6 +107,8 @@ class LogService:
         if transfer is None:
             return
         for _ in range(BURST):
+            if not transfer.peer.channel.has_room():
+                break
             if transfer.place >= transfer.end:
                 self._transfer = None
                 return

@@ -507,10 +507,28 @@ def on_attitude_target(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -
     _take(vehicle, offboard.attitude_target(fields))
 
 
+def on_pose(vehicle: Vehicle, fields: dict[str, Any], _sender: int, *, name: str) -> None:
+    """Handle VISION_POSITION_ESTIMATE and ODOMETRY."""
+    commander_of(vehicle).vision.receive(name, fields)
+
+
+def on_origin(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """Handle SET_GPS_GLOBAL_ORIGIN."""
+    commander_of(vehicle).vision.set_origin(fields)
+
+
+def on_time(vehicle: Vehicle, fields: dict[str, Any], _sender: int) -> None:
+    """Handle the answer to a TIMESYNC."""
+    commander_of(vehicle).vision.note_time(fields)
+
+
 MESSAGE_HANDLERS: Mapping[str, MessageHandler] = {
     "HEARTBEAT": on_heartbeat,
     "MANUAL_CONTROL": on_manual_control,
+    **{name: partial(on_pose, name=name) for name in ("ODOMETRY", "VISION_POSITION_ESTIMATE")},
     "REQUEST_EVENT": on_event_request,
+    "SET_GPS_GLOBAL_ORIGIN": on_origin,
+    "TIMESYNC": on_time,
     "SET_ATTITUDE_TARGET": on_attitude_target,
     "SET_POSITION_TARGET_GLOBAL_INT": on_global_target,
     "SET_POSITION_TARGET_LOCAL_NED": on_local_target,

@@ -124,6 +124,7 @@ def on_step(vehicle: Vehicle) -> None:
     _detect_ground(commander, now)
     _forget_ended_cause(commander)
     commander.faults.step()
+    commander.vision.step()
     commander.examine_mission()
     if commander.home_correction is not None and vehicle.flies:
         commander.home_correction.step(commander.lifted_at if vehicle.armed else NEVER)

@@ -42,6 +42,7 @@ FILES = FilePolicy(
     taken=_SESSION_TAKEN,
     unknown=_UNKNOWN,
     own_session=True,
+    expires=0,
 )
 
 

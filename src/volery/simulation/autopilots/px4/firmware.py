@@ -27,6 +27,7 @@ from volery.simulation.autopilots.mavlink.log_service import LogPolicy
 from volery.simulation.autopilots.mavlink.messages import DENIED, FAILED, MULTIROTORS, Handler
 from volery.simulation.autopilots.px4 import files, geofence, mission, telemetry, ulog
 from volery.simulation.autopilots.px4.commands import DO_SET_MODE, MESSAGE_HANDLERS, set_mode
+from volery.simulation.autopilots.px4.external_vision import uses_satellites
 from volery.simulation.autopilots.px4.follow_target import on_follow_target
 from volery.simulation.autopilots.px4.modes import LOITER, READY_AFTER, Commander, commander_of
 from volery.simulation.autopilots.px4.versions import Version
@@ -51,6 +52,9 @@ HOME: Ns = 7_600 * MS
 POSITION_KEPT_S = 5.0
 """Time for which a position counts after the last fix [s]: recorded of 1.14 and 1.17."""
 
+POSE_KEPT_S = 4.6
+"""The same after the last external pose: with 1.17 the failsafe came 4.6 to 4.7 s after it."""
+
 STREAMS: Ns = 500 * MS
 """First telemetry stream."""
 
@@ -69,9 +73,22 @@ def stand_on_ground(vehicle: Vehicle) -> None:
     vehicle.ground.landed = True
 
 
+def find_position(vehicle: Vehicle) -> None:
+    """Begin to take the position from satellites, unless the parameters forbid it."""
+    if uses_satellites(vehicle):
+        vehicle.flight.set_origin()
+
+
+def start_warm(vehicle: Vehicle) -> None:
+    """Put a vehicle that starts warm on the ground, without satellites if the parameters forbid them."""
+    stand_on_ground(vehicle)
+    if not uses_satellites(vehicle):
+        vehicle.flight.use_poses()
+
+
 EVENTS = (
     BootEvent(0, stand_on_ground),
-    BootEvent(ORIGIN, lambda vehicle: vehicle.flight.set_origin()),
+    BootEvent(ORIGIN, find_position),
     BootEvent(HOME, set_home_position),
     BootEvent(READY_AFTER - 50 * MS, set_home_position),
 )
@@ -315,8 +332,9 @@ def px4_firmware(
             rc=RcDefaults((1500,) * 4 + (0,) * 12, throttle_centred=True),
             firmware_state=partial(Commander, version=version),
             position_kept=POSITION_KEPT_S,
+            pose_kept=POSE_KEPT_S,
         ),
-        boot=BootSequence(EVENTS, stand_on_ground, on_position),
+        boot=BootSequence(EVENTS, start_warm, on_position),
         periodic=PeriodicWork(on_step=on_step, failsafe_ticks=1),
         endpoint=endpoint,
     )

@@ -19,7 +19,7 @@ from volery.simulation.autopilots.manual_control import StickPositions
 from volery.simulation.autopilots.px4.position_control import Cruise, PositionLoops
 from volery.simulation.autopilots.px4.yaw_stick import YawStick
 from volery.simulation.autopilots.state_groups import NEVER, Home
-from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.simulation.autopilots.vehicle_state import IDLE, Manoeuvre, Vehicle
 
 CLIMB_RAMP = ((0.0, 0.05), (0.6, 0.08), (0.75, 0.33), (1.5, 1.0))
 """Share of the climb rate over the time since lift-off in MPC_TKO_RAMP_T, as recorded."""
@@ -134,9 +134,11 @@ class Descent(Land):
         """Move the trajectory down over the point and follow it."""
         vehicle = self.vehicle
         control: PositionLoops = vehicle.firmware_state.control
-        if not vehicle.has_position or self.point is None or vehicle.estimate.landed:
-            if vehicle.estimate.landed:
-                control.rest()
+        if vehicle.estimate.landed:  # no thrust after a ground contact
+            control.rest()
+            vehicle.drive(IDLE)
+            return
+        if not vehicle.has_position or self.point is None:
             super().step()
             return
         p = vehicle.parameters

@@ -20,6 +20,7 @@ from volery.simulation.autopilots.mavlink.messages import ACCEPTED, TEMPORARILY_
 from volery.simulation.autopilots.mavlink.microservices import FENCE
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.px4 import event_interface
+from volery.simulation.autopilots.px4.external_vision import ExternalVision
 from volery.simulation.autopilots.px4.geofence import fence_breach
 from volery.simulation.autopilots.px4.home_correction import HomeCorrection
 from volery.simulation.autopilots.px4.offboard import Joystick, SetpointStream
@@ -164,7 +165,7 @@ class Commander:
 
     def reset(self) -> None:
         """Reset to the state after a boot."""
-        self.faults = SimulatedFaults(self.vehicle)
+        self.faults, self.vision = SimulatedFaults(self.vehicle), ExternalVision(self.vehicle)
         self._forget_mission()
         self._refused_at: Ns = NEVER
         self.joystick = Joystick()

@@ -104,7 +104,7 @@ LANDED_THRUST = 0.158
 
 TOUCHES_FROM = 0.3
 """Distance of the airframe of the loops below the vehicle from which the vehicle stands on the ground [m]:
-more than it is behind in flight. PX4 commands no lean after a ground contact."""
+more than it is behind in flight. PX4 commands neither lean nor thrust after a ground contact."""
 
 MOVES_FROM = 0.25
 """Vertical speed from which a vehicle is not on the ground for the landed detector, LNDMC_Z_VEL_MAX [m/s]."""
@@ -337,7 +337,7 @@ class PositionLoops:
         touches = row[A_POSITION + 2] - row[E_POSITION + 2] - here[2] > TOUCHES_FROM
         if self._noisy:
             self._state_error(here, velocity, touches)
-        if row[A_GROUNDED]:
+        if row[A_GROUNDED] or (touches and estimate.landed):
             vehicle.drive(IDLE)
             return
         vehicle.drive(

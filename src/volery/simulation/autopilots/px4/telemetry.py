@@ -279,7 +279,7 @@ def home_position(vehicle: Vehicle) -> Fields | None:
 
 def origin(vehicle: Vehicle) -> Fields | None:
     """Return GPS_GLOBAL_ORIGIN once the estimator has an origin."""
-    if not vehicle.estimate.position_ok:
+    if not vehicle.estimate.position_ok and not commander_of(vehicle).vision.aiding.placed:
         return None
     latitude, longitude, amsl = vehicle.estimate.origin
     return {

@@ -1,0 +1,288 @@
+"""How faults of the world reach a real firmware.
+
+Whatever the link of a project carries is the world's, and so are its faults: they act on a real firmware as
+on a simulated one. A sensor that the firmware simulates itself fails by a parameter of that simulation. It is
+set when the fault appears in the state row of the body, and gets its value back when the fault is over.
+
+Names of parameters differ between versions, so a firmware is asked for all of them after its boot. A fault
+that it cannot be given is refused by name.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from enum import Enum
+from typing import NamedTuple
+
+from volery.base.errors import CapabilityError
+from volery.base.time import Ns, S, to_seconds
+from volery.links.mavlink_messages import message_type
+from volery.simulation.real_firmware.ground_link import GroundLink
+from volery.simulation.world.state_layout import (
+    P_CAPACITY,
+    S_AMPS,
+    S_CHARGE,
+    U_BARO_BLOCKED,
+    U_GPS_BLOCKED,
+    U_MAG_BLOCKED,
+)
+
+
+class Way(Enum):
+    """How a kind of fault reaches a firmware if not by parameters."""
+
+    LINK = "by its link"
+    """What the firmware is sent in each exchange has the fault."""
+    WORLD = "by the world"
+    """The body, the air, a link of the run or a computer beside the firmware has the fault."""
+
+
+class LinkFrom(NamedTuple):
+    """A fault that is in what a firmware is sent, which it takes from a version on."""
+
+    major: int
+    minor: int
+
+
+class Setting(NamedTuple):
+    """A parameter of a firmware, and its value while a fault is present."""
+
+    name: str
+    value: float
+
+
+class ByParameters(NamedTuple):
+    """A fault that a firmware gives itself.
+
+    Args:
+        column: Column of the state row that is not 0 while the fault is present.
+        settings: What is set; of each group the first that the firmware has.
+    """
+
+    column: int
+    settings: tuple[tuple[Setting, ...], ...]
+
+
+_IN_THE_WORLD = dict.fromkeys(
+    (
+        "motor-dead",
+        "sensor-silent",
+        "sensor-stuck",
+        "sensor-clock-off",
+        "camera-black",
+        "ranges-maximum",
+        "ranges-not-a-number",
+        "link-cut",
+        "link-degraded",
+        "network-cut",
+        "network-degraded",
+        "computer-stopped",
+        "computer-slowed",
+        "wind",
+    ),
+    Way.WORLD,
+)
+_FROZEN_COMPASS = 2.0
+
+_BATTERY_OF_THE_WORLD = LinkFrom(4, 6)
+
+WAYS: Mapping[str, Mapping[str, Way | LinkFrom | ByParameters]] = {
+    "ardupilot": {
+        **_IN_THE_WORLD,
+        "battery-low": _BATTERY_OF_THE_WORLD,
+        "battery-cell-dead": _BATTERY_OF_THE_WORLD,
+        "gps-lost": ByParameters(
+            U_GPS_BLOCKED, ((Setting("SIM_GPS1_ENABLE", 0.0), Setting("SIM_GPS_DISABLE", 1.0)),)
+        ),
+        "gps-drift": Way.LINK,
+        "barometer-stuck": ByParameters(
+            U_BARO_BLOCKED, ((Setting("SIM_BARO_FREEZE", 1.0),), (Setting("SIM_BAR2_FREEZE", 1.0),))
+        ),
+        "compass-stuck": ByParameters(
+            U_MAG_BLOCKED,
+            tuple((Setting(f"SIM_MAG{number}_FAIL", _FROZEN_COMPASS),) for number in (1, 2, 3)),
+        ),
+    },
+    "px4": {
+        **_IN_THE_WORLD,
+        "battery-low": Way.LINK,
+        "battery-cell-dead": Way.LINK,
+        "gps-lost": Way.LINK,
+        "gps-drift": Way.LINK,
+        "barometer-stuck": Way.LINK,
+        "compass-stuck": Way.LINK,
+    },
+}
+"""How each kind of fault that a model can state reaches a firmware, by project and kind."""
+
+_COUNTS_CHARGE = frozenset({"ardupilot"})
+"""Projects that count the charge of the battery themselves, from the current."""
+_MISCOUNT = 0.01
+"""Share of the capacity by which a count may be off before it is set."""
+_ALL_BATTERIES = 255.0
+
+_ASK_AFTER: Ns = S
+"""Time from a firmware's start until it answers."""
+_ASK_AGAIN: Ns = S
+_ASKED_AT_MOST = 3
+_TAKEN_UP_WITHIN: Ns = 2 * S
+
+
+class _Change(NamedTuple):
+    """A parameter that was set, and must be taken up."""
+
+    setting: Setting
+    at: Ns
+
+
+def release(version: str) -> tuple[int, int]:
+    """Return the major and minor number of a version such as ``4.6.3 (92b0cd78)``; zeros if it has none."""
+    stated = re.match(r"(\d+)\.(\d+)", version)
+    return (int(stated[1]), int(stated[2])) if stated else (0, 0)
+
+
+class FirmwareFaults:
+    """The faults of one firmware.
+
+    Args:
+        project: One of ``WAYS``.
+        whose: Vehicle and program, for messages.
+        ground: Connection over which parameters are asked for and set.
+    """
+
+    def __init__(self, project: str, whose: str, ground: GroundLink) -> None:
+        self._ways, self._whose, self._ground = WAYS[project], whose, ground
+        self._known = ground.reported.parameters
+        self._by_version = any(isinstance(way, LinkFrom) for way in self._ways.values())
+        self._counts = project in _COUNTS_CHARGE
+        self._counted, self._counted_until = 0.0, 0  # [A s] that the firmware has counted, on its clock
+        self._asked = 0
+        self._ask_at: Ns = 0
+        self._wanted: dict[str, str] = {}  # kind by name of the fault
+        self._before: dict[str, list[Setting]] = {}  # by kind of a present fault, what is to be restored
+        self._changes: list[_Change] = []
+        self.settled = not self._by_version and not any(self._unknown())
+        """Whether it is known which parameters and which version the firmware has."""
+
+    def _unknown(self) -> Iterator[str]:
+        for way in self._ways.values():
+            if isinstance(way, ByParameters):
+                for group in way.settings:
+                    if not any(setting.name in self._known for setting in group):
+                        yield from (setting.name for setting in group)
+
+    def ask(self, now: Ns) -> None:
+        """Ask the firmware, which waits, for the parameters and the version that are not known yet.
+
+        Args:
+            now: The firmware's clock, for the time between two requests and the limit of all.
+        """
+        if self.settled or now < _ASK_AFTER:
+            return
+        names = [*self._unknown()]
+        version_known = bool(self._ground.reported.version) or not self._by_version
+        if version_known and not names:
+            self.settled = True
+        elif now >= self._ask_at:
+            self.settled = self._asked == _ASKED_AT_MOST
+            self._asked, self._ask_at = self._asked + 1, now + _ASK_AGAIN
+            for name in names:
+                self._ground.ask_parameter(name)
+            if not version_known:
+                self._ground.command("MAV_CMD_REQUEST_MESSAGE", float(message_type("AUTOPILOT_VERSION").id))
+
+    def require(self, kind: str, fault: str) -> None:
+        """Refuse a fault that the firmware cannot be given; at once, or when its parameters are known.
+
+        Args:
+            kind: Kind of the fault.
+            fault: Its name.
+
+        Raises:
+            CapabilityError: The firmware cannot be given it.
+        """
+        self._wanted[fault] = kind
+        if self.settled:
+            self._refuse()
+
+    def _refuse(self) -> None:
+        while self._wanted:
+            fault, kind = self._wanted.popitem()
+            reason = self._obstacle(kind)
+            if reason:
+                version = self._ground.reported.version or "of no stated version"
+                raise CapabilityError(
+                    f"fault {fault}: {self._whose} {version} cannot be given {kind}: {reason}, "
+                    "or leave the fault out"
+                )
+
+    def _obstacle(self, kind: str) -> str:
+        """Return why the firmware cannot be given a kind of fault, with the remedy; empty: it can."""
+        way = self._ways.get(kind)
+        if way is None:
+            return "there is no way to it; fly that vehicle on a simulated autopilot"
+        if isinstance(way, LinkFrom) and release(self._ground.reported.version) < way:
+            since = f"{way.major}.{way.minor}"
+            return f"from {since} on it takes that from the world; name a program of {since} or later"
+        for group in way.settings if isinstance(way, ByParameters) else ():
+            if not any(setting.name in self._known for setting in group):
+                names = " or ".join(setting.name for setting in group)
+                return f"it has no parameter {names}; name a program built for its project's own simulator"
+        return ""
+
+    def act(self, now: Ns, row: Sequence[float]) -> None:
+        """Let the firmware, which waits, have the faults that are in a state row.
+
+        Args:
+            now: The firmware's clock.
+            row: State row of the body.
+
+        Raises:
+            CapabilityError: A fault that was required cannot be given.
+        """
+        self.ask(now)
+        if not self.settled:
+            return
+        self._refuse()
+        for kind, way in self._ways.items():
+            if isinstance(way, ByParameters) and (row[way.column] != 0.0) != (kind in self._before):
+                self._set(self._begin(kind, way) if kind not in self._before else self._before.pop(kind), now)
+        self._check(now)
+        if self._counts:
+            self._count(row, now)
+
+    def _begin(self, kind: str, way: ByParameters) -> list[Setting]:
+        settings = [
+            next(setting for setting in group if setting.name in self._known)
+            for group in way.settings
+            if any(setting.name in self._known for setting in group)
+        ]
+        self._before[kind] = [Setting(name, self._known[name]) for name, _ in settings]
+        return settings
+
+    def _set(self, settings: Sequence[Setting], now: Ns) -> None:
+        names = {setting.name for setting in settings}
+        self._changes = [change for change in self._changes if change.setting.name not in names]
+        for setting in settings:
+            self._ground.set_parameter(*setting)
+            self._changes.append(_Change(setting, now))
+
+    def _check(self, now: Ns) -> None:
+        """Drop the changes that were taken up."""
+        self._changes = [one for one in self._changes if self._known[one.setting.name] != one.setting.value]
+        for (name, value), at in self._changes:
+            if now - at > _TAKEN_UP_WITHIN:
+                raise CapabilityError(
+                    f"{self._whose} has not taken up {name} {value:g} within "
+                    f"{to_seconds(_TAKEN_UP_WITHIN):g} s; it says {self._known[name]:g}"
+                )
+
+    def _count(self, row: Sequence[float], now: Ns) -> None:
+        """Set the firmware's count if charge has come or gone that is no current of the vehicle."""
+        elapsed, self._counted_until = now - self._counted_until, now
+        self._counted += row[S_AMPS] * to_seconds(elapsed)
+        if abs(row[S_CHARGE] - self._counted) > _MISCOUNT * row[P_CAPACITY]:
+            self._counted = row[S_CHARGE]
+            left = 100.0 * (1.0 - row[S_CHARGE] / row[P_CAPACITY])
+            self._ground.command("MAV_CMD_BATTERY_RESET", _ALL_BATTERIES, left)
