@@ -13,6 +13,7 @@ costs up to about 1 m of height and, N / 6371 km, 0.16 m of distance where the g
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import degrees, hypot, pi, radians, remainder, sqrt
 
@@ -25,6 +26,7 @@ EQUATOR_M = 6_378_137.0
 FLATTENING = 1.0 / 298.257223563
 _E2 = FLATTENING * (2.0 - FLATTENING)
 _HALF = sqrt(0.5)
+_AXES, _SIGNS = (1, 0, 2, 4, 3, 5), (1.0, 1.0, -1.0, 1.0, 1.0, -1.0)
 
 
 def enu_to_ned(v: Vector) -> Vector:
@@ -60,6 +62,66 @@ def heading_to_yaw(heading: float) -> float:
 yaw_to_heading = heading_to_yaw
 
 
+def map_to_north_east(point: tuple[float, float], x_heading: float) -> tuple[float, float]:
+    """Convert a point of a plane map, or a vector, to north and east. Its own inverse.
+
+    Args:
+        point: Along the map's x axis and along its y axis, which is to the left of that.
+        x_heading: Where the x axis points, clockwise from north, radians.
+    """
+    sine, cosine = sine_cosine(x_heading)
+    return cosine * point[0] + sine * point[1], sine * point[0] - cosine * point[1]
+
+
+def map_covariance_to_ned(
+    covariance: Sequence[Sequence[float]], x_heading: float
+) -> tuple[tuple[float, float, float], ...]:
+    """Convert the covariance (3 rows of 3) of x, y, yaw on a map to that of north, east, heading.
+
+    Args:
+        covariance: In m and radians, yaw anticlockwise.
+        x_heading: See ``map_to_north_east``.
+    """
+    sine, cosine = sine_cosine(x_heading)
+    turn = ((cosine, sine, 0.0), (sine, -cosine, 0.0), (0.0, 0.0, -1.0))
+    half = [[sum(row[k] * covariance[k][j] for k in range(3)) for j in range(3)] for row in turn]
+    first, second, third = ([sum(row[k] * other[k] for k in range(3)) for other in turn] for row in half)
+    return (
+        (first[0], first[1], first[2]),
+        (second[0], second[1], second[2]),
+        (third[0], third[1], third[2]),
+    )
+
+
+def pose_covariance_ned_to_enu(covariance: Sequence[float]) -> list[float]:
+    """Convert the covariance of a pose, 36 values by rows, from NED to ENU. Its own inverse.
+
+    Its rows are the three axes of position, then turns about the three axes.
+    """
+    return [
+        _SIGNS[row] * _SIGNS[column] * covariance[6 * _AXES[row] + _AXES[column]]
+        for row in range(6)
+        for column in range(6)
+    ]
+
+
+pose_covariance_enu_to_ned = pose_covariance_ned_to_enu
+
+
+def pose_covariance_neu_to_ned(rows: Sequence[Sequence[float]]) -> list[float]:
+    """Convert the covariance of north, east, up, roll, pitch, heading (6 rows of 6) to 36 values of NED."""
+    return [
+        (-1.0 if (row == 2) != (column == 2) else 1.0) * float(rows[row][column])
+        for row in range(6)
+        for column in range(6)
+    ]
+
+
+def upper_triangle(covariance: Sequence[float]) -> list[float]:
+    """Return the 21 values of the upper right triangle of a 6 by 6 matrix, by rows, as MAVLink has it."""
+    return [covariance[6 * row + column] for row in range(6) for column in range(row, 6)]
+
+
 def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
     """Return the Hamilton product p q: the rotation by q, then by p."""
     pw, px, py, pz = p
@@ -92,9 +154,10 @@ def body_to_world(attitude: Quaternion, v: Vector) -> Vector:
 
 def attitude_ned_to_enu(q: Quaternion) -> Quaternion:
     """Convert the attitude of a FRD body in NED to that of the FLU body in ENU. Its own inverse."""
-    world: Quaternion = (0.0, _HALF, _HALF, 0.0)
-    body: Quaternion = (0.0, 1.0, 0.0, 0.0)
-    return multiply(multiply(world, q), body)
+    w, x, y, z = q
+    w, x, y, z = _HALF * w, _HALF * x, _HALF * y, _HALF * z
+    # the product (0, sqrt(1/2), sqrt(1/2), 0) q (0, 1, 0, 0), without the terms that are zero
+    return -w - z, 0.0 - x - y, y - x, z - w
 
 
 attitude_enu_to_ned = attitude_ned_to_enu

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import sysconfig
 import threading
 from pathlib import Path
@@ -41,6 +42,8 @@ _LIBRARIES = (
     *{sysconfig.get_path(name) for name in ("stdlib", "platstdlib", "purelib", "platlib")},
 )
 
+_COMPILERS = ("numba", "llvmlite")
+
 
 def _is_framework(frame: FrameType) -> bool:
     file = frame.f_code.co_filename
@@ -63,6 +66,18 @@ def is_component_code(frame: FrameType | None) -> bool:
 def is_outside(frame: FrameType | None) -> bool:
     """Return whether nothing of the framework executes: a script between two calls, a prompt."""
     return not any(_is_framework(each) for each in _callers(frame))
+
+
+def is_compiling(frame: FrameType | None) -> bool:
+    """Return whether numba compiles a function or reads one from its cache.
+
+    A compiled function that executes has no frame, so an endless loop in one is none of this.
+    """
+    while frame is not None:
+        if frame.f_globals.get("__name__", "").partition(".")[0] in _COMPILERS:
+            return True
+        frame = frame.f_back
+    return False
 
 
 def component_line(frame: FrameType | None) -> str:
@@ -160,7 +175,8 @@ class Interrupts:
 class Watchdog:
     """Thread that reports a task which executes for `patience_s` of wall time at one virtual time.
 
-    The flow of a script is exempt, since virtual time stands still while a script executes.
+    The flow of a script is exempt, since virtual time stands still while a script executes. So is the time
+    in which numba compiles: what a component calls for the first time takes minutes on a busy machine.
     """
 
     def __init__(self, kernel: Kernel, interrupts: Interrupts, patience_s: float) -> None:
@@ -184,12 +200,14 @@ class Watchdog:
 
     def _watch(self) -> None:
         while not self._stopped.wait(self._patience_s / SAMPLES_PER_PATIENCE):
-            self.check(monotonic())
+            main = threading.main_thread().ident
+            frame = None if main is None else sys._current_frames().get(main)
+            self.check(monotonic(), compiling=is_compiling(frame))
 
-    def check(self, moment: float) -> None:
+    def check(self, moment: float, *, compiling: bool = False) -> None:
         """Compare what runs at `moment`, monotonic seconds, with the previous sample."""
         task, now = self._kernel.current(), self._kernel.now()
-        if task is None or task.adopted or self._seen != (task, now):
+        if compiling or task is None or task.adopted or self._seen != (task, now):
             self._seen, self._since = (task, now), moment
         elif moment - self._since >= self._patience_s:
             self._interrupts.report_stall(task, now, f"it has not let go for {self._patience_s:g} s")

@@ -11,6 +11,7 @@ import select
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Protocol
 
 from volery.base.time import MS, Ns, S
@@ -24,6 +25,8 @@ FIRST_RETRY: Ns = 500 * MS
 LONGEST_RETRY: Ns = 5 * S
 MAX_UNSENT = 65_536
 """Bytes that wait for a slow connection. Data beyond this is dropped, as a radio drops it."""
+ROOM = MAX_UNSENT // 4
+"""While fewer bytes wait, there is room for a long answer beside telemetry."""
 MAX_UNHANDLED = 262_144
 """Received bytes of one connection that wait for the kernel. What exceeds this stays in the socket, so that a
 TCP sender is slowed down and datagrams are dropped."""
@@ -249,15 +252,22 @@ class StreamLink(CodedLink):
             self._reader = ReaderThread(self.name, self._open_and_read)
             self._reader.start()
 
+    def has_room(self) -> bool:
+        """See ``FillingLink``."""
+        if self._stream is not None and len(self._unsent) >= ROOM:
+            self._flush(self._stream)
+        return len(self._unsent) < ROOM
+
     def _transmit(self, data: bytes) -> None:
         if self._stream is None or len(self._unsent) + len(data) > MAX_UNSENT:
             return
         self._unsent += data
-        try:
-            taken = self._stream.write(bytes(self._unsent))
-        except OSError:
-            return  # the buffer is full, or the stream broke, which the reader thread reports
-        del self._unsent[:taken]
+        self._flush(self._stream)
+
+    def _flush(self, stream: ByteStream) -> None:
+        with suppress(OSError):  # the buffer is full, or the stream broke, which the reader thread reports
+            taken = stream.write(bytes(self._unsent))
+            del self._unsent[:taken]
 
     def close(self) -> None:
         """Close the stream and stop the thread."""

@@ -1,4 +1,4 @@
-"""Flight logs as tables of numbers: MAVLink telemetry logs, ArduPilot's DataFlash logs and PX4's ULog.
+"""Flight logs as tables of numbers and texts: tlogs, ArduPilot's DataFlash logs and PX4's ULogs.
 
 A table holds the numeric fields of one type of message, each as an array, and ``time`` in seconds since the
 start of the log (DataFlash: since the boot of the autopilot). Formats are recognised by their first bytes and
@@ -10,12 +10,12 @@ from __future__ import annotations
 import os
 import struct
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +24,23 @@ from pymavlink import DFReader
 from volery.base.errors import UsageError
 from volery.base.installed import require_extra
 from volery.links.frame import Frame
-from volery.links.mavlink_messages import constant
+from volery.links.mavlink_messages import StatusTextAssembler, constant
 from volery.links.tlog import LINK_BITS, Entry, has_links, read_tlog
 
 Table = Mapping[str, NDArray[np.float64]]
 Tables = dict[str, Table]
+
+
+class LoggedText(NamedTuple):
+    """What an autopilot said: seconds as in a table, syslog's severity, prefix of the vehicle's tables."""
+
+    time: float
+    severity: int
+    text: str
+    vehicle: str = ""
+
+
+OnText = Callable[[LoggedText], None]
 
 TIME = "time"
 STATION = "station."
@@ -74,7 +86,9 @@ def log_format(path: Path) -> str:
     )
 
 
-def read_flight_log(path: Path, wanted: Collection[str] = (), also: Collection[str] = ()) -> Tables:
+def read_flight_log(
+    path: Path, wanted: Collection[str] = (), also: Collection[str] = (), on_text: OnText | None = None
+) -> Tables:
     """Return the tables of a log.
 
     A log that is cut or damaged is read as far as that is possible.
@@ -83,17 +97,29 @@ def read_flight_log(path: Path, wanted: Collection[str] = (), also: Collection[s
         path: a tlog, a DataFlash log (binary or text) or a ULog.
         wanted: names of the messages to read; all if empty. Reading few is faster.
         also: names of messages to read besides, of which the log need not have any.
+        on_text: called with each text of the autopilot, of a tlog if STATUSTEXT is read, of a DataFlash log
+            if MSG is. ULogs always have their texts.
 
     Raises:
         UsageError: the file cannot be read, or holds no message that is wanted.
     """
     kind = log_format(path)
     read = {DATAFLASH: _dataflash, ULOG: _ulog, TLOG: _tlog}[kind]
-    tables = read(path, {*wanted, *also} if wanted else set())
+    tables = read(path, {*wanted, *also} if wanted else set(), on_text or _drop)
     if not tables or (wanted and not any(_plain_name(name) in wanted for name in tables)):
         names = f" among {', '.join(sorted(wanted))}" if wanted else ""
         raise UsageError(f"{path} ({kind}) holds no message{names}; was it cut before its first one?")
     return tables
+
+
+def _drop(text: LoggedText) -> None:
+    """Do nothing."""
+
+
+def vehicles_in(tables: Tables) -> list[str]:
+    """Return the prefix of each vehicle's tables: ``""`` for the first, in a tlog ``vehicle2.`` ..."""
+    further = {name.partition(".")[0] + "." for name in tables if name.startswith(VEHICLE) and "." in name}
+    return ["", *sorted(further)]
 
 
 def _plain_name(name: str) -> str:
@@ -170,11 +196,13 @@ class _Senders:
         return prefix
 
 
-def _tlog(path: Path, wanted: set[str]) -> Tables:
+def _tlog(path: Path, wanted: set[str], on_text: OnText) -> Tables:
     """Read a telemetry log; its tables are named after sender and message."""
     entries = list(read_tlog(path))
     senders = _Senders(entries)
-    rows = _Rows(entries[0].at_us / 1e6 if entries else 0.0)
+    start = entries[0].at_us / 1e6 if entries else 0.0
+    rows = _Rows(start)
+    texts: dict[str, _Texts] = {}
     for at_us, frame, _ in entries:
         name = frame.name
         if wanted and name not in wanted and f"{STATION}{name}" not in wanted:
@@ -183,7 +211,25 @@ def _tlog(path: Path, wanted: set[str]) -> Tables:
         other = prefix == f"{VEHICLE}{frame.system}."  # its autopilot's, wanted like the first one's
         if not wanted or f"{prefix}{name}" in wanted or (other and name in wanted):
             rows.add(f"{prefix}{name}", at_us / 1e6, frame.fields)
+            if name == "STATUSTEXT":
+                texts.setdefault(prefix, _Texts(prefix, on_text)).add(at_us / 1e6 - start, frame.fields)
     return rows.tables()
+
+
+class _Texts:
+    """Joins the status texts of one sender of a telemetry log."""
+
+    def __init__(self, vehicle: str, on_text: OnText) -> None:
+        self._vehicle, self._on_text, self._time = vehicle, on_text, 0.0
+        self._assembler = StatusTextAssembler(self._report)
+
+    def add(self, time: float, fields: Mapping[str, Any]) -> None:
+        """Add a STATUSTEXT that came *time* seconds after the start of the log."""
+        self._time = time
+        self._assembler.add(fields)
+
+    def _report(self, severity: int, text: str) -> None:
+        self._on_text(LoggedText(self._time, severity, text, self._vehicle))
 
 
 _DAMAGE = (
@@ -275,7 +321,11 @@ class _TextReader(_Resilient, DFReader.DFReader_text):  # type: ignore[misc]
     """pymavlink's reader of text logs."""
 
 
-def _dataflash(path: Path, wanted: set[str]) -> Tables:
+_SEVERITY = 6
+"""Of the texts of a DataFlash log, which states none: information."""
+
+
+def _dataflash(path: Path, wanted: set[str], on_text: OnText) -> Tables:
     with path.open("rb") as file:
         binary = file.read(2) == DATAFLASH_HEAD
     if binary:
@@ -290,6 +340,8 @@ def _dataflash(path: Path, wanted: set[str]) -> Tables:
                 name, instance, time = message.get_type(), _instance(message), _dataflash_time(fields)
                 if time is not None:
                     rows.add(f"{name}[{instance}]" if instance else name, time, fields)
+                    if name == "MSG" and isinstance(fields.get("Message"), str):
+                        on_text(LoggedText(time, _SEVERITY, fields["Message"]))
         except Exception as error:
             if type(error) is not Exception and not isinstance(error, _DAMAGE):
                 raise  # pymavlink raises bare ones at damage, too; what it read until then counts
@@ -340,7 +392,7 @@ def _check_definitions(path: Path) -> None:
                 at += 1
 
 
-def _ulog(path: Path, wanted: set[str]) -> Tables:
+def _ulog(path: Path, wanted: set[str], on_text: OnText) -> Tables:
     require_extra("control", "logs of PX4")
     from pyulog import ULog
     from pyulog.core import ULogException
@@ -362,6 +414,9 @@ def _ulog(path: Path, wanted: set[str]) -> Tables:
         stamps = columns.pop("timestamp", None)
         if stamps is not None and len(stamps):
             tables[name] = {TIME: (stamps - log.start_timestamp) / 1e6, **columns}
+    for said in log.logged_messages:
+        severity = said.log_level - ord("0")
+        on_text(LoggedText((said.timestamp - log.start_timestamp) / 1e6, severity, said.message))
     return tables
 
 

@@ -48,6 +48,14 @@ class ByteLink(Protocol):
 
 
 @runtime_checkable
+class FillingLink(Protocol):
+    """A link that fills up while the other side reads more slowly than this one sends."""
+
+    def has_room(self) -> bool:
+        """Return whether more can be sent now; else a sender of long answers waits, or frames are dropped."""
+
+
+@runtime_checkable
 class SelectiveLink(Protocol):
     """A link whose receiver states which messages it uses, so that the sender need not make the others.
 

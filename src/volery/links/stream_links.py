@@ -18,7 +18,7 @@ import serial
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
-from volery.links.coded_link import CONNECTION_FAULTS, MAX_UNSENT, ByteStream, CodedLink, StreamLink
+from volery.links.coded_link import CONNECTION_FAULTS, MAX_UNSENT, ROOM, ByteStream, CodedLink, StreamLink
 from volery.links.link import Codec, FrameParser
 from volery.links.mavlink_codec import MAVLINK
 
@@ -29,6 +29,9 @@ ACCEPT_RETRY: Ns = S
 """Time after which connections are accepted again when the process had no descriptor left."""
 NOTICE_PERIOD: Ns = 10 * S
 """At most one notice about connections that were closed for want of room in this time."""
+_SEND_BUFFER = 32_768
+"""Bytes of a connection that wait in the system, which doubles it. By itself Linux lets megabytes wait: who
+reads slowly would receive what is old by many seconds, and answers to requests only after that."""
 _CONNECT_S = 3.0
 _JOIN_S = 5.0
 _READ_SIZE = 65_536
@@ -45,6 +48,7 @@ class _SocketStream:
     def __init__(self, connected: socket.socket) -> None:
         connected.setblocking(False)
         connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        connected.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
         self._socket = connected
 
     def fileno(self) -> int:
@@ -176,9 +180,19 @@ class _Client:
         if len(self.unsent) + len(data) > MAX_UNSENT:
             return
         self.unsent += data
+        self.flush()
+
+    def flush(self) -> None:
+        """Send what waits, as far as the connection takes it now."""
         with suppress(OSError):
             taken = self.stream.write(bytes(self.unsent))
             del self.unsent[:taken]
+
+    def has_room(self) -> bool:
+        """Return whether little waits."""
+        if len(self.unsent) >= ROOM:
+            self.flush()
+        return len(self.unsent) < ROOM
 
     def precedence(self) -> tuple[bool, Ns]:
         """Return what decides who is kept when there is no room; the least is closed."""
@@ -317,6 +331,10 @@ class TcpServer(CodedLink):
         if self._clients or self._closed:
             return super()._connection_problem()
         return f"no client has connected to {self.name}"
+
+    def has_room(self) -> bool:
+        """Return whether a client has room; who does not read must not hold up the others."""
+        return not self._clients or any(client.has_room() for client in self._clients.values())
 
     def _transmit(self, data: bytes) -> None:
         for client in self._clients.values():

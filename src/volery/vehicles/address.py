@@ -2,12 +2,14 @@
 
 ```
 sim:ardupilot?home=46.0828,-103.899,900     simulated in this program
+firmware:ardupilot?program=arducopter       a program of its real firmware, in the simulated world
 ardupilot+tcp://127.0.0.1:5760              connects to a server
 ardupilot+udp://:14550                      binds the port and answers the first sender
 ardupilot+udp://:14550?bind=127.0.0.1       the same, for senders on this computer only
 ardupilot+udp://10.0.0.7:14551              sends to a host
 ardupilot+serial:///dev/ttyUSB0?baud=57600  a radio or a cable
 mavros+graph:///drone_1                     topics and services of a graph, below that namespace
+px4+ros2:///                                PX4's own topics on ROS 2; below /px4_1: px4+ros2:///px4_1
 ```
 
 Addresses to listen at have the same form without a driver: ``tcp://127.0.0.1:5760``,
@@ -32,7 +34,9 @@ from volery.links.mavlink_codec import MAVLINK, SignedMavlink, read_key
 from volery.links.stream_links import SerialLink, TcpClient, TcpServer
 from volery.links.udp_link import UdpLink, UdpServer
 
-TRANSPORTS = ("graph", "ros1", "ros2", "serial", "sim", "tcp", "udp")
+IN_VIRTUAL_TIME = ("sim", "firmware")
+"""Transports to vehicles of the simulated world: an autopilot of volery, or a program of real firmware."""
+TRANSPORTS = ("graph", "ros1", "ros2", "serial", *IN_VIRTUAL_TIME, "tcp", "udp")
 
 EXAMPLES = (
     "sim:ardupilot, ardupilot+tcp://127.0.0.1:5760, ardupilot+udp://:14550, "
@@ -87,6 +91,11 @@ class Address:
     def __str__(self) -> str:
         return self.text
 
+    @property
+    def in_virtual_time(self) -> bool:
+        """Whether the vehicle flies in the simulated world, in virtual time."""
+        return self.transport in IN_VIRTUAL_TIME
+
     def with_option(self, name: str, value: str) -> Address:
         """Return the same address with one more option."""
         return replace(self, options=MappingProxyType({**self.options, name: value}))
@@ -135,11 +144,11 @@ def parse(text: str) -> Address:
         UsageError: the address is invalid; the message names the error and the valid choices.
     """
     url = _split(text)
-    if url.scheme == "sim":
+    if url.scheme in IN_VIRTUAL_TIME:
         name = (url.netloc + url.path).strip("/")
         if not name:
-            raise UsageError(f"{text!r} does not say which autopilot to simulate; try sim:ardupilot")
-        return Address(name, "sim", options=_options(text, url), text=text)
+            raise UsageError(f"{text!r} does not say which autopilot to simulate; try {url.scheme}:ardupilot")
+        return Address(name, url.scheme, options=_options(text, url), text=text)
     driver, plus, transport = url.scheme.partition("+")
     if not plus or not driver:
         raise UsageError(f"{text!r} does not say which driver to use; an address is like {EXAMPLES}")
@@ -180,8 +189,8 @@ def _options(text: str, url: SplitResult) -> Mapping[str, str]:
 
 
 def _with_transport(text: str, url: SplitResult, driver: str, transport: str) -> Address:
-    if transport not in TRANSPORTS or transport == "sim":
-        valid = [name for name in TRANSPORTS if name != "sim"]
+    if transport not in TRANSPORTS or transport in IN_VIRTUAL_TIME:
+        valid = [name for name in TRANSPORTS if name not in IN_VIRTUAL_TIME]
         known = f"{choices(valid)} (and sim:{driver})"
         hint = did_you_mean(transport, valid)
         raise UsageError(f"{text!r}: no transport {transport!r}{hint}; there is {known}")

@@ -331,6 +331,7 @@ class DriverFactory:
         on_link: opener on a link; ``None`` if not supported.
         codec: codec of the link's frames.
         on_graph: opener on a node of a graph; ``None`` if not supported.
+        on_ros2: opener on a node of real ROS 2 under the autopilot's own names; ``None`` if it has none.
         namespace: default namespace of its topics; ``{name}`` is replaced by the vehicle's name.
         graph_names: whose topic names it uses.
         home_option: option that states the altitude of home, m AMSL, for an autopilot that does not know it.
@@ -339,6 +340,7 @@ class DriverFactory:
     on_link: Opener | None = None
     codec: Codec = MAVLINK
     on_graph: Opener | None = None
+    on_ros2: Opener | None = None
     namespace: str = "/{name}"
     graph_names: str = "mavros"
     home_option: str = ""

@@ -8,17 +8,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from volery.base.errors import CapabilityError, Refused, UsageError, choices, did_you_mean
+from volery.base.errors import (
+    CapabilityError,
+    PositionLost,
+    Refused,
+    UsageError,
+    choices,
+    did_you_mean,
+)
+from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns, S, from_seconds
 from volery.kernel.api import Handle
 from volery.kernel.waiting import sleep
 from volery.vehicles.bounded_vehicle import BoundedVehicle
 from volery.vehicles.driver import LINK_LOSS_ACTIONS, LinkLossAction
+from volery.vehicles.external_pose import ExternalPose
 from volery.vehicles.onboard_files import OnboardFiles
 from volery.vehicles.onboard_logs import OnboardLogs
 from volery.vehicles.onboard_plan import OnboardPlan
 from volery.vehicles.parameters import Parameters
 from volery.vehicles.payload import Payload
+from volery.vehicles.pose_watch import PoseWatch
 from volery.vehicles.rtcm import messages_of
 from volery.vehicles.services import Services
 from volery.vehicles.telemetry_feed import Quantity, TelemetryHistory, read_quantity, subscribe
@@ -33,6 +43,8 @@ DOWN_AFTER: Ns = 1500 * MS
 
 class ServicedVehicle(BoundedVehicle):
     """State over time and services of a vehicle; see ``Vehicle``."""
+
+    _pose_watch: PoseWatch | None = None
 
     def _services(self, what: str) -> Services:
         """Return the services; raise ``CapabilityError`` where there is no *what*."""
@@ -151,6 +163,77 @@ class ServicedVehicle(BoundedVehicle):
         services = self._services("RTK corrections")
         for message in messages_of(data):
             services.send_corrections(message)
+
+    def send_landing_target(self, forward: float, right: float, down: float) -> None:
+        """Send where the autopilot is to land (MAVLink's LANDING_TARGET), for each picture of a landing.
+
+        An ArduPilot with PLND_ENABLED 1 and PLND_TYPE 1 lands on it in ``land`` and ``return_home``, which
+        another task calls meanwhile; from 2 s without a target on it descends where it is. Others take none.
+        The first call reads the two parameters and waits for them.
+
+        Args:
+            forward: distance of the target along the body's forward axis, m; the axes tilt with the body.
+            right: distance along its right axis, m.
+            down: distance along its down axis, m, above 0.
+
+        Raises:
+            UsageError: a value is not a number, or the target is not below.
+            CapabilityError: the autopilot takes no landing target.
+            Refused: its parameters have it ignored.
+        """
+        call = f"send_landing_target({forward!r}, {right!r}, {down!r})"
+        self._check_numbers(call, forward, right, down, example="send_landing_target(0.4, -0.2, 5.0)")
+        if down <= 0.0:
+            raise UsageError(f"{self.name}: {call}: the target is not below; give metres downwards, above 0")
+        self._services("a landing target").send_landing_target((forward, right, down))
+
+    # -- flight without satellites
+
+    def send_external_pose(self, pose: ExternalPose) -> None:
+        """Tell the autopilot where the vehicle is, as by scan matching or motion capture. It never waits.
+
+        The autopilot fuses it if its parameters say so (ArduPilot: VISO_TYPE, EK3_SRC1_POSXY; PX4:
+        EKF2_EV_CTRL), weighs it by its covariance, and says when it misses it. Send it 10 to 30 times a
+        second, and nothing while the place is not known.
+
+        Args:
+            pose: about the origin of the estimator: ``set_origin`` sets it where there are no satellites.
+
+        Raises:
+            UsageError: a value is missing, is not a number or has another unit.
+            CapabilityError: this autopilot takes none.
+            PositionLost: in flight the poses do not move as the vehicle's own velocity says: they have
+                frozen, jumped without ``resets``, or run away. This one is not sent; without poses the
+                autopilot does what it does when it has lost its position.
+        """
+        services = self._services("an external position estimate")
+        if not isinstance(pose, ExternalPose):
+            raise UsageError(f"{self.name}: send_external_pose({pose!r}): give an ExternalPose(...)")
+        pose.check(self.name)
+        if self._pose_watch is None:
+            self._pose_watch = PoseWatch(self._driver.telemetry)
+        problem = self._pose_watch.problem(pose, self.kernel.now())
+        if problem:
+            raise PositionLost(self.name, "external poses", f"{problem}; they are not sent")
+        services.send_external_pose(pose)
+        self._driver.telemetry.external_pose_ns = self.kernel.now()
+
+    def set_origin(self, place: Position) -> None:
+        """Set the origin of the estimator's local frame, and return when the autopilot states it.
+
+        With it a vehicle without satellites has positions in degrees, and home. It need not be the true
+        place. An origin that satellites have set stays.
+
+        Args:
+            place: the origin, with an altitude AMSL: that of the ground where the autopilot was started.
+
+        Raises:
+            NotArrived: the autopilot states no origin, or another one.
+        """
+        services = self._services("set the origin of its estimator")
+        if not isinstance(place, Position) or not isinstance(place.altitude, AMSL):
+            raise UsageError(f"{self.name}: set_origin({place}): give a Position with an altitude AMSL(...)")
+        services.set_origin(place)
 
     # -- telemetry in time
 

@@ -11,7 +11,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence, Set
 from typing import NamedTuple, Protocol
 
 from volery.base.errors import CapabilityError, Refused, UsageError, did_you_mean
+from volery.base.frames import Vector
+from volery.base.position import Position
 from volery.base.time import Ns
+from volery.vehicles.external_pose import ExternalPose
 
 
 class Item(NamedTuple):
@@ -77,10 +80,12 @@ class ParameterRules(NamedTuple):
     Args:
         renamed: those with another name in another version, by both names.
         volatile: those that the autopilot writes itself, such as counters; they are no settings.
+        landing_target: those with which it lands on a LANDING_TARGET, and their values; empty: it takes none.
     """
 
     renamed: Mapping[str, RenamedParameter] = {}
     volatile: Set[str] = frozenset()
+    landing_target: Mapping[str, float] = {}
 
 
 NO_RULES = ParameterRules()
@@ -213,6 +218,20 @@ class Services(Protocol):
     def send_corrections(self, message: bytes) -> None:
         """Send one RTCM message to the GPS receivers. It is not acknowledged."""
 
+    def send_landing_target(self, offset: Vector) -> None:
+        """Send where to land: forward, right, down from the vehicle [m]. It is not acknowledged.
+
+        Raises:
+            CapabilityError: the autopilot takes none.
+            Refused: its parameters have it ignored.
+        """
+
+    def send_external_pose(self, pose: ExternalPose) -> None:
+        """Send an external position estimate. It is not acknowledged."""
+
+    def set_origin(self, place: Position) -> None:
+        """Set the origin of the estimator (AMSL); ``NotArrived`` if it does not state that one then."""
+
 
 class PartialServices:
     """``Services`` of a vehicle whose protocol carries few of them.
@@ -277,3 +296,15 @@ class PartialServices:
     def send_corrections(self, message: bytes) -> None:
         """See ``Services``."""
         raise self._unsupported("RTK corrections")
+
+    def send_landing_target(self, offset: Vector) -> None:
+        """See ``Services``."""
+        raise self._unsupported("a landing target")
+
+    def send_external_pose(self, pose: ExternalPose) -> None:
+        """See ``Services``."""
+        raise self._unsupported("an external position estimate")
+
+    def set_origin(self, place: Position) -> None:
+        """See ``Services``."""
+        raise self._unsupported("set the origin of its estimator")

@@ -165,6 +165,7 @@ class Telemetry:
         obstacles_ns: time of their last measurement, also of one that sees nothing; -1 before the first.
         home_ns: time since which home is reported where it is now, within ``SAME_HOME_M``; -1 without one.
         detects_silence: whether a silence is one of the link, not of a node that does not run its loop.
+        external_pose_ns: when this program has last sent an external position estimate; -1: never.
         stream_lost: how a stream of this program was interrupted, so that a failsafe of the autopilot acts.
     """
 
@@ -217,7 +218,7 @@ class Telemetry:
         self.rc: tuple[int, ...] = ()
         self.rc_ns: Ns = -1
         self.obstacles: dict[tuple[str, int], Obstacle] = {}
-        self.obstacles_ns: Ns = -1
+        self.obstacles_ns = self.external_pose_ns = -1
         self.changed = Signal(kernel, f"telemetry of {name}")
 
     def forget(self) -> None:
@@ -275,15 +276,20 @@ class Telemetry:
     def position_lost_for(self, now: Ns) -> Ns:
         """Return for how long the position has not been reported or not been a valid estimate, ns.
 
-        An estimate is not valid without satellites, or where the autopilot reports so. It is 0 before the
-        first position, and for a vehicle that never had satellites or a valid estimate.
+        An estimate is not valid where the autopilot reports so, or without satellites, unless this program
+        sends an external one. It is 0 before the first position, and for a vehicle that never had satellites
+        or a valid estimate.
         """
         if self.position is None:
             return 0
         allowed = max(POSITION_STALE_AFTER, PERIODS_MISSED * self._position_period)
         age = now - self._position_ns
         lost = age if age > min(allowed, LONGEST_POSITION_AGE) else 0
-        since = [one for one in (self._fix_lost_ns, self._estimate_lost_ns) if one is not None]
+        fix_lost = self._fix_lost_ns
+        if fix_lost is not None and self.external_pose_ns >= 0:
+            sent = now - self.external_pose_ns <= POSITION_STALE_AFTER
+            fix_lost = None if sent else max(fix_lost, self.external_pose_ns)
+        since = [one for one in (fix_lost, self._estimate_lost_ns) if one is not None]
         return max(lost, *(now - one for one in since)) if since else lost
 
     def note_obstacle(self, sector: tuple[str, int], direction: Vector, metres: float) -> None:

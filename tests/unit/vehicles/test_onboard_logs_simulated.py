@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from pymavlink import DFReader, mavutil
 from pyulog import ULog
@@ -15,6 +16,8 @@ from volery.base.time import S
 from volery.control.log_signals import read_signals
 from volery.kernel.waiting import sleep
 from volery.links.frame import Frame
+from volery.report.flight_comparison import phases
+from volery.report.flights import read_flights
 from volery.vehicles import Drone
 from volery.vehicles.drivers.ardupilot import open_driver as open_ardupilot
 from volery.vehicles.drivers.px4 import open_driver as open_px4
@@ -132,6 +135,16 @@ def test_volery_judges_them(
 ) -> None:
     assert {"roll", "pitch", "yaw"} <= {signal.name for signal in read_signals(dataflash[1])}
     assert {"roll", "pitch", "yaw", "north"} <= {signal.name for signal in read_signals(ulog[1])}
+
+
+@pytest.mark.parametrize("log", ["dataflash", "ulog"])
+def test_volery_finds_the_flight_in_them(log: str, request: pytest.FixtureRequest) -> None:
+    (flight,) = read_flights(request.getfixturevalue(log)[1])
+    found = {one.name: one.stretch for one in phases(flight, by_operations=False)}
+    assert {"armed", "take-off", "landing"} <= set(found)
+    assert found["mode LAND" if log == "dataflash" else "mode AUTO.LAND"].end == found["armed"].end
+    _, north, height = flight.places(np.array([found["landing"].begin]))[0]
+    assert (north, height) == pytest.approx((15.0, 12.0), abs=2.0)
 
 
 def test_an_interrupted_download_an_unknown_log_and_erasing() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from rigs.airstrip import Airstrip, at
 from volery.base.errors import CapabilityError, OutOfBounds, Refused, UsageError
+from volery.base.frames import world_to_body
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import S
 from volery.kernel.waiting import sleep
@@ -251,6 +252,46 @@ def test_corrections_that_are_none() -> None:
             drone.send_corrections(rtcm(20)[:-1] + b"\0")
 
     Px4Strip().fly(mission)
+
+
+def test_an_ardupilot_lands_on_the_target_that_is_sent() -> None:
+    field = ArduPilotStrip(parameters={"PLND_ENABLED": 1, "PLND_TYPE": 1})
+    goal = (4.0, -3.0)  # north, east of home
+
+    def mission(drone: Drone) -> Any:
+        def look() -> None:
+            estimate = field.autopilot.vehicle.estimate
+            here = estimate.position
+            off = (goal[0] - here[0], goal[1] - here[1], -here[2])
+            if here[2] < -0.3:
+                drone.send_landing_target(*world_to_body(estimate.quaternion, off))
+
+        drone.takeoff(6)
+        look()  # the first call waits for parameters
+        drone.kernel.every(S // 10, look)
+        sleep(drone.kernel, 3 * S)
+        drone.land()
+        return field.autopilot.vehicle.estimate.position
+
+    north, east, _ = field.fly(mission)
+    assert (north, east) == pytest.approx(goal, abs=0.3)
+
+
+def test_a_landing_target_that_would_be_ignored() -> None:
+    def ardupilot(drone: Drone) -> None:
+        with pytest.raises(UsageError, match="the target is not below"):
+            drone.send_landing_target(1.0, 0.0, -2.0)
+        with pytest.raises(UsageError, match=r"send_landing_target\(0.4, -0.2, 5.0\)"):
+            drone.send_landing_target(nan, 0.0, 2.0)
+        with pytest.raises(Refused, match="PLND_ENABLED is not 1, so it would ignore it; set it and reboot"):
+            drone.send_landing_target(1.0, 0.0, 2.0)
+
+    def px4(drone: Drone) -> None:
+        with pytest.raises(CapabilityError, match="fly velocities towards it"):
+            drone.send_landing_target(1.0, 0.0, 2.0)
+
+    ArduPilotStrip().fly(ardupilot)
+    Px4Strip().fly(px4)
 
 
 def test_telemetry_over_time() -> None:

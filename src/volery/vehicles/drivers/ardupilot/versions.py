@@ -168,4 +168,4 @@ _ALL = (
 )
 RENAMED: Mapping[str, RenamedParameter] = {name: one for one in _ALL for name in (one.before, one.after)}
 """Parameters of Copter and Rover with another name in another version, by both names."""
-PARAMETER_RULES = ParameterRules(RENAMED, _VOLATILE)
+PARAMETER_RULES = ParameterRules(RENAMED, _VOLATILE, {"PLND_ENABLED": 1.0, "PLND_TYPE": 1.0})

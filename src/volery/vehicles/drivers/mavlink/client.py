@@ -306,7 +306,7 @@ class MavlinkClient:
 
     def _uses(self, name: str) -> bool:
         """Return whether a periodic message changes anything here; a service in progress may use each."""
-        return self._decoder.handles(name) or name in self._streams or self.services.listening
+        return self._decoder.handles(name) or name in self._streams or self.services.uses(name)
 
     def _receive(self, frame: Frame) -> None:
         if not self._is_from_autopilot(frame):

@@ -157,8 +157,8 @@ class MavlinkDriver:
         """Return the parameters for a lost link; over a graph the link is that of another program."""
         if not isinstance(self._backend, MavlinkClient):
             raise CapabilityError(
-                f"{self.name}: over a ROS graph its link is MAVROS's, which goes on when this program is "
-                "killed: what it then does cannot be asked for; connect to it by MAVLink"
+                f"{self.name}: over a ROS graph its link is another program's, which goes on when this one "
+                "is killed: what it then does cannot be asked for; connect to it by MAVLink"
             )
         return self._link_loss_settings(action)
 
@@ -190,10 +190,13 @@ class MavlinkDriver:
     def _missing(self) -> str:
         """Return what it lacks to be ready, by its own telemetry, and what can be done."""
         seen = self.telemetry
-        if seen.fix in UNFIXED or (not seen.fix and seen.position is None):
+        unlocated = seen.position is None
+        if unlocated and seen.external_pose_ns >= 0:
+            return "its estimator has no position by the poses that it gets: are its parameters for them set?"
+        if (seen.fix in UNFIXED and seen.external_pose_ns < 0) or (not seen.fix and unlocated):
             fix = f"its GPS reports {seen.fix or 'nothing'}, {seen.satellites} satellites"
             return f"{fix}: give it a view of the sky"
-        if seen.position is None:
+        if unlocated:
             return "its estimator has no position yet: stand it still and level"
         if seen.home is None:
             return "it has not reported its home"

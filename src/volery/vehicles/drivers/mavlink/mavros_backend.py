@@ -1,21 +1,15 @@
 """Backend over MAVROS: an autopilot behind topics and services of a graph, as a commanding node uses them.
 
-The node's own loop, at 10 Hz, is run by the task that waits: process what has arrived (one ``spinOnce``),
-then sleep. All execution time is therefore charged to the component whose node this is. Nothing runs in the
-background: a set-point is repeated by that loop, or by the caller.
-
 MAVROS does not pass on everything: neither the kind of vehicle (``Drone`` or ``Rover`` states it) nor the
 result of the arming checks. Here a vehicle is ready once it has a local position, a fix and a home.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from math import degrees, isnan, nan, radians
+from math import degrees, nan, radians
 from typing import Any, NamedTuple
 
-from volery.base.errors import LinkError, LinkSilent
 from volery.base.frames import (
     attitude_enu_to_ned,
     attitude_ned_to_enu,
@@ -25,11 +19,10 @@ from volery.base.frames import (
 )
 from volery.base.geoid import EGM96, EGM96_NAME, Geoid, parse_geoid
 from volery.base.position import AMSL, Position
-from volery.base.time import MS, Ns, S
-from volery.kernel.api import Action, Kernel
+from volery.base.time import Ns
+from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant, entry_name
-from volery.ros.graph import Node, Publisher, ServiceError
-from volery.ros.graph.work import Work
+from volery.ros.graph import Node, Publisher
 from volery.ros.messages import message_class, new, request
 from volery.vehicles.address import check_options
 from volery.vehicles.driver import Acceleration, AttitudeTarget
@@ -47,18 +40,12 @@ from volery.vehicles.drivers.mavlink.backend import (
     Ack,
     AttitudeStream,
 )
+from volery.vehicles.drivers.mavlink.graph_backend import PERIOD, GraphBackend
 from volery.vehicles.drivers.mavlink.mavros_services import MavrosServices, to_waypoint
 from volery.vehicles.drivers.steps import ROVER_KIND
 from volery.vehicles.firmware_versions import Rule
 from volery.vehicles.services import NO_RULES, Item, ParameterRules
 from volery.vehicles.telemetry import Answer, Battery, StatusText, Telemetry, Velocity
-
-PERIOD: Ns = 100 * MS
-ANSWERED_WITHIN: Ns = 6 * S
-"""A vehicle node waits up to 5 s for the autopilot's acknowledgement."""
-
-ATTITUDE_WITHIN: Ns = 2 * S
-"""MAVROS publishes the attitude several times a second."""
 
 MAVROS_OPTIONS = ("geoid", "namespace")
 NO_FIX = -1
@@ -193,7 +180,8 @@ class MavrosDecoder:
     def _update_ready(self) -> None:
         telemetry = self._telemetry
         located = telemetry.position is not None and telemetry.home is not None
-        telemetry.ready = telemetry.armable = self._has_fix and self._has_local_position and located
+        fixed = self._has_fix or telemetry.external_pose_ns >= 0
+        telemetry.ready = telemetry.armable = fixed and self._has_local_position and located
 
     def _battery(self, message: Any) -> None:
         """Decode the battery; in ROS the current of a discharge is negative."""
@@ -212,7 +200,7 @@ class MavrosDecoder:
         self._telemetry.mission_reached = message.wp_seq
 
 
-class MavrosBackend:
+class MavrosBackend(GraphBackend):
     """See ``Backend``. The constructor joins the graph, which takes execution time of the calling task.
 
     Args:
@@ -226,18 +214,10 @@ class MavrosBackend:
     firmware: FirmwareBehind
 
     def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
-        self.telemetry = Telemetry(kernel, name)
-        self.cycle: Action | None = self._spin
-        self._kernel = kernel
-        self._node = node
-        self._namespace = namespace.rstrip("/")
+        super().__init__(kernel, node, name, namespace)
         self._decoder = MavrosDecoder(kernel, self.telemetry, geoid, self.firmware)
-        self._wrong = ""
-        self._arrived: deque[Work] = deque()
-        self._spinner = node.group()
-        inbox = node.group(self._arrived.append)
         for topic, (message_type, handler) in self._decoder.topics().items():
-            node.subscribe(self._name(topic), message_type, handler, group=inbox)
+            self._subscribe(topic, message_type, handler)
         self._velocity = node.advertise(self._name("setpoint_raw/local"), "mavros_msgs/msg/PositionTarget")
         self._set_mode = node.client(self._name("set_mode"), "mavros_msgs/srv/SetMode")
         self._arming = node.client(self._name("cmd/arming"), "mavros_msgs/srv/CommandBool")
@@ -246,7 +226,6 @@ class MavrosBackend:
         self._push = node.client(self._name("mission/push"), "mavros_msgs/srv/WaypointPush")
         self._attitude: Publisher | None = None
         self._attitudes = AttitudeStream(kernel, self.firmware.turning, self.firmware.drawn_back)
-        self._inbox = inbox
         self._receives_attitude = False
         self._rate = node.rate(PERIOD)
         self.services = MavrosServices(
@@ -255,73 +234,28 @@ class MavrosBackend:
             self.telemetry,
             self._namespace,
             self._spin,
+            geoid=geoid,
             home_first=self.firmware.home_first,
             parameter_rules=self.firmware.parameter_rules,
         )
 
-    def _name(self, name: str) -> str:
-        return f"{self._namespace}/{name}"
-
-    # -- the node's loop
-
-    def _spin(self) -> None:
-        self.poll()
-        self._rate.sleep()
+    def _update(self) -> None:
+        self._decoder.update_flying()
 
     def request_attitude(self) -> None:
         """Subscribe to ``imu/data``, at the first call, and wait for a message."""
         if self._receives_attitude:
             return
         self._receives_attitude = True
-        name = self._name("imu/data")
-        self._node.subscribe(name, "sensor_msgs/msg/Imu", self._decoder.orientation, group=self._inbox)
-        until = self._kernel.now() + ATTITUDE_WITHIN
-        while isnan(self.telemetry.attitude.roll) and self._kernel.now() < until:
-            self._spin()
+        self._subscribe("imu/data", "sensor_msgs/msg/Imu", self._decoder.orientation)
+        self._wait_for_attitude()
 
-    def request_obstacles(self) -> None:
-        """Do nothing: MAVROS publishes range sensors only as its configuration names them."""
-
-    def poll(self) -> None:
-        """Process received messages; all of them are charged as one ``spinOnce``."""
-        self._spinner.spin_once(0)
-        while self._arrived:
-            self._arrived.popleft().run()
-        self._decoder.update_flying()
-
-    def failing_checks(self) -> Sequence[str]:
-        """Return nothing: no arming checks pass MAVROS but as texts."""
-        return ()
-
-    @property
-    def parameters(self) -> Mapping[str, float] | None:
-        """Always ``None``: parameters are not read over a graph."""
-        return None
-
-    def problem(self) -> LinkError | None:
-        """Return what is wrong with the link, as an error to raise."""
-        if self._wrong:
-            return LinkSilent(self._wrong)
-        if self.telemetry.last_message_ns >= 0:
-            return None
+    def _silence(self) -> str:
         if self._decoder.node_seen:
-            return LinkSilent(f"the vehicle node at {self._namespace} receives no autopilot")
-        return LinkSilent(f"no vehicle node publishes {self._name('state')}")
-
-    def close(self) -> None:
-        """Do nothing: the node belongs to its component."""
+            return f"the vehicle node at {self._namespace} receives no autopilot"
+        return f"no vehicle node publishes {self._name('state')}"
 
     # -- services
-
-    def _call(self, client: Any, asked: Any) -> Any | None:
-        """Return the response; ``None`` if there was none, which is not a refusal by the autopilot."""
-        try:
-            response = client.call(asked, within=ANSWERED_WITHIN)
-        except ServiceError as error:
-            self._wrong = str(error)
-            return None
-        self._wrong = ""
-        return response
 
     def _note_answer(self, key: str, response: Any | None) -> None:
         if response is not None:
@@ -362,12 +296,6 @@ class MavrosBackend:
     def request_arming_checks(self) -> None:
         """Call ``cmd/command`` with RUN_PREARM_CHECKS."""
         self._command("MAV_CMD_RUN_PREARM_CHECKS")
-
-    def request_target(self) -> None:
-        """Do nothing: the target would need another subscription, with its execution time."""
-
-    def request_mission_progress(self) -> None:
-        """Do nothing: ``mission/reached`` is subscribed to already."""
 
     def upload(self, items: Sequence[Item]) -> None:
         """Call ``mission/push``."""

@@ -13,11 +13,20 @@ from math import isclose
 from typing import Any, TypeVar
 
 from volery.base.errors import CapabilityError, NotArrived, Refused
+from volery.base.frames import (
+    Vector,
+    attitude_ned_to_enu,
+    euler_to_quaternion,
+    pose_covariance_ned_to_enu,
+)
+from volery.base.geoid import Geoid
+from volery.base.position import Position
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.links.mavlink_messages import constant, entry_name
 from volery.ros.graph import Node, QoS, ServiceError
-from volery.ros.messages import new, request
+from volery.ros.messages import message_class, new, request
+from volery.vehicles.external_pose import ExternalPose
 from volery.vehicles.services import (
     NO_RULES,
     Item,
@@ -52,6 +61,7 @@ _TOPICS = {
 }
 """MAVROS 1 and 2 name two of the lists differently."""
 
+SAME_DEGREES = 1e-6
 LOG_QUEUE = QoS(1000)
 """A piece of a log is a hundred messages, which arrive within one round of the loop."""
 
@@ -67,6 +77,7 @@ class MavrosServices:
         telemetry: telemetry of the vehicle.
         namespace: namespace of the vehicle node.
         spin: one round of the node's loop.
+        geoid: geoid of the altitudes, which MAVROS states above the ellipsoid.
         home_first: whether item 0 of a mission is home, as in ArduPilot.
         parameter_rules: its parameters with other names in other versions, and those that it writes itself.
     """
@@ -82,6 +93,7 @@ class MavrosServices:
         namespace: str,
         spin: Action,
         *,
+        geoid: Geoid,
         home_first: bool,
         parameter_rules: ParameterRules = NO_RULES,
     ) -> None:
@@ -93,6 +105,7 @@ class MavrosServices:
         self._name = telemetry.name
         self._namespace = namespace
         self._spin = spin
+        self._geoid = geoid
         self._inbox = node.group()
         self._clients: dict[tuple[str, str], Any] = {}
         self._lists: dict[int, tuple[Ns, list[Any]]] = {}  # time of arrival and items of each list
@@ -102,6 +115,9 @@ class MavrosServices:
         self._log = -1
         self._listens_to_logs = False
         self._corrections: Any = None
+        self._poses: Any = None
+        self._origins: Any = None
+        self._origin: Any = None  # the last one that was stated
         self._pulled = False
 
     # -- the graph
@@ -389,6 +405,57 @@ class MavrosServices:
             self._corrections = self._node.advertise(name, "mavros_msgs/msg/RTCM")
             self._until("RTK corrections", lambda: self._corrections.subscribers() or None, ANSWERED_WITHIN)
         self._corrections.publish(new("mavros_msgs/msg/RTCM", data=list(message)))
+
+    def send_landing_target(self, offset: Vector) -> None:
+        """See ``Services``."""
+        raise CapabilityError(
+            f"{self._name}: send a landing target: not over MAVROS; connect by MAVLink, or fly velocities "
+            "towards it, as volery.autonomy.precision_landing gives them"
+        )
+
+    # -- flight without satellites
+
+    def send_external_pose(self, pose: ExternalPose) -> None:
+        """Publish on ``vision_pose/pose_cov``, which is advertised at the first call."""
+        if self._poses is None:
+            name = f"{self._namespace}/vision_pose/pose_cov"
+            self._poses = self._node.advertise(name, "geometry_msgs/msg/PoseWithCovarianceStamped")
+        message = new("geometry_msgs/msg/PoseWithCovarianceStamped")
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(pose.time, S)
+        message.header.frame_id = "map"
+        message.pose.pose.position = message_class("geometry_msgs/msg/Point")(pose.east, pose.north, pose.up)
+        w, x, y, z = attitude_ned_to_enu(euler_to_quaternion(*pose.attitude_ned()))
+        message.pose.pose.orientation = message_class("geometry_msgs/msg/Quaternion")(x, y, z, w)
+        message.pose.covariance = pose_covariance_ned_to_enu(pose.covariance_ned())
+        self._poses.publish(message)
+
+    def set_origin(self, place: Position) -> None:
+        """Publish on ``global_position/set_gp_origin`` until ``gp_origin`` states it."""
+        kind = "geographic_msgs/msg/GeoPointStamped"
+        if self._origins is None:
+            at = f"{self._namespace}/global_position"
+            self._origins = self._node.advertise(f"{at}/set_gp_origin", kind)
+            self._node.subscribe(f"{at}/gp_origin", kind, self._keep_origin, group=self._inbox)
+        self._origin = None
+        latitude, longitude = place.latitude, place.longitude
+        message = new(kind)
+        message.position.latitude, message.position.longitude = latitude, longitude
+        message.position.altitude = self._geoid.to_ellipsoidal(latitude, longitude, place.altitude.metres)
+
+        def stated() -> bool | None:
+            if self._origin is None:
+                return None
+            at = self._origin.position
+            near = max(abs(at.latitude - latitude), abs(at.longitude - longitude)) <= SAME_DEGREES
+            return True if near else None
+
+        asked = f"take {place} as the origin of its estimator"
+        self._until(asked, lambda: self._origins.subscribers() or None, ANSWERED_WITHIN)
+        self._origins.publish(message)
+        self._until(asked, stated, ANSWERED_WITHIN, lambda: self._origins.publish(message))
+
+    def _keep_origin(self, message: Any) -> None:
+        self._origin = message
 
 
 def _full(kind: str) -> str:

@@ -7,11 +7,14 @@ calls block the calling task; several tasks may ask at once, because an answer i
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from math import isclose, isfinite
+from math import hypot, isclose, isfinite
 from typing import Any
 
+from volery.base.elementary import atan2
 from volery.base.errors import CapabilityError, NotArrived, Refused
-from volery.base.time import MS, Ns, S
+from volery.base.frames import Vector, upper_triangle
+from volery.base.position import Position
+from volery.base.time import MS, US, Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Lock
 from volery.links.frame import Frame
@@ -26,6 +29,7 @@ from volery.links.mavlink_messages import (
 )
 from volery.vehicles.drivers.mavlink.file_transfer import FileTransfer
 from volery.vehicles.drivers.mavlink.pending_requests import AGAIN, TRIES, PendingRequests
+from volery.vehicles.external_pose import ExternalPose
 from volery.vehicles.rtcm import correction_parts
 from volery.vehicles.services import (
     MISSION,
@@ -48,6 +52,10 @@ KEPT_TIMES = 2
 LATE_WITHIN: Ns = 250 * MS
 """Time after a new value was sent in which the old one is rather the answer to an earlier request."""
 
+RESETS = 256
+SAME_DEGREES = 10
+"""Difference of an origin that is stated as a float on the way [1e-7 degrees]."""
+
 LOG_PART = 90
 """Bytes in one LOG_DATA."""
 
@@ -65,6 +73,8 @@ _WHOLE: Mapping[int, tuple[int, int]] = {
     for bits in (8, 16, 32, 64)
 }
 """Smallest and largest value of whole parameters, by MAV_PARAM_TYPE."""
+_BODY_FRD = constant("MAV_FRAME_BODY_FRD")
+_FIDUCIAL = constant("LANDING_TARGET_TYPE_VISION_FIDUCIAL")
 _REAL32, _REAL64 = constant("MAV_PARAM_TYPE_REAL32"), constant("MAV_PARAM_TYPE_REAL64")
 
 Send = Callable[..., None]
@@ -108,6 +118,8 @@ class MavlinkServices(PendingRequests):
         self._known: dict[str, Parameter] = {}
         self._whole = False  # all parameters are known, and none was written since
         self._correction = 0
+        self._lands_on_target = False  # the parameters are known to be so
+        self._answers_time = False  # an autopilot that gets poses may ask for the time of their stamps
 
     def command(self, asked: str, command: str, *parameters: float, within: Ns = 0) -> None:
         """See ``Services``."""
@@ -419,6 +431,103 @@ class MavlinkServices(PendingRequests):
             for fields in correction_parts(message, self._correction):
                 self._send("GPS_RTCM_DATA", **fields)
             self._correction = (self._correction + 1) % 32
+
+    # -- landing target
+
+    def send_landing_target(self, offset: Vector) -> None:
+        """See ``Services``."""
+        if not self._lands_on_target:
+            self._check_landing_target()
+            self._lands_on_target = True
+        forward, right, down = offset
+        with self._kernel.guard:  # a framework's callback may send it, too
+            self._send(
+                "LANDING_TARGET",
+                time_usec=self._kernel.now() // US,
+                frame=_BODY_FRD,
+                angle_x=atan2(right, down),
+                angle_y=atan2(-forward, down),
+                distance=hypot(forward, right, down),
+                x=forward,
+                y=right,
+                z=down,
+                q=(1.0, 0.0, 0.0, 0.0),
+                type=_FIDUCIAL,
+                position_valid=1,
+            )
+
+    def _check_landing_target(self) -> None:
+        """Raise an error if the autopilot would ignore a landing target."""
+        asked = "send a landing target"
+        needed = self.parameter_rules.landing_target
+        if not needed:
+            raise CapabilityError(
+                f"{self._name}: {asked}: this autopilot does not land on one by this driver; "
+                "fly velocities towards it, as volery.autonomy.precision_landing gives them"
+            )
+        for name, value in needed.items():
+            if self.read_parameter(name).value != value:
+                raise Refused(
+                    self._name,
+                    asked,
+                    f"its parameter {name} is not {value:g}, so it would ignore it; set it and reboot",
+                )
+
+    # -- flight without satellites
+
+    def send_external_pose(self, pose: ExternalPose) -> None:
+        """Send VISION_POSITION_ESTIMATE; from then on the autopilot's requests for the time are answered."""
+        self._answers_time = True
+        roll, pitch, yaw = pose.attitude_ned()
+        with self._kernel.guard:  # a framework's callback may send it, too
+            self._send(
+                "VISION_POSITION_ESTIMATE",
+                usec=pose.time // 1000,
+                x=pose.north,
+                y=pose.east,
+                z=-pose.up,
+                roll=roll,
+                pitch=pitch,
+                yaw=yaw,
+                covariance=upper_triangle(pose.covariance_ned()),
+                reset_counter=pose.resets % RESETS,
+            )
+
+    def set_origin(self, place: Position) -> None:
+        """Send SET_GPS_GLOBAL_ORIGIN until GPS_GLOBAL_ORIGIN states it."""
+        latitude, longitude = round(place.latitude * 1e7), round(place.longitude * 1e7)
+        number = float(message_type("GPS_GLOBAL_ORIGIN").id)
+
+        def send() -> None:
+            altitude = round(place.altitude.metres * 1000.0)
+            self._send(
+                "SET_GPS_GLOBAL_ORIGIN",
+                target_system=self._telemetry.system,
+                latitude=latitude,
+                longitude=longitude,
+                altitude=altitude,
+                time_usec=self._kernel.now() // 1000,
+            )
+            self._send_to("COMMAND_LONG", command=_REQUEST_MESSAGE, param1=number)
+
+        def stated(frame: Frame) -> bool | None:
+            if frame.name != "GPS_GLOBAL_ORIGIN":
+                return None
+            off = max(abs(frame.fields["latitude"] - latitude), abs(frame.fields["longitude"] - longitude))
+            return True if off <= SAME_DEGREES else None
+
+        other = "; it has another one, of satellites, or its estimator has not started"
+        self.ask(f"take {place} as the origin of its estimator", send, stated, unanswered=other)
+
+    def uses(self, name: str) -> bool:
+        """Return whether a periodic message of that name is needed now."""
+        return self.listening or (self._answers_time and name == "TIMESYNC")
+
+    def receive(self, frame: Frame) -> None:
+        """Pass a frame of the autopilot to the requests in progress, and tell it the time if it asks."""
+        if self._answers_time and frame.name == "TIMESYNC" and frame.fields["tc1"] == 0:
+            self._send("TIMESYNC", tc1=self._kernel.now(), ts1=frame.fields["ts1"])
+        super().receive(frame)
 
 
 def _same(one: float, other: float) -> bool:

@@ -8,11 +8,15 @@ import pytest
 
 from rigs.missions import carried_out
 from volery.base.errors import CapabilityError, NotArrived, Refused
+from volery.base.position import AMSL, Position
 from volery.base.time import MS
 from volery.run.assembly.vehicles import OpenedVehicles, VehicleSettings, open_vehicles
 from volery.simulation.autopilots.dji.flight_controller import controller_of
 from volery.simulation.autopilots.dji.gimbal import Gimbal
 from volery.vehicles import Drone
+from volery.vehicles.external_pose import ExternalPose
+
+LEVEL = [[0.01 if row == column else 0.0 for column in range(6)] for row in range(6)]
 
 BOTH = pytest.mark.parametrize("names", ["dji_sdk", "dji_osdk_ros"])
 
@@ -94,6 +98,8 @@ def test_what_a_dji_does_not_offer() -> None:
             drone.logs.list,
             drone.reboot,
             lambda: drone.send_corrections(b"\xd3\x00\x00\x47\xea\x4b"),
+            lambda: drone.send_external_pose(ExternalPose(0, 0.0, 0.0, 0.0, 0.0, LEVEL)),
+            lambda: drone.set_origin(Position(46.0, 8.0, AMSL(400.0))),
         ):
             with pytest.raises(CapabilityError, match=offers):
                 call()

@@ -13,6 +13,8 @@ import pytest
 from rigs.airstrip import Airstrip, at
 from rigs.missions import carried_out
 from volery.base.errors import CapabilityError, Refused
+from volery.base.frames import LocalFrame
+from volery.base.position import AMSL, Position
 from volery.base.time import MS, S
 from volery.bridge import serve_vehicle
 from volery.bridge.vehicle_node import VehicleNodeOptions
@@ -24,6 +26,7 @@ from volery.links.in_process_link import in_process_pair
 from volery.ros.graph import EmbeddedGraph
 from volery.vehicles import Drone, Vehicle
 from volery.vehicles.drivers.mavros import MAVROS
+from volery.vehicles.external_pose import ExternalPose
 from volery.vehicles.rtcm import crc24q
 from volery.vehicles.services import Item
 from volery.vehicles.vehicle_plan import Circle, Plan
@@ -34,10 +37,10 @@ KNOWN = {"ardupilot": ("WP_SPD", "FENCE_ENABLE"), "px4": ("MPC_XY_CRUISE", "GF_A
 class MavrosStrip(Airstrip):
     """A simulated vehicle, MAVROS's names before it, and a node that commands it."""
 
-    def __init__(self, firmware: str, **options: Any) -> None:
+    def __init__(self, firmware: str, vehicle: dict[str, float] | None = None, **options: Any) -> None:
         self.firmware = firmware
         self.options = options
-        super().__init__()
+        super().__init__(parameters=vehicle)
 
     def open(self) -> Vehicle | None:
         return None
@@ -187,3 +190,29 @@ def test_a_log_is_downloaded_whole(tmp_path: Path) -> None:
         return drone.logs.download(log, tmp_path / "three.bin")
 
     assert carried_out(kernel, download).read_bytes() == LOG
+
+
+@BOTH
+def test_poses_and_origin(firmware: str) -> None:
+    """A vehicle without satellites gets ready by what a node publishes."""
+    given = {"EKF2_EV_CTRL": 1.0, "EKF2_GPS_CTRL": 0.0}
+    if firmware == "ardupilot":
+        given = {"VISO_TYPE": 1.0, "EK3_SRC1_POSXY": 6.0, "EK3_SRC1_VELXY": 0.0, "EK3_SRC1_VELZ": 0.0}
+        given["GPS1_TYPE"] = 0.0
+    strip = MavrosStrip(firmware, vehicle=given)
+    strip.flight.block_gps(True)
+    level = [[0.01 if row == column else 0.0 for column in range(6)] for row in range(6)]
+
+    def mission(drone: Drone) -> tuple[float, float]:
+        drone.set_origin(Position(48.5, 9.25, AMSL(400.0)))
+
+        def send() -> None:
+            pose = ExternalPose(strip.kernel.now(), 3.0, -4.0, 0.0, 0.0, level)
+            drone.send_external_pose(pose)
+
+        strip.kernel.every(50 * MS, send)
+        drone.wait_ready(within=60.0)
+        place = drone.position
+        return LocalFrame(48.5, 9.25, 400.0).to_ned(place.latitude, place.longitude, 400.0)[:2]
+
+    assert strip.fly(mission) == pytest.approx((3.0, -4.0), abs=0.1)
