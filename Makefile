@@ -16,8 +16,8 @@ unexport PYTHONDONTWRITEBYTECODE
 demo: $(VENV)/volery.stamp ## parcels across a city, two allocations side by side, a report
 	$(BIN)/volery demo
 
-caches: $(VENV)/dev.stamp # what each of the many processes would compile else: physics, and assertions of tests
-	@$(BIN)/python -c "import volery; volery.fly('examples/mission.py', 'sim:px4')"
+caches: $(VENV)/ros1.stamp # what each of the many processes would compile else: physics, and assertions of tests
+	@$(BIN)/python -W ignore scripts/compile_numerics.py
 	@$(BIN)/pytest --collect-only -qq >/dev/null
 
 BY_FILE := --dist loadfile --no-loadscope-reorder --durations=5

@@ -111,7 +111,7 @@ def build(entry: NumericCode, linker: str) -> None:
             old.unlink()
     if entry.shipped:
         return
-    with tempfile.TemporaryDirectory() as place:
+    with tempfile.TemporaryDirectory(dir=folder) as place:  # renamed when whole: others load meanwhile
         file = Path(place) / "code.o"
         code, source = compiled(entry)
         file.write_bytes(code)
@@ -120,7 +120,7 @@ def build(entry: NumericCode, linker: str) -> None:
         made = Path(place) / "code.so"
         options = ["-shared", "-fPIC", "-s", "-Wl,--no-undefined", "-fno-builtin", "-o", str(made)]
         subprocess.run([linker, *options, str(file), str(frame), "-lm"], check=True)
-        shutil.move(made, entry.library)
+        made.replace(entry.library)
     print(f"{entry.library.name}: {entry.library.stat().st_size} bytes")
 
 

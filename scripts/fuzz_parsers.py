@@ -61,7 +61,7 @@ from rigs.flight_log_files import dataflash, ulog  # noqa: E402
 MEMORY = Path("/dev/shm")
 """A file system in memory, where a file is written in a hundredth of the time."""
 FOLDER = Path(tempfile.mkdtemp(prefix="fuzz-", dir=MEMORY if MEMORY.is_dir() else None))
-VOCABULARY = Vocabulary({}, frozenset({"python", "rospy"}), frozenset({"ardupilot", "px4"}))
+VOCABULARY = Vocabulary({}, frozenset({"ardupilot", "px4"}))
 MESSAGES = 200
 """Messages read of one file: a longer one shows nothing new."""
 TYPES = (

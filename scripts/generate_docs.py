@@ -11,7 +11,7 @@ import ast
 import json
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -42,6 +42,7 @@ from volery.simulation.autopilots.autopilot import FirmwareFamily
 from volery.simulation.autopilots.autopilot_parameters import Renamed
 from volery.simulation.autopilots.px4 import FIRMWARE as PX4
 from volery.simulation.autopilots.vehicle_state import ParameterTable
+from volery.simulation.real_firmware.firmware_faults import WAYS, ByParameters, LinkFrom, Way
 from volery.simulation.world.body_specs import Multirotor
 from volery.testing.driver_checks import GROUPS
 from volery.testing.driver_conformance import chosen
@@ -564,6 +565,99 @@ def delivery_model() -> dict[Path, str]:
     }
 
 
+def firmware_faults() -> str:
+    """Return how faults reach real firmware, and what was seen of it in bench/firmware_faults.py."""
+    found: list[dict[str, Any]] = json.loads((REFERENCE / "firmware-faults.json").read_text(encoding="utf-8"))
+    lines = [
+        "# Faults on real firmware\n",
+        "How each [kind of fault](faults.md) reaches a program of real firmware that flies",
+        "[in the loop](../firmware-in-the-loop.md).\n",
+        f"| kind | {' | '.join(WAYS)} |",
+        "|---" * (len(WAYS) + 1) + "|",
+        *(f"| `{kind}` | {' | '.join(_way(ways.get(kind)) for ways in WAYS.values())} |" for kind in FAULTS),
+        "\nBy its link: what the firmware is sent in each exchange has the fault. By the world: the body,",
+        "the air, a link or a computer beside has it; the firmware itself has none. Parameters are set at",
+        "the time of the fault and get their values back at its end; of two names the firmware has one. A",
+        "fault that a program cannot be given is refused by name before the run, or, if it boots in the",
+        "run, as soon as it has answered. A barometer or compass that is stuck repeats its value on",
+        "ArduPilot, and is silent on PX4.\n",
+        "## What they do\n",
+        "`bench/firmware_faults.py` lets each fault strike in each phase of a flight, for good, and",
+        "watches for 45 s what the vehicle does: the real program, and the simulated autopilot of the",
+        "same project. All parameters are default ones but those that fit the program to the body. Times",
+        "count from the fault. Whatever a flight without a fault shows, too, is left out.",
+    ]
+    for project in dict.fromkeys(row["project"] for row in found):
+        rows = {(row["real"], row["fault"], row["phase"]): row for row in found if row["project"] == project}
+        phases = dict.fromkeys(row["phase"] for row in rows.values())
+        version = next(row["version"] for row in rows.values() if row["real"])
+        lines += [
+            f"\n### {project} {version}\n",
+            f"| fault | | {' | '.join(phases)} |",
+            "|---" * (len(phases) + 2) + "|",
+        ]
+        for fault in dict.fromkeys(row["fault"] for row in rows.values() if row["fault"] != "none"):
+            for real in (True, False):
+                cells = [
+                    _reaction(rows[real, fault, phase], rows[real, "none", phase])
+                    if (real, fault, phase) in rows and (real, "none", phase) in rows
+                    else ""
+                    for phase in phases
+                ]
+                name = f"`{fault}`" if real else ""
+                lines.append(f"| {name} | {'real' if real else 'simulated'} | {' | '.join(cells)} |")
+        lines += ["\nThe words of the real one, with the phase in which they came first:\n"]
+        lines += [f"- `{fault}`: {said}" for fault, said in _words(rows.values()).items()]
+    return "\n".join(lines) + "\n"
+
+
+def _way(way: Way | LinkFrom | ByParameters | None) -> str:
+    if isinstance(way, ByParameters):
+        groups = (" or ".join(f"`{name}` {value:g}" for name, value in group) for group in way.settings)
+        return ", ".join(groups)
+    if isinstance(way, LinkFrom):
+        return f"{Way.LINK.value}, from {way.major}.{way.minor} on"
+    return way.value if way is not None else "refused"
+
+
+NEAR_ENOUGH_M = 3.0
+WORST_SEVERITY = 4
+
+
+def _reaction(row: dict[str, Any], usual: dict[str, Any]) -> str:
+    """Return what a vehicle did that it does not do without the fault."""
+    parts = [row["broken"]] if row["broken"] else []
+    modes = {mode for _, mode in usual["modes"]}
+    parts += [f"{mode} after {at:.0f} s" for at, mode in row["modes"] if mode not in modes]
+    if usual["flown"] and not row["flown"]:
+        parts.append("does not take off")
+    if row["down_s"] is not None and not row["broken"] and row["phase"] != "landing":
+        parts.append(f"disarmed after {row['down_s']:.0f} s")
+    if usual["down_s"] is not None and row["down_s"] is None:
+        parts.append("not disarmed")
+    parts = parts or ["goes on"]
+    if row["estimate_off_m"] > usual["estimate_off_m"] + NEAR_ENOUGH_M and row["flown"]:
+        parts.append(f"estimate off by {row['estimate_off_m']:.0f} m")
+    elif row["phase"] != "cruise" and row["moved_m"] > usual["moved_m"] + NEAR_ENOUGH_M:
+        parts.append(f"moved {row['moved_m']:.0f} m")
+    return ", ".join(parts)
+
+
+def _words(rows: Iterable[dict[str, Any]]) -> dict[str, str]:
+    """Return what a real firmware says of each fault, by fault."""
+    real = [row for row in rows if row["real"]]
+    usual = {text for row in real if row["fault"] == "none" for _, _, text in row["texts"]}
+    said: dict[str, dict[str, str]] = {}
+    for row in real:
+        for at, severity, text in row["texts"]:
+            key = re.sub(r"[-\d.]+", "…", text.strip())
+            if severity <= WORST_SEVERITY and text not in usual:
+                said.setdefault(row["fault"], {}).setdefault(
+                    key, f"“{text.strip()}” ({row['phase']}, {at:.0f} s)"
+                )
+    return {fault: "; ".join(texts.values()) for fault, texts in said.items()}
+
+
 def rules() -> str:
     """The rules that a model is checked against."""
     lines = [
@@ -589,6 +683,7 @@ def pages() -> dict[Path, str]:
         **{f"{name}-checks.md": MADE + checks(one, name) for name, one in FIRMWARES.items()},
         "conformance.md": MADE + conformance(),
         "faults.md": MADE + faults(),
+        "firmware-faults.md": MADE + firmware_faults(),
         "model.md": MADE + model(),
         "ros-surface.md": MADE + ros_surface(_LIBRARIES),
         "rules.md": MADE + rules(),

@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from volery.base.position import Position as Position
     from volery.components.component_api import add_time as add_time
     from volery.components.component_api import log as log
+    from volery.components.component_api import node as node
     from volery.components.component_api import note as note
     from volery.components.component_api import now as now
     from volery.components.component_api import sleep as sleep

@@ -9,6 +9,9 @@ import pytest
 
 from rigs.station import TARGET, Station
 from volery.base.frames import LocalFrame
+from volery.base.time import MS
+from volery.links.frame import Frame
+from volery.links.in_process_link import in_process_pair
 from volery.simulation.autopilots import ardupilot, px4
 
 ACK, NAK = 128, 129
@@ -46,6 +49,10 @@ class Bench(Station):
         payload = [*head, *data.ljust(239, b"\0")]
         self.send("FILE_TRANSFER_PROTOCOL", **TARGET, target_network=0, payload=payload)
         self.run(0.5)
+        return self.heard_since(before, operation)
+
+    def heard_since(self, before: int, operation: int) -> list[tuple[int, int, int, bytes]]:
+        """Return the same of what was heard after so many replies."""
         found = []
         for number, one in enumerate(self.of("FILE_TRANSFER_PROTOCOL")[before:]):
             octets = bytes(one.fields["payload"])
@@ -139,6 +146,58 @@ def test_a_burst_ends_after_so_many_replies(rig: Bench) -> None:
     burst = rig.replies(BURST, b"", 0, 239)
     assert len(burst) == (500 if rig.name == "ardupilot" else 168)
     assert [complete for _, complete, _, _ in burst] == [*[0] * (len(burst) - 1), 1]
+
+
+class Filling:
+    """The vehicle's end of a link that is full while ``room`` is 0; each message takes one of it."""
+
+    name = "slow"
+
+    def __init__(self, end: Any) -> None:
+        self._end = end
+        self.room = 0
+        self.receive, self.problem, self.close = end.receive, end.problem, end.close
+
+    def has_room(self) -> bool:
+        return self.room > 0
+
+    def send(self, frame: Frame) -> None:
+        if frame.name == "FILE_TRANSFER_PROTOCOL":
+            self.room -= 1
+        self._end.send(frame)
+
+
+def test_a_burst_waits_while_the_link_is_full(rig: Bench) -> None:
+    path = logged(rig, 2390)
+    ours, theirs = in_process_pair(rig.kernel, MS, "slow")
+    slow = Filling(theirs)
+    rig.autopilot.connect(slow)
+    ours.receive(rig._hear)
+    rig.link = ours
+    rig.ask(OPEN, path)
+    slow.room = 4
+    burst = rig.replies(BURST, b"", 0, 239)
+    assert [place for place, *_ in burst] == [0, 239, 478, 717]
+    slow.room = 100
+    rig.run(0.5)
+    whole = rig.heard_since(1, BURST)
+    assert [place for place, *_ in whole] == [*range(0, 2390, 239), 2390]
+
+
+def test_a_number_counts_within_its_session_only(rig: Bench) -> None:
+    path = logged(rig, 700)
+    rig.ask(OPEN, path, session=1)
+    rig.ask(END, session=0 if rig.name == "px4" else 1)
+    rig._sequence -= 1
+    assert rig.ask(OPEN, path, session=2) == (ACK, (700).to_bytes(4, "little"))
+
+
+def test_a_file_that_nobody_reads_gives_way(rig: Bench) -> None:
+    path = logged(rig, 700)
+    rig.ask(OPEN, path)
+    rig.run(4.0)
+    later = rig.ask(OPEN, path, session=1)
+    assert later == ((ACK, (700).to_bytes(4, "little")) if rig.name == "ardupilot" else (NAK, b"\x05"))
 
 
 def test_a_request_that_is_sent_again_is_answered_as_before(rig: Bench) -> None:

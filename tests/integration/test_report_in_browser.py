@@ -5,14 +5,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from rigs.requirements import lacking
-from volery.report.html_report import recover, write_comparison
+from volery.autonomy.map_server import path_message
+from volery.base.time import S
+from volery.report.comparison_page import Comparison, read_side
+from volery.report.html_report import recover
 from volery.requirements.accounts import Accounts
 from volery.requirements.record import write_record
+from volery.ros.messages import definition, new, to_cdr
 from volery.testing.sample_run import sample_events, sample_scenery, sample_setup
-from volery.trace.attachments import to_json
+from volery.trace.attachments import RunSetup, VehicleSetup, to_json
+from volery.trace.events import Published, VehicleState
 from volery.trace.mcap_writer import Attachment, McapWriter
 
 pytestmark = pytest.mark.integration
@@ -175,7 +181,10 @@ def test_a_click_into_a_chart_goes_there(open_page: Any, folders: list[Path]) ->
 
 @pytest.mark.parametrize("width", [390, 768, 1280])
 def test_nothing_sticks_out_sideways(open_page: Any, folders: list[Path], width: int) -> None:
-    for document in (folders[0] / "report.html", write_comparison(folders, folders[0].parent)):
+    for document in (
+        folders[0] / "report.html",
+        Comparison(list(map(read_side, folders))).write(folders[0].parent),
+    ):
         page = open_page(document, width)
         assert page.evaluate("document.documentElement.scrollWidth") == width
 
@@ -188,3 +197,51 @@ def test_light_and_dark_differ(open_page: Any, folders: list[Path]) -> None:
         for scheme in ("light", "dark")
     ]
     assert grounds[0] != grounds[1]
+
+
+@pytest.fixture(scope="module")
+def mapped(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run whose nodes have published a map, a way, a plan, a scan and a picture."""
+    folder = tmp_path_factory.mktemp("mapped")
+    cells = np.zeros((60, 80), dtype=np.int8)
+    cells[::59], cells[:, ::79], cells[:, :5] = 100, 100, -1
+    grid = new("nav_msgs/msg/OccupancyGrid", header={"frame_id": "map"}, data=cells.ravel())
+    grid.info.resolution, grid.info.width, grid.info.height = 0.5, 80, 60
+    grid.info.origin.orientation.w = 1.0
+    way = np.array([(second, 0.5 * second, 0.46) for second in range(1, 30)])
+    scan = new("sensor_msgs/msg/LaserScan", angle_increment=0.1, range_max=9.0, ranges=[5.0] * 60)
+    scan.header.stamp.sec = 29
+    picture = new("sensor_msgs/msg/Image", height=8, width=8, step=8, encoding="mono8", data=range(0, 256, 4))
+    messages = {
+        "/map": grid,
+        "/path": path_message(30 * S, way, times=[second * S for second in range(1, 30)]),
+        "/plan": path_message(30 * S, way[::-1]),
+        "/rover/scan": scan,
+        "/rover/camera/image_raw": picture,
+    }
+    setup = RunSetup(vehicles=(VehicleSetup("rover", "ardupilot", "rover"),))
+    writer = McapWriter(folder / "trace.mcap", setup, [], definition)
+    for second in range(31):
+        east, north, turn = float(second), 0.5 * second, (0.974, 0.0, 0.0, 0.228)
+        still = (0.0,) * 6
+        writer(
+            VehicleState(second * S, "rover", east, north, 0.0, *turn, *still, 1.0, 12.0, 1.0, True, "AUTO")
+        )
+    for topic, message in messages.items():
+        writer(Published(30 * S, topic, message.__msgtype__, "/slam", to_cdr(message)))
+    writer.close()
+    return recover(folder).report
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_map_that_a_node_has_published_can_be_chosen(open_page: Any, mapped: Path, scheme: str) -> None:
+    page = open_page(mapped, scheme=scheme)
+    with_map = picture(page, "#map")
+    assert page.locator(".player + .legend span").count() == 4
+    assert "/map at 0:00:30: map, within 0 cm of the track of rover" in page.content()
+    assert colours(page, "canvas.picture") == 64
+    page.select_option("#layer", label="none")
+    without = picture(page, "#map")
+    assert without != with_map
+    page.select_option("#layer", label="/map")
+    assert picture(page, "#map") == with_map

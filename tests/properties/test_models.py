@@ -18,7 +18,6 @@ TEXT = (STARTER / "model.yaml").read_text()
 WORDS = sorted(set(TEXT.replace(":", " ").replace(",", " ").split()))
 VOCABULARY = Vocabulary(
     {"rpi4-cortex-a72": ProcessorKind(4, 0.6e9, 1.5e9)},
-    frozenset({"python"}),
     frozenset({"ardupilot"}),
     OBSERVABLES,
 )

@@ -63,11 +63,8 @@ def check(path: Path | ModelBuilder, vocabulary: Vocabulary, overrides: Iterable
     for one in (system, *(one for one in systems if one is not None)):
         for rule in (*SYSTEM_RULES, *ROS_RULES):
             found.update(dict.fromkeys(rule(one)))
-    found.update(dict.fromkeys(_code(system, vocabulary)))
-    missing = {
-        fidelity: tuple(_finding(gap) for gap in gaps(system, fidelity, vocabulary))
-        for fidelity in FIDELITIES
-    }
+    found.update(dict.fromkeys(_code(system)))
+    missing = {fidelity: tuple(_finding(gap) for gap in gaps(system, fidelity)) for fidelity in FIDELITIES}
     found.update(
         dict.fromkeys(one for listed in missing.values() for one in listed if _is_fault(one, system))
     )
@@ -111,9 +108,9 @@ def _finding(error: ModelError) -> Finding:
     return Finding(rule, error.what, error.path, error.where)
 
 
-def _code(system: System, vocabulary: Vocabulary) -> Iterator[Finding]:
+def _code(system: System) -> Iterator[Finding]:
     try:
-        check_components(system, vocabulary.languages)
+        check_components(system)
     except ModelError as error:
         for one in error.errors if isinstance(error, CollectedModelError) else (error,):
             rule = rules.RULES.get(one.code, rules.CODE_MISMATCH)

@@ -33,6 +33,7 @@ from volery.links.flight_logs import (
     columns_of,
     log_format,
     read_flight_log,
+    vehicles_in,
 )
 from volery.links.mavlink_messages import constant
 from volery.trace.events import ControlSample, VehicleState
@@ -185,7 +186,7 @@ def read_signals(path: Path) -> list[Signal]:
     wanted = {source.table for one in quantities for source in (one.measured, *one.goals)}
     tables = read_flight_log(path, wanted, STATES[kind])
     found = []
-    for vehicle in _vehicles(tables):
+    for vehicle in vehicles_in(tables):
         idle = _IDLE[kind](tables, vehicle)
         for one in quantities:
             signal = _signal(tables, one, vehicle)
@@ -197,12 +198,6 @@ def read_signals(path: Path) -> list[Signal]:
         have = ", ".join(sorted({one.measured.table for one in quantities}))
         raise UsageError(f"{path} ({kind}) has neither attitude nor position: none of {have}")
     return found
-
-
-def _vehicles(tables: Tables) -> list[str]:
-    """Return the prefix of each vehicle's tables: ``""`` for the first, in a tlog ``vehicle2.`` ..."""
-    further = {name.partition(".")[0] + "." for name in tables if name.startswith(VEHICLE) and "." in name}
-    return ["", *sorted(further)]
 
 
 # -- armed and in the air

@@ -15,7 +15,6 @@ from volery.ros.messages import Workspace
 from volery.run.assembly.cpp import is_cpp
 from volery.run.assembly.vehicle_nodes import graph_access
 from volery.run.distributed.call_types import call_types, package_name
-from volery.run.distributed.plan import worker_instances
 
 VERIFICATION = "verification"
 """Last word of the package that has the vehicles and the environment of a simulation."""
@@ -60,7 +59,6 @@ def computers(system: System) -> tuple[Computer, ...]:
         CapabilityError: A component is in a language that cannot be hosted.
         UsageError: Two computers would get the same package, or there is nothing to deploy.
     """
-    worker_instances(system)  # raises for languages without a host
     found = tuple(one for one in (_computer(system, each) for each in system.processors) if _executes(one))
     names: dict[str, str] = {}
     for one in found:

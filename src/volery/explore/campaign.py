@@ -346,9 +346,10 @@ class Campaign:
             if isinstance(error, VoleryError) and not isinstance(error, EngineLostError):
                 raise
             asked, done_before = self.count()
+            reason = " ".join(str(error).split()).rstrip(".") or type(error).__name__  # dask's has lines
             raise EngineLostError(
-                f"the engine {self._on} was lost after {done_before} of {asked} runs: "
-                f"{error or type(error).__name__}; the same command resumes the campaign"
+                f"the engine {self._on} was lost after {done_before} of {asked} runs: {reason}; "
+                "the same command resumes the campaign"
             ) from error
 
 

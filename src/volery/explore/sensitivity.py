@@ -24,7 +24,15 @@ from volery.explore.search import Discard, Objective, search
 from volery.explore.space import Choices, Range, Space
 from volery.explore.specification import run_seed
 from volery.explore.statistics import LEVEL, Array, Interval
-from volery.model.faults import FAULTS, Fault, NetworkFault, ProcessorFault, VehicleFault
+from volery.model.faults import (
+    FAULTS,
+    AddedSensorFault,
+    Fault,
+    NetworkFault,
+    ProcessorFault,
+    VehicleFault,
+    can_happen_to,
+)
 from volery.model.system import System
 
 # -- sensitivity
@@ -476,10 +484,10 @@ def fault_campaign(
         subjects = list(_subjects(made, system))
         if not subjects:
             without.append(kind)
-        for key, subject in subjects:
-            about = {key: subject} if key else {}
+        for key, named, about in subjects:
+            subject = ".".join(about.values()) or named
             for phase, times in phases.items():
-                at = _time_of(times, key, subject, system)
+                at = _time_of(times, key, named, system)
                 if at is None:
                     continue
                 fault = {"kind": kind, "at": _seconds(at), **stated, **about, **_severe(kind)}
@@ -513,19 +521,26 @@ def _seconds(at: Ns) -> str:
     return f"{at / S!r} s"
 
 
-def _subjects(made: type[Fault], system: System) -> Iterator[tuple[str, str]]:
-    """Yield the key that names a subject, and each subject that a fault can happen to."""
+def _subjects(made: type[Fault], system: System) -> Iterator[tuple[str, str, dict[str, str]]]:
+    """Yield each subject that a fault can happen to: the key that names it, its name, and all such keys."""
+    if issubclass(made, AddedSensorFault):
+        for vehicle in system.vehicles:
+            for one in vehicle.added_sensors:
+                if can_happen_to(made, one):
+                    sensor = one if isinstance(one, str) else one.named
+                    yield "vehicle", vehicle.name, {"vehicle": vehicle.name, "sensor": sensor}
+        return
+    key, names = "", ["all"]
     if issubclass(made, VehicleFault):
         rotors = any("motor" in one.name or "cells" in one.name for one in fields(made))
-        yield from (
-            ("vehicle", one.name) for one in system.vehicles if not rotors or one.kind == "multirotor"
-        )
+        key = "vehicle"
+        names = [one.name for one in system.vehicles if not rotors or one.kind == "multirotor"]
     elif issubclass(made, ProcessorFault):
-        yield from (("processor", one.name) for one in system.processors)
+        key, names = "processor", [one.name for one in system.processors]
     elif issubclass(made, NetworkFault):
-        yield from (("network", one.name) for one in system.networks)
-    else:
-        yield "", "all"
+        key, names = "network", [one.name for one in system.networks]
+    for name in names:
+        yield key, name, {key: name} if key else {}
 
 
 def _severe(kind: str) -> dict[str, Value]:

@@ -282,7 +282,7 @@ def run_seed(root: int, number: int) -> int:
 
 
 _SPECIFICATION = Record(Specification)
-_NO_NAMES = Vocabulary({}, frozenset(), frozenset())
+_NO_NAMES = Vocabulary({}, frozenset())
 
 
 def specification_of(model: str | FilePath | ModelBuilder, file: FilePath | None = None) -> Specification:

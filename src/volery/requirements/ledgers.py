@@ -329,6 +329,7 @@ class VehicleLedger:
         last = self.last
         return VehicleRecord(
             autopilot=self.setup.autopilot,
+            firmware=self.setup.firmware,
             kind=self.setup.kind,
             distance_m=self.distance,
             armed_s=to_seconds(self.armed),

@@ -170,10 +170,12 @@ class VehicleRecord(_Part):
     """The motion of a vehicle; the errors are the largest of all operations that succeeded.
 
     ``airborne_s`` is the time armed and more than 0.3 m above where it last stood disarmed. ``landed`` is
-    true if it stands still, disarmed, at the end.
+    true if it stands still, disarmed, at the end. ``firmware`` is the program of real firmware that flew it,
+    empty for a simulated autopilot and a real vehicle.
     """
 
     autopilot: str
+    firmware: str = ""
     kind: str
     distance_m: float
     armed_s: float

@@ -140,7 +140,7 @@ def conformance(
     results: list[Result] = []
     left, interrupted = "", False
     try:
-        if address.transport == "sim":
+        if address.in_virtual_time:
             for one in wanted:
                 results.append(_simulated(one, address, kind, seed, report))
         else:

@@ -117,11 +117,15 @@ class NetworkSetup:
 
 @dataclass(frozen=True)
 class VehicleSetup:
-    """A vehicle: ``kind`` is ``multirotor`` or ``rover``; ``autopilot`` the firmware that flies it."""
+    """A vehicle: ``kind`` is ``multirotor`` or ``rover``; ``autopilot`` is what flies it.
+
+    ``firmware`` is the program of real firmware, empty for a simulated autopilot and a real vehicle.
+    """
 
     name: str
     autopilot: str = ""
     kind: str = ""
+    firmware: str = ""
 
 
 @dataclass(frozen=True)

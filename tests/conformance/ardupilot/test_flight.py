@@ -7,6 +7,8 @@ from typing import Any
 
 import pytest
 
+from volery.simulation.world.environment_models import Wind
+
 TOLERANCE = 0.2
 """Of the recorded times."""
 
@@ -87,9 +89,27 @@ def test_landing_from_ten_metres_takes_the_recorded_time(bench: Any, facts: Any)
     touched = next(
         one.at for one in rig.of("STATUSTEXT") if one.fields["text"].startswith("SIM Hit ground at 0.")
     )
-    assert rig.now - touched == pytest.approx(recorded["touch_down_to_disarm"], abs=1.0)
+    assert rig.now - touched == pytest.approx(recorded["touch_down_to_disarm"], abs=0.2)
     states = list(dict.fromkeys(one.fields["landed_state"] for one in rig.of("EXTENDED_SYS_STATE")))
     assert states == [1, 3, 2, 4]
+
+
+def test_in_wind_it_closes_the_throttle_and_stays_where_it_touches_the_ground(bench: Any) -> None:
+    """Recorded: 6 % of throttle 0.3 s after touch-down, none after 0.6 s."""
+    slides = []
+    for seed in range(1, 4):
+        rig = bench(seed=seed)
+        rig.airborne()
+        rig.world.set_wind(Wind(east=4.0, north=4.5, gust=1.0))
+        assert rig.mode(9) == 0
+        rig.run_until(lambda rig=rig: rig.world.truth(0).on_ground)
+        touched = rig.world.truth(0).position
+        rig.run(0.8)
+        assert rig.vehicle.estimate.throttle < 0.08
+        rig.run_until(lambda rig=rig: not rig.vehicle.armed)
+        rests = rig.world.truth(0).position
+        slides.append(hypot(rests[0] - touched[0], rests[1] - touched[1]))
+    assert max(slides) < 0.15
 
 
 def test_landing_from_above_ten_metres_is_fast_at_first(bench: Any) -> None:

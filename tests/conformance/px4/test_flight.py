@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from math import cos, degrees, radians, remainder, sin, tau
+from math import cos, degrees, hypot, radians, remainder, sin, tau
 from typing import Any
 
 import pytest
 
 from volery.simulation.autopilots.px4.loop_state import A_POSITION
+from volery.simulation.world.environment_models import Wind
 
 OFFBOARD, POSCTL, LOITER, RTL, LAND = 0x00060000, 0x00030000, 0x03040000, 0x05040000, 0x06040000
 
@@ -124,6 +125,23 @@ def test_the_landed_detector_waits_while_the_vertical_estimate_moves(bench: Any)
                 last, moved = rig.now, moved + 1
         assert rig.now - last > 2.9
     assert moved
+
+
+def test_in_wind_it_stays_where_it_touches_the_ground(rig_of: Any) -> None:
+    """No thrust is left after a ground contact, also while the landed detector waits."""
+    slides = []
+    for seed in range(1, 5):
+        rig = rig_of("1.17", seed=seed)
+        rig.airborne(3.0)
+        rig.world.set_wind(Wind(east=4.0, north=4.5, gust=1.0))
+        rig.run(6.0)
+        assert rig.mode(4, 6) == 0
+        rig.run_until(lambda rig=rig: rig.world.truth(0).on_ground)
+        touched = rig.world.truth(0).position
+        rig.run_until(lambda rig=rig: not rig.vehicle.armed)
+        rests = rig.world.truth(0).position
+        slides.append(hypot(rests[0] - touched[0], rests[1] - touched[1]))
+    assert max(slides) < 0.25
 
 
 @pytest.mark.parametrize(("place", "crawls"), [(0, True), (1, False)])

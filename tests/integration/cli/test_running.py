@@ -229,3 +229,25 @@ def test_the_demo_shows_both_allocations_and_is_no_failure(tmp_path):
         assert f"slow: the requirement '{name}'" in " ".join(done.stderr.split())
     assert "parcel-1: delivered" in done.stdout
     assert "report.html" in done.stderr
+
+
+def test_a_mission_is_flown_on_two_addresses_and_compared(tmp_path):
+    mission = "def mission(drone):\n    drone.takeoff(5)\n    drone.land()\n"
+    (tmp_path / "hop.py").write_text(mission)
+    between = ("--between", "sim:px4", "sim:ardupilot")
+    done = volery("runs", "compare", "hop.py", *between, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    first, second = json.loads(done.stdout)
+    assert [list(one["vehicles"]) for one in (first, second)] == [["px4"], ["ardupilot"]]
+    (found,) = second["comparison"]
+    assert found["sides"] == ["sim:px4", "sim:ardupilot"]
+    phases = {one["phase"]: one for one in found["phases"]}
+    assert list(phases) == ["before arming", "armed", "takeoff", "land"]
+    assert phases["takeoff"]["path_m"] < 2.0
+    land = [read_record(tmp_path / "runs" / f"hop-{number}") for number in (1, 2)]
+    durations = [
+        next(one.end_s - one.start_s for one in record.vehicles[name].operations if one.operation == "land")
+        for record, name in zip(land, ("px4", "ardupilot"), strict=True)
+    ]
+    assert phases["land"]["seconds"] == pytest.approx(durations, abs=0.001)
+    assert (tmp_path / "runs" / "comparison.html").exists()

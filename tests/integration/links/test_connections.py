@@ -127,6 +127,24 @@ def test_a_server_serves_several_clients_and_survives_one_that_leaves(bench: Ben
     assert joined == ["one", "one"]
 
 
+def test_what_waits_for_a_client_that_does_not_read_is_bounded(bench: Bench) -> None:
+    """Else it would get answers after all that was sent before: seconds later, or minutes."""
+    server = TcpServer(bench.kernel, HERE, 0)
+    bench.add(server)
+    assert server.has_room()
+    with socket.socket() as slow:
+        slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        slow.connect((HERE, server.port))
+        bench.until(lambda: server.clients == 1)
+        data = bytes(1000)
+        sent = 0
+        while server.has_room():
+            server.send_bytes(data)
+            sent += len(data)
+            assert sent < 300_000
+        bench.until(lambda: slow.recv(4096, socket.MSG_DONTWAIT) and server.has_room())
+
+
 def test_a_url_with_no_listener_says_so_and_is_tried_again(bench: Bench) -> None:
     port = free_port()
     client = bench.add(TcpClient(bench.kernel, HERE, port))

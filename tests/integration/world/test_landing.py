@@ -12,6 +12,12 @@ from volery.run.assembly.model_checks import vocabulary
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "landing"
 
+SMALL = (
+    "environment.vehicles.drone.added_sensors="
+    "[{camera: {pitch: 90 deg, width: 320, height: 240, field: 60 deg}}]"
+)
+"""A camera whose pictures take little time."""
+
 pytestmark = pytest.mark.integration
 
 
@@ -28,4 +34,19 @@ def test_without_a_marker_it_comes_home_and_says_why():
     system = load(EXAMPLE, vocabulary(), scenario="away")
     run = simulate(system, Options(record="summary"))
     assert "no marker was seen within 10 s" in str(run.error)
+    assert run.observables["drone.landing_offset"] < 2.0, "of home"
+
+
+@pytest.mark.parametrize(
+    ("kind", "at", "said"),
+    [
+        ("camera-black", 22, "the marker was lost"),
+        ("sensor-stuck", 20, "the pictures stay the same"),
+    ],
+)
+@pytest.mark.long
+def test_with_a_camera_that_breaks_in_the_descent_it_comes_home_and_says_why(kind, at, said):
+    broken = f"environment.faults={{eye: {{kind: {kind}, vehicle: drone, sensor: camera, at: {at} s}}}}"
+    run = simulate(load(EXAMPLE, vocabulary(), overrides=[broken, SMALL]), Options(seed=3, record="summary"))
+    assert said in str(run.error)
     assert run.observables["drone.landing_offset"] < 2.0, "of home"

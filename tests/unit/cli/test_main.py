@@ -325,7 +325,7 @@ def test_new_does_not_write_over_anything(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("--fidelity", "firmware"), "not there yet"),
+        (("--fidelity", "hardware"), "not there yet"),
         (("--fidelity", "guess"), "no fidelity 'guess'"),
         (("--speed", "fast"), "--speed fast: give max, or simulated seconds per second"),
         (("--speed", "0"), "--speed 0"),
@@ -382,6 +382,19 @@ def test_doctor_finds_what_is_needed_and_says_how_to_get_the_rest(capsys):
     assert all(part.get for part in PARTS)
     assert module("no_such_module_anywhere")() == ""
     assert program("no-such-program-anywhere", "sh")().endswith("sh")
+
+
+def test_doctor_shows_programs_of_real_firmware_or_how_to_build_them(capsys, monkeypatch, tmp_path):
+    copter = tmp_path / "copter"
+    copter.write_text("")
+    copter.chmod(0o755)
+    monkeypatch.setenv("VOLERY_ARDUCOPTER", str(copter))
+    monkeypatch.setenv("VOLERY_PX4", str(tmp_path / "nowhere"))
+    assert doctor(Output()) == OK
+    said = "".join(capsys.readouterr().out.split())
+    assert f"✓arducopter{copter}" in said
+    assert "·px4missing" in said
+    assert "makepx4_sitl_default,thenVOLERY_PX4=" in said
 
 
 def test_doctor_fails_if_something_needed_is_missing(monkeypatch, capsys):

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from volery.base.errors import CapabilityError, UsageError
+from volery.base.errors import UsageError
 from volery.base.files import write_text
 from volery.deploy import generation
 from volery.deploy.generation import MARK, deploy
@@ -305,8 +305,6 @@ def pair(folder, language="python", path="loop.py", allocation="one", name="pair
 def test_what_cannot_be_deployed(tmp_path):
     with pytest.raises(UsageError, match="pc-1 and pc_1 would both be the package pair_pc_1"):
         deploy(pair(tmp_path / "names", allocation="two"), tmp_path / "out", 1)
-    with pytest.raises(CapabilityError, match="a component in rclcpp cannot be a process"):
-        deploy(pair(tmp_path / "cpp", "rclcpp", "loop.cpp"), tmp_path / "out", 1)
     with pytest.raises(UsageError, match="--ros 3: there is 1 or 2"):
         deploy(pair(tmp_path / "ros"), tmp_path / "out", 3)
 

@@ -147,7 +147,25 @@ def test_every_fault_is_tried_in_every_phase():
     assert table["wind", "all"] == {"take-off": "0/1", "flight": "0/1", "drive": "0/1"}
     vehicle = system.vehicles[0].name
     assert table["gps-lost", vehicle] == {"take-off": "1/1", "flight": "1/1"}
+    assert {"sensor-silent", "ranges-maximum"} <= set(found.without_subject), "it has no added sensors"
     times = {one.values["environment.faults.campaign"]["at"] for one in asked}
     assert times == {"5.0 s", "20.0 s", "7.0 s"}
     for one in asked[::2]:  # each is a model; read_variant raises otherwise
         read_variant("examples/starter", one.values)
+
+
+def test_faults_of_added_sensors_are_tried_on_each_that_can_have_them():
+    system = read_variant("examples/mapping", {})
+    asked = []
+
+    def evaluate(points):
+        asked.extend(points)
+        return [Row(0, one, verdicts={"safe": True}) for one in points]
+
+    found = fault_campaign(evaluate, system, {"flight": {EVERYWHERE: 20 * S}})
+    subjects = {kind: {subject for other, subject in found.table() if other == kind} for kind in FAULTS}
+    assert subjects["sensor-silent"] == {"drone.lidar", "drone.odometry"}
+    assert subjects["ranges-not-a-number"] == {"drone.lidar"}
+    assert subjects["camera-black"] == set(), "it has no camera"
+    for one in asked:
+        read_variant("examples/mapping", one.values)

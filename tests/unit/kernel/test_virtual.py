@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections.abc import Callable
 
 import pytest
+from numba import njit
+from numba.core import event
 
 from volery.base.errors import ComponentError, Deadlock, UsageError
 from volery.base.time import MS, S
-from volery.kernel.interrupts import Watchdog
+from volery.kernel.interrupts import Watchdog, is_compiling
 from volery.kernel.task import MAX_SWALLOWED_CANCELLATIONS, Cancelled, ExecutionContext, Scope, Task
 from volery.kernel.virtual import NEVER, Pacer, VirtualKernel
 from volery.kernel.waiting import Event, Queue, Signal, sleep
@@ -376,6 +379,35 @@ def test_the_watchdog_reports_only_the_task_that_does_not_block() -> None:
     for moment in (60.0, 80.0):
         look(moment, a, 6)  # a script may take its time
     assert len(accused.whom) == 2
+
+
+def test_a_task_that_compiles_is_not_stuck() -> None:
+    kernel, accused = Still(), Accused()
+    dog = Watchdog(kernel, accused, patience_s=10.0)
+    kernel.task, kernel.time = Task("a", ExecutionContext("a"), Scope("run")), 5
+    for moment in range(0, 100, 5):
+        dog.check(float(moment), compiling=True)
+    dog.check(104.0)
+    assert accused.whom == []
+    dog.check(106.0)  # what it has compiled does not end
+    assert accused.whom == [("a", 5)]
+
+
+def test_the_first_call_of_a_numba_function_compiles_and_the_second_does_not() -> None:
+    seen: dict[str, bool] = {}
+
+    class Look(event.Listener):
+        def on_start(self, started: event.Event) -> None:
+            seen["while it compiles"] = is_compiling(sys._getframe())
+
+        def on_end(self, ended: event.Event) -> None:
+            pass
+
+    function = njit(lambda number: number + 1)
+    with event.install_listener("numba:compile", Look()):
+        assert function(1) == 2
+    assert seen == {"while it compiles": True}
+    assert not is_compiling(sys._getframe())
 
 
 def test_the_watchdogs_patience_must_be_positive() -> None:

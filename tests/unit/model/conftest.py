@@ -112,7 +112,6 @@ class Workshop:
                 "intel-i5-3470": ProcessorKind(4, 1.6e9, 3.0e9),
                 "rpi4-cortex-a72": ProcessorKind(4, 0.6e9, 1.5e9, (0.6e9, 0.7e9, 1.4e9, 1.5e9)),
             },
-            languages=frozenset({"python", "rospy"}),
             autopilots=frozenset({"ardupilot"}),
             observables=OBSERVABLES,
         )

@@ -5,7 +5,9 @@ from dataclasses import replace
 import pytest
 
 from volery.base.errors import ModelError
+from volery.base.time import S
 from volery.model.added_sensors import Camera, Lidar, Odometry
+from volery.model.faults import SensorClockOff
 
 ROVER = "sensors: rtk, started: cold"
 
@@ -73,3 +75,29 @@ def test_a_wrong_one_is_blamed_on_its_line(workshop, written, said):
     text = str(raised.value)
     assert f"model.yaml:{workshop.line_of(ROVER)}" in text
     assert said in text
+
+
+@pytest.mark.parametrize(
+    ("kind", "sensor", "words"),
+    [
+        ("sensor-silent", "lidar", "no added sensor named 'lidar'.*front or odometry"),
+        ("camera-black", "front", "no camera named 'front'"),
+        ("ranges-maximum", "odometry", "no sensor of distances named 'odometry'.*there is front"),
+    ],
+)
+def test_a_fault_of_a_sensor_that_cannot_have_it_is_refused(workshop, kind, sensor, words):
+    workshop.change(ROVER, f"{ROVER}, added_sensors: [{{lidar: {{name: front}}}}, odometry]")
+    fault = f"{{f: {{kind: {kind}, vehicle: rover_1, at: 5 s, sensor: {sensor}}}}}"
+    workshop.change("  workload:", f"  faults: {fault}\n  workload:")
+    with pytest.raises(ModelError, match=rf"environment\.faults\.f\.sensor: {words}"):
+        workshop.load()
+
+
+def test_a_fault_of_an_added_sensor_names_it(workshop):
+    workshop.change(ROVER, f"{ROVER}, added_sensors: [lidar]")
+    fault = "{f: {kind: sensor-clock-off, vehicle: rover_1, at: 5 s, sensor: lidar, by: -2 s}}"
+    workshop.change("  workload:", f"  faults: {fault}\n  workload:")
+    (fault,) = workshop.load().environment.faults
+    assert fault == SensorClockOff(
+        name="f", at_ns=5 * S, vehicle="rover_1", sensor="lidar", by_ns=-2 * S, where=fault.where
+    )

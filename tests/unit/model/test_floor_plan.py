@@ -5,7 +5,7 @@ import pytest
 from PIL import Image
 
 from volery.base.errors import ModelError
-from volery.model import floor_plan
+from volery.model import floor_plan, map_file
 from volery.model.floor_plan import cover
 
 MAP = "image: hall.pgm\nresolution: 0.5\norigin: [-1.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\n"
@@ -89,10 +89,12 @@ def test_a_wrong_map_is_an_error_of_the_model(hall, old, new, said):
 def test_a_missing_file_or_picture_for_it_is_an_error_of_the_model(hall):
     hall.change("floor_plan: hall.yaml", "floor_plan: hull.yaml")
     line = hall.line_of("floor_plan")
-    with pytest.raises(ModelError, match=rf"model\.yaml:{line}: .*no floor plan hull\.yaml: No such file"):
+    with pytest.raises(
+        ModelError, match=rf"model\.yaml:{line}: .*hull\.yaml: it cannot be read: No such file"
+    ):
         hall.load()
     hall.change("floor_plan: hull.yaml", "floor_plan: hall.pgm")
-    with pytest.raises(ModelError, match=r"hall\.pgm is not YAML; give the YAML file of the picture"):
+    with pytest.raises(ModelError, match=r"hall\.pgm: this is not YAML; give the YAML file of the picture"):
         hall.load()
 
 
@@ -100,7 +102,7 @@ def test_huge_and_speckled_pictures_are_refused(hall, monkeypatch):
     monkeypatch.setattr(floor_plan, "MOST_WALLS", 1)
     with pytest.raises(ModelError, match=r"more than 1 rectangles cover .* hall\.pgm: remove its speckles"):
         hall.load()
-    monkeypatch.setattr(floor_plan, "MOST_CELLS", 10)
+    monkeypatch.setattr(map_file, "MOST_CELLS", 10)
     with pytest.raises(ModelError, match=r"hall\.pgm has 4 x 3 cells, 10 at most"):
         hall.load()
 

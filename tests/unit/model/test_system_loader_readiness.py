@@ -7,11 +7,11 @@ from volery.model.system_loader import check_code, gaps
 
 
 def missing(workshop):
-    return [str(gap) for gap in gaps(workshop.load(), "code", workshop.vocabulary)]
+    return [str(gap) for gap in gaps(workshop.load(), "code")]
 
 
 def test_times_needs_a_figure_at_each_kind_of_processor(workshop):
-    found = [str(gap) for gap in gaps(workshop.load(), "times", workshop.vocabulary)]
+    found = [str(gap) for gap in gaps(workshop.load(), "times")]
     assert len(found) == 2  # control's operation and its activation
     assert "components.drone_control.operations.deliver: no time is stated at rpi4-cortex-a72" in found[0]
     assert "components.drone_control.activation" in found[1]
@@ -19,7 +19,7 @@ def test_times_needs_a_figure_at_each_kind_of_processor(workshop):
 
 def test_a_figure_at_another_processor_is_named(workshop):
     system = workshop.load(None, None, "allocations.fast.central=onboard")
-    found = [str(gap) for gap in gaps(system, "times", workshop.vocabulary)]
+    found = [str(gap) for gap in gaps(system, "times")]
     assert "where central runs (there is one at intel-i5-3470); fidelity `times` needs one" in found[0]
 
 
@@ -41,14 +41,6 @@ def test_a_file_that_is_not_written_yet_keeps_a_model_from_running_only(workshop
     with pytest.raises(ModelError, match=r"a run needs its code. Write it, or remove `path`"):
         check_code(system)
     assert any("a run needs its code" in one for one in missing(workshop))
-
-
-def test_languages_that_do_not_run_yet_are_named(workshop):
-    workshop.change("language: rospy", "language: roscpp")
-    assert any("roscpp components do not run yet; python or rospy do" in one for one in missing(workshop))
-    workshop.change("language: roscpp", "language: rclcpp")
-    with pytest.raises(ModelError, match=r"rclcpp components do not run yet"):
-        check_code(workshop.load())
 
 
 def test_components_without_instances_do_not_matter(workshop):

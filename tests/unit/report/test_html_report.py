@@ -14,14 +14,14 @@ from rich.console import Console, RenderableType
 
 from volery.base.errors import UsageError
 from volery.base.time import S
+from volery.report.comparison_page import Comparison, read_side
 from volery.report.html_report import (
+    SCRIPTS,
     HtmlReport,
-    compare,
     environment,
     gather,
     recover,
     render,
-    write_comparison,
 )
 from volery.report.terminal import comparison_table, cost_table, short_comparison, summary_table
 from volery.requirements.accounts import Accounts, Circumstances
@@ -154,7 +154,7 @@ def test_words_of_others_cannot_break_out_of_the_page(tmp_path: Path) -> None:
     )
     html = render(gather(folder))
     tags = parsed(html)
-    assert len(tags.scripts) == 5
+    assert len(tags.scripts) == len(SCRIPTS) + 1  # and the data
     assert tags.references == ["data:,"]
 
 
@@ -320,25 +320,29 @@ def test_a_record_that_is_there_is_kept(runs: tuple[Path, Path]) -> None:
     assert (runs[0] / "run.json").read_bytes() == before
 
 
+def compared(*folders: Path) -> Comparison:
+    return Comparison([read_side(folder) for folder in folders])
+
+
 def test_runs_side_by_side(runs: tuple[Path, Path], tmp_path: Path) -> None:
     recover(runs[0])
-    html = write_comparison(runs, tmp_path).read_text()
+    html = compared(*runs).write(tmp_path).read_text()
     tags = parsed(html)
     assert any(reference.endswith("one/report.html") for reference in tags.references)
     for words in ("fast", "slow", "1 500", "600", "✗ not met", "drone_control"):
         assert words in html.replace("\N{NO-BREAK SPACE}", " ")
-    text = shown(compare(runs).table)
+    text = shown(comparison_table([read_record(folder) for folder in runs]))
     assert "deadline misses" in text
 
 
 def test_one_run_cannot_be_compared(runs: tuple[Path, Path]) -> None:
     with pytest.raises(UsageError, match="at least two"):
-        compare([runs[0]])
+        compared(runs[0])
 
 
 def test_runs_of_the_same_allocation_go_by_their_folders(runs: tuple[Path, Path], tmp_path: Path) -> None:
     make_run(tmp_path / "again")
-    assert "again" in shown(compare([runs[0], tmp_path / "again"]).table)
+    assert "again" in compared(runs[0], tmp_path / "again").labels
 
 
 def test_tables_for_the_terminal(runs: tuple[Path, Path]) -> None:
@@ -393,4 +397,4 @@ def test_a_page_runs_its_own_scripts_only() -> None:
     known = [
         base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() in allowed for script in scripts
     ]
-    assert known == [True, True, True, True, False]
+    assert known == [*[True] * len(SCRIPTS), False]

@@ -160,7 +160,7 @@ def test_what_a_listener_raises_ends_the_run(model):
 @pytest.mark.parametrize(
     ("error", "options", "arguments"),
     [
-        (CapabilityError, {"fidelity": "firmware"}, {}),
+        (CapabilityError, {"fidelity": "hardware"}, {}),
         (UsageError, {}, {"allocation": "none"}),
         (ModelError, {}, {"overrides": ["run.duration=blue"]}),
         (UsageError, {"out": Path("/dev/null/run")}, {}),

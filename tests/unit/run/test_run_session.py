@@ -121,8 +121,10 @@ def test_its_pace_is_set_between_steps(model):
 def test_what_is_wrong_is_said_before_anything_starts(model):
     with pytest.raises(UsageError, match="step of 0 ns"):
         RunSession(model, Options(out=None)).step(0)
-    with pytest.raises(CapabilityError, match="firmware"):
-        RunSession(model, Options(out=None, fidelity="firmware"))
+    with pytest.raises(
+        CapabilityError, match="'hardware' is not there yet; there is code, firmware or times"
+    ):
+        RunSession(model, Options(out=None, fidelity="hardware"))
     with pytest.raises(UsageError, match="no allocation named 'none'"):
         RunSession(model, Options(out=None), allocation="none")
     with pytest.raises(ModelError, match="duration"):

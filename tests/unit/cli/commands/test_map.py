@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from rigs.floor_plans import ANGLES, OFFICE, odometry, ranges, tour
+from rigs.floor_plans import OFFICE, odometry, ranges, tour
+from rigs.scanning_robot import MOUNTING, odometry_message, scan_message, transform
 from volery.autonomy.planar_pose import Pose2
-from volery.base.frames import euler_to_quaternion
 from volery.cli.main import application
 from volery.ros.messages import new
 from volery.ros.messages.bags import create_bag
@@ -19,44 +19,6 @@ WAY = tour([(2.0, 2.0), (10.5, 2.5), (10.5, 12.0)], 0.4)
 
 def mapped(*options):
     return CliRunner().invoke(application(), ["map", *map(str, options)])
-
-
-def stamp(header, time, frame):
-    header.stamp.sec, header.stamp.nanosec, header.frame_id = time // 10**9, time % 10**9, frame
-
-
-def turned(pose):
-    return dict(zip("wxyz", euler_to_quaternion(0.0, 0.0, pose.yaw), strict=True))
-
-
-def scan_message(time, pose):
-    message = new("sensor_msgs/msg/LaserScan")
-    stamp(message.header, time, "lidar")
-    message.angle_min, message.angle_increment = float(ANGLES[0]), float(ANGLES[1] - ANGLES[0])
-    message.range_min, message.range_max = 0.05, 10.0
-    message.ranges = ranges(OFFICE, pose).tolist()
-    return message
-
-
-def odometry_message(time, pose):
-    message = new("nav_msgs/msg/Odometry")
-    stamp(message.header, time, "odom")
-    place, turn = message.pose.pose.position, message.pose.pose.orientation
-    place.x, place.y = pose.x, pose.y
-    for axis, value in turned(pose).items():
-        setattr(turn, axis, value)
-    return message
-
-
-def transform(time, parent, child, pose):
-    message, moved = new("tf2_msgs/msg/TFMessage"), new("geometry_msgs/msg/TransformStamped")
-    stamp(moved.header, time, parent)
-    moved.child_frame_id = child
-    moved.transform.translation.x, moved.transform.translation.y = pose.x, pose.y
-    for axis, value in turned(pose).items():
-        setattr(moved.transform.rotation, axis, value)
-    message.transforms = [moved]
-    return message
 
 
 def table(tmp_path):
@@ -70,7 +32,6 @@ def table(tmp_path):
 
 
 def bag(tmp_path, name, source):
-    mounting = Pose2(0.1, 0.0, 0.2)
     with create_bag(tmp_path / name) as writer:
         for number, (moved, true) in enumerate(zip(odometry(WAY, 2), WAY, strict=True)):
             time = (number + 1) * 10**8
@@ -78,8 +39,8 @@ def bag(tmp_path, name, source):
                 writer.write("/odom", time, odometry_message(time, moved))
             elif source == "tf":
                 writer.write("/tf", time, transform(time, "odom", "base_link", moved))
-            writer.write("/tf", time, transform(time, "base_link", "lidar", mounting))
-            writer.write("/scan", time, scan_message(time, true.after(mounting)))
+            writer.write("/tf", time, transform(time, "base_link", "lidar", MOUNTING))
+            writer.write("/scan", time, scan_message(time, true.after(MOUNTING)))
     return tmp_path / name
 
 
@@ -135,3 +96,46 @@ def test_a_log_whose_beams_meet_nothing_makes_no_map(tmp_path):
     assert result.exit_code == 2
     assert "has met anything" in result.output
     assert not list(tmp_path.glob("floor*"))
+
+
+@pytest.mark.parametrize("name", ["", "..", "folder", "file/map", "nowhere/map"])
+def test_a_name_that_cannot_be_written_is_refused_before_the_map_is_made(tmp_path, monkeypatch, name):
+    (tmp_path / "folder.pgm").mkdir()
+    (tmp_path / "file").touch()
+    monkeypatch.chdir(tmp_path)
+    result = mapped("no_recording", "--out", name)
+    assert result.exit_code == 2
+    assert "--out" in result.output
+
+
+def test_odometry_that_is_no_number_is_left_out(tmp_path):
+    with create_bag(tmp_path / "wrong") as writer:
+        for number, true in enumerate(WAY[:3]):
+            time = (number + 1) * 10**8
+            writer.write("/odom", time, odometry_message(time, Pose2(float("nan"), 0.0, 0.0)))
+            writer.write("/scan", time, scan_message(time, true.after(MOUNTING)))
+    result = mapped(tmp_path / "wrong", "--out", tmp_path / "floor")
+    assert result.exit_code == 3, result.output
+    assert "3 poses of /odom that are none are left out" in result.output
+
+
+def test_odometry_that_jumps_out_of_the_country_says_so(tmp_path):
+    beams = ",".join(map(str, ranges(OFFICE, WAY[0], np.radians(np.arange(-90.0, 90.0)), 30.0).round(2)))
+    (tmp_path / "far.csv").write_text("".join(f"{number},{number}e6,0,0,{beams}\n" for number in range(3)))
+    result = mapped(tmp_path / "far.csv", "--out", tmp_path / "floor")
+    assert result.exit_code == 2
+    assert "look whether the odometry jumps" in result.output.replace("\n", " ")
+    assert not (tmp_path / "floor.pgm").exists()
+
+
+def test_pictures_that_cannot_be_used_are_named(tmp_path):
+    with create_bag(tmp_path / "colours") as writer:
+        writer.write("/odom", 1, odometry_message(1, Pose2()))
+        writer.write("/image_raw", 1, new("sensor_msgs/msg/Image", encoding="yuv422", width=4, height=4))
+        info = new("sensor_msgs/msg/CameraInfo", width=4, height=4, distortion_model="plumb_bob")
+        info.k, info.d = [4.0, 0.0, 2.0, 0.0, 4.0, 2.0, 0.0, 0.0, 1.0], [0.0] * 5
+        writer.write("/camera_info", 1, info)
+    result = mapped(tmp_path / "colours", "--from", "camera", "--out", tmp_path / "floor")
+    assert result.exit_code == 2
+    assert "no scan of it can be used; 1 pictures are left out" in result.output
+    assert "'yuv422'" in result.output

@@ -24,9 +24,14 @@ def said_of(*arguments: str) -> str:
         (("sim:ardupilot", "--names", "roscoptr"), "did you mean 'roscopter'?"),
         (
             ("ardupilot+tcp://127.0.0.1:5760", "--names", "pprzros"),
-            "of vehicles that speak pprzlink; this one goes by mavros or roscopter",
+            "of vehicles that speak pprzlink; this one goes by ardupilot, ",
         ),
         (("sim:dji", "--names", "pprzros"), "this one goes by mavros or roscopter"),
+        (
+            ("sim:ardupilot", "--names", "px4"),
+            "are those of a px4; this one goes by ardupilot, ardupilot-4.5, mavros",
+        ),
+        (("sim:px4", "--names", "px4-1.13"), "did you mean 'px4-1.1"),
         (("sim:dji",), "`volery vehicle serve dji --graph ros1`"),
         (("sim:dji",), "for other names give --names mavros or roscopter"),
         (("paparazzi+ros1:///", "--names", "pprzros"), "a ROS node itself, under pprzros's names"),

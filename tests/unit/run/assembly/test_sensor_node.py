@@ -13,7 +13,7 @@ from volery.base.frames import body_to_world
 from volery.run.event_log import LogOptions
 from volery.simulation.world import sensors
 from volery.simulation.world.sensors import ErrorModel, Sensor
-from volery.trace.events import Omitted
+from volery.trace.events import Omitted, Published
 from volery.trace.reader import read
 
 MODEL = """
@@ -118,6 +118,25 @@ if __name__ == "__main__":
     rospy.Subscriber("/rover_1/camera/camera_info", CameraInfo, known)
     rospy.spin()
 """
+
+
+UNHEARD = """
+import rospy
+if __name__ == "__main__":
+    rospy.init_node("watch")
+    rospy.sleep(1.5)
+"""
+
+
+@pytest.mark.parametrize(("record", "published"), [("trace", 0), ("/rover_1/camera/image_raw", 21)])
+def test_a_picture_that_nobody_hears_is_published_only_for_a_record(record, published, tmp_path):
+    (tmp_path / "watch.py").write_text(UNHEARD)
+    camera = "[{camera: {width: 64, height: 48, field: 90 deg}}]"
+    (tmp_path / "model.yaml").write_text(MODEL.format(language="rospy", sensor=camera))
+    run = simulate(tmp_path / "model.yaml", Options(out=tmp_path / "run", record=record))
+    events = read(run.folder / "trace.mcap").events
+    sent = [one for one in events if isinstance(one, Published) and one.topic == "/rover_1/camera/image_raw"]
+    assert len(sent) == published
 
 
 def test_pictures_come_late_and_are_stamped_with_their_exposure(tmp_path):

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from volery.base.errors import CapabilityError
 from volery.model.system import System
 from volery.model.system_loader import load
 from volery.run.assembly.model_checks import vocabulary
@@ -25,13 +24,6 @@ def test_the_application_gets_processes_and_the_environment_stays_with_the_world
     apart = [one.name for one in plan.worker_instances(delivery)]
     assert {"central", "planner", "drone_control_1", "landing_2", "rover_control_east"} <= set(apart)
     assert not {"requesters", "provider", "beacon_1", "beacon_2"} & set(apart)
-
-
-def test_a_language_that_cannot_be_a_process_yet_is_named(delivery: System) -> None:
-    first = delivery.instances[0]
-    foreign = replace(first, component=replace(first.component, language="rclcpp"))
-    with pytest.raises(CapabilityError, match=f"{first.name}: a component in rclcpp"):
-        plan.worker_instances(replace(delivery, instances=(foreign, *delivery.instances[1:])))
 
 
 def test_requirements_about_the_models_computers_are_not_judged(delivery: System) -> None:
