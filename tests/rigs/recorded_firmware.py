@@ -12,12 +12,15 @@ file plays the firmware: it ends with an error at the first frames whose answers
 
 from __future__ import annotations
 
+import fcntl
 import gzip
 import json
+import os
 import socket
 import stat
 import struct
 import sys
+import termios
 import threading
 from hashlib import blake2b
 from itertools import groupby
@@ -50,6 +53,12 @@ def _digests(answers: list[bytes]) -> list[str]:
     return [blake2b(b"".join(group), digest_size=6).hexdigest() for group in groups]
 
 
+def _wait_until_arrived(stream: socket.socket) -> None:
+    """Wait until the other end could read all: what comes after the next question is read later."""
+    while any(fcntl.ioctl(stream, termios.TIOCOUTQ, bytes(4))):  # octets that are not acknowledged
+        os.sched_yield()
+
+
 def play(recording: Path, mode: str, options: list[str]) -> int:
     """Answer as the recorded firmware did; return the exit code."""
     with gzip.open(recording, "rt", encoding="ascii") as file:
@@ -65,7 +74,9 @@ def play(recording: Path, mode: str, options: list[str]) -> int:
     _say("a recorded firmware")
     answers: list[bytes] = []
     for frame, group in enumerate(pulses):
-        ground.sendall(said.get(frame, b""))
+        if frame in said:
+            ground.sendall(said[frame])
+            _wait_until_arrived(ground)
         question = QUESTION.pack(18_458, 1200, frame, *group)
         if frame == FAULT_AT and mode == "die":
             _say("it has run out of frames")

@@ -17,7 +17,8 @@ from statistics import median, quantiles
 from volery.base.errors import EstimateError, UsageError
 from volery.base.time import Ns, S
 from volery.calibration.node_processes import MeasuredRun, NodeProgram, measurement_session, node_programs
-from volery.calibration.ros.probe_environment import check_client, own_master
+from volery.calibration.ros.probe_environment import check_client
+from volery.ros.transports.ros1.master import own_roscore
 from volery.model.system import System
 from volery.requirements.record import RunRecord
 from volery.run.result import Options
@@ -195,7 +196,7 @@ def measure_runs(
     """
     done: list[MeasuredRun] = []
     try:
-        with own_master() as master, measurement_session(nodes, master, duration) as run:
+        with own_roscore() as core, measurement_session(nodes, core.uri, duration) as run:
             for number in range(count):
                 show(number)
                 done.append(run())

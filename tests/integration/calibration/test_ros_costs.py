@@ -19,7 +19,8 @@ from volery.calibration.node_comparison import prepare_nodes
 from volery.calibration.node_processes import measurement_session
 from volery.calibration.ros.call_costs import CallCost, call_costs
 from volery.calibration.ros.campaign import Conditions, ros_law, write_entry
-from volery.calibration.ros.probe_environment import Pace, own_master, probe_setup
+from volery.calibration.ros.probe_environment import Pace, probe_setup
+from volery.ros.transports.ros1.master import own_roscore
 from volery.cli.main import application
 from volery.cost import load_catalogue
 from volery.model.system_loader import load
@@ -140,7 +141,7 @@ def test_a_models_nodes_are_measured_and_estimated(ros: None, tmp_path: Path) ->
 def test_a_program_in_cpp_is_measured_from_its_main_on(ros: None, tmp_path: Path) -> None:
     in_cpp = MODEL.replace("{language: rospy, path: talker.py", "{language: roscpp, path: shouter.cpp")
     system = load(model(tmp_path, in_cpp), vocabulary())
-    with own_master() as master, measurement_session(prepare_nodes(system), master, S // 2) as run:
+    with own_roscore() as core, measurement_session(prepare_nodes(system), core.uri, S // 2) as run:
         [(name, taken)] = run().items()
     assert name == "talker"
     assert 0 < taken < S // 2

@@ -21,7 +21,7 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.wall import WallKernel
 from volery.ros.graph import Node
 from volery.ros.transports.ros1 import Roscore, available, ros1_graph
-from volery.ros.transports.ros1.master import environment
+from volery.ros.transports.ros1.master import environment, own_roscore
 from volery.ros.transports.transport_graph import TransportGraph
 from volery.trace.events import Text
 
@@ -66,12 +66,9 @@ def roscore() -> Iterator[Roscore]:
     """One for all tests, since a process knows one master."""
     if not available() or shutil.which("roscore") is None:
         lacking("no rospy or no roscore here (scripts/debian-packages ros1, scripts/ros1-modules)")
-    with socket.socket() as asked:
-        asked.bind(("127.0.0.1", 0))
-        port = asked.getsockname()[1]
     before = {key: os.environ.get(key) for key in ("ROS_IP", "ROS_MASTER_URI")}
     os.environ["ROS_IP"] = "127.0.0.1"
-    with Roscore(f"http://127.0.0.1:{port}") as core:
+    with own_roscore() as core:
         yield core
     for key, value in before.items():
         os.environ.pop(key, None)

@@ -12,13 +12,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from socket import socket
 
 from volery.base.errors import LinkError, LinkSilent, UsageError, choices
 from volery.calibration.ros.call_costs import Round, read_round
 from volery.components.cpp.compiler import CppToolchain
-from volery.ros.transports.ros1 import Roscore, available
-from volery.ros.transports.ros1.master import environment
+from volery.ros.transports.ros1 import available
+from volery.ros.transports.ros1.master import environment, own_roscore
 
 CLIENTS = ("roscpp", "rospy", "rclpy")
 PROBES = Path(str(files("volery.calibration.ros").joinpath("probes")))
@@ -147,16 +146,6 @@ def roscpp_program(
 
 
 @contextmanager
-def own_master() -> Iterator[str]:
-    """Start a ROS master without other nodes for the duration of the context; yield its address."""
-    with socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    with Roscore(f"http://127.0.0.1:{port}") as core:
-        yield core.uri
-
-
-@contextmanager
 def probe_setup(client: str, python: str = "") -> Iterator[ProbeSetup]:
     """Set up a ROS graph on loopback with the peers of a probe.
 
@@ -172,8 +161,8 @@ def probe_setup(client: str, python: str = "") -> Iterator[ProbeSetup]:
             yield ProbeSetup(client, probe, _for_ros2())
         return
     command = (str(_roscpp_probe()),) if client == "roscpp" else probe
-    with own_master() as master:
-        surroundings = environment(master)
+    with own_roscore() as core:
+        surroundings = environment(core.uri)
         with _sinks((sys.executable, str(PROBES / "sinks.py"), "rospy"), surroundings):
             yield ProbeSetup(client, command, surroundings)
 

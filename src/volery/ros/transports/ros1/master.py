@@ -11,6 +11,7 @@ import http.client
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -123,7 +124,8 @@ def is_alive(node_uri: str) -> bool:
         return False
 
 
-READY_S, GONE_S, GLANCE_S = 20.0, 5.0, 0.05
+READY_S, GONE_S, GLANCE_S = 60.0, 5.0, 0.05
+PORTS_TRIED = 3
 
 
 def master_answers(uri: str) -> bool:
@@ -220,6 +222,32 @@ class Roscore:
         if self._logs is not None:
             self._logs.cleanup()
             self._logs = None
+
+
+@contextmanager
+def own_roscore() -> Iterator[Roscore]:
+    """Run roscore at a free port of loopback for the duration of the context.
+
+    Another process may take the port before roscore has bound it; then another one is tried.
+
+    Raises:
+        UsageError: roscore is not installed.
+        LinkSilent: it is not ready in time, or no port was to be had.
+    """
+    for left in reversed(range(PORTS_TRIED)):
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            core = Roscore(f"http://127.0.0.1:{free.getsockname()[1]}")
+        try:
+            core.start()
+            break
+        except LinkSilent:
+            if not left:
+                raise
+    try:
+        yield core
+    finally:
+        core.stop()
 
 
 def _end(process: subprocess.Popen[bytes], how: int) -> None:
