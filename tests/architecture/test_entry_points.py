@@ -9,6 +9,8 @@ from importlib.metadata import entry_points
 import pytest
 
 import volery
+from rigs.sockets import HERE, served
+from volery.links.stream_links import TcpServer
 
 GROUPS = ("volery.drivers", "volery.autopilots", "volery.reporters")
 HEAVY = ("numba", "numpy", "pymavlink", "rosbags", "networkx", "matplotlib", "greenlet", "mcap")
@@ -63,3 +65,23 @@ def test_help_is_light(word):
 def test_where_no_world_is_needed_nothing_of_the_simulation_is_loaded(module):
     """On board of a real vehicle, and in the processes of components that are on a real graph."""
     assert "numba" not in loaded_by(f"import volery.{module}")
+
+
+FLIGHT = """
+import sys, volery
+with volery.connect(sys.argv[1]) as drone:
+    drone.takeoff(3)
+    drone.goto(drone.position)
+    drone.land()
+loaded = [name for name in sys.modules if name.startswith("volery.")]
+print(len(loaded), *(name for name in loaded if name.split(".")[1] in {"ros", "simulation", "model"}))
+"""
+
+
+def test_a_flight_over_mavlink_loads_nothing_of_ros():
+    with served(lambda kernel: TcpServer(kernel, HERE, 0), "ardupilot") as server:
+        url = f"ardupilot+tcp://{HERE}:{server.port}"
+        done = subprocess.run([sys.executable, "-c", FLIGHT, url], capture_output=True, text=True, check=True)
+    loaded, *not_needed = done.stdout.split()
+    assert not_needed == []
+    assert int(loaded) <= 89

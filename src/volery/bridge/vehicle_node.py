@@ -37,7 +37,7 @@ from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.kernel.waiting import sleep
 from volery.links.frame import Frame
 from volery.links.link import Link
-from volery.links.pprzlink_codec import FROM_ROS, PPRZROS_TYPE, TO_ROS, to_frame, to_message
+from volery.links.pprzros_messages import FROM_ROS, PPRZROS_TYPE, TO_ROS, to_frame, to_message
 from volery.ros.graph import DEFAULT, INVALID_VALUES, SENSOR_DATA, Group, Node, Publisher, RosGraph, Work
 from volery.trace.events import Text
 

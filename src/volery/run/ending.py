@@ -14,15 +14,17 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from types import FrameType
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from volery.base.errors import ComponentError, VoleryError
 from volery.base.process import on_ending_signals
 from volery.base.time import MINUTE, Ns, S
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext, Scope
-from volery.requirements.record import Status
 from volery.trace.events import Collision, Failure
+
+if TYPE_CHECKING:
+    from volery.requirements.record import Status
 
 FOREVER: Ns = 2**63 - 1
 

@@ -20,7 +20,8 @@ from volery.components.virtual_stdlib import virtual_modules
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.requirements.accounts import FRAMEWORK, WARNING
-from volery.run.assembly.vehicles import ObservedVehicles, OpenedVehicles, VehicleSettings, open_vehicles
+from volery.run.assembly.observed_vehicles import ObservedVehicles
+from volery.run.assembly.vehicles import OpenedVehicles, VehicleSettings, open_vehicles
 from volery.run.ending import Ending
 from volery.run.last_defence import LastDefence
 from volery.run.recording import Recording

@@ -13,7 +13,8 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.pprzlink_codec import FROM_ROS, PPRZLINK, PPRZROS_TYPE, TO_ROS, to_frame, to_message
+from volery.links.pprzlink_codec import PPRZLINK
+from volery.links.pprzros_messages import FROM_ROS, PPRZROS_TYPE, TO_ROS, to_frame, to_message
 from volery.ros.graph import EmbeddedGraph
 from volery.ros.messages import new
 from volery.trace.events import Text

@@ -1,21 +1,19 @@
 """From addresses to vehicles: simulated ones in one world, or real ones.
 
-A real vehicle must not load the simulation, so the simulated fleet is imported inside a function.
+A real vehicle must load neither the simulation nor what a recorded run needs, so the simulated fleet is
+imported inside a function.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from math import nan, radians
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from volery.base.errors import CapabilityError, UsageError, VoleryError, choices
-from volery.base.frames import LocalFrame, Quaternion, attitude_ned_to_enu, euler_to_quaternion
 from volery.base.installed import require_extra
 from volery.base.position import Position
-from volery.base.time import Ns
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
@@ -23,18 +21,16 @@ from volery.kernel.wall import WallKernel
 from volery.links.in_process_link import SharedLink
 from volery.links.link import Link
 from volery.run.assembly.ros_graphs import GRAPHS, open_graph
-from volery.run.result import SAMPLING_PERIOD, Tell, VehicleProgress
-from volery.trace.events import VehicleState
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import Address, open_link, parse
 from volery.vehicles.driver import Driver, DriverFactory, drivers
 from volery.vehicles.limits import Bounds
-from volery.vehicles.telemetry import Attitude
 
 if TYPE_CHECKING:
     from volery.ros.graph import RosGraph
     from volery.run.assembly.simulated_fleet import SimulatedFleet
     from volery.run.assembly.simulated_vehicles import SimulatedVehicle
+    from volery.run.result import Tell
 
 EMBEDDED = "graph"
 KINDS: Mapping[type[Vehicle], str] = {Drone: "multirotor", Rover: "rover"}
@@ -287,64 +283,3 @@ def _endpoint(address: Address) -> tuple[object, ...]:
 def for_driver(address: Address) -> dict[str, str]:
     """Return the options of an address that are meant for the driver, not for the carrier."""
     return {key: value for key, value in address.options.items() if key != "baud"}
-
-
-UNKNOWN = (nan, nan, nan)
-
-
-class ObservedVehicles:
-    """Real vehicles, recorded as their telemetry reports them.
-
-    The origin of the local frame is the first position that is received. The true acceleration and angular
-    rates stay unknown.
-    """
-
-    def __init__(self, kernel: Kernel, vehicles: Sequence[Vehicle]) -> None:
-        self._kernel = kernel
-        self._vehicles = vehicles
-        self._frame: LocalFrame | None = None
-
-    def sample(self, period: Ns = SAMPLING_PERIOD) -> None:
-        """Record the state of every vehicle periodically, from now on."""
-        self._kernel.every(period, self.record_states)
-
-    def progress(self) -> tuple[VehicleProgress, ...]:
-        """Return the present state of each vehicle whose telemetry arrives."""
-        known = [(one.name, one.telemetry) for one in self._vehicles if one.telemetry.last_message_ns >= 0]
-        return tuple(VehicleProgress(name, seen.mode, seen.armed, seen.above_home) for name, seen in known)
-
-    def record_states(self) -> None:
-        """Record the present state of each vehicle whose telemetry arrives."""
-        for vehicle in self._vehicles:
-            if vehicle.telemetry.last_message_ns >= 0:
-                self._kernel.record(self._state(vehicle))
-
-    def _state(self, vehicle: Vehicle) -> VehicleState:
-        seen = vehicle.telemetry
-        return VehicleState(
-            self._kernel.now(),
-            vehicle.name,
-            *UNKNOWN,
-            *_attitude(seen.attitude),
-            seen.velocity.east,
-            seen.velocity.north,
-            seen.velocity.up,
-            *self._enu(seen.position),
-            *seen.battery,
-            seen.armed,
-            seen.mode,
-        )
-
-    def _enu(self, at: Position | None) -> tuple[float, float, float]:
-        """Return metres east, north and up of the origin; NaN while the position is unknown."""
-        if at is None:
-            return nan, nan, nan
-        amsl = at.altitude.metres
-        if self._frame is None:
-            self._frame = LocalFrame(at.latitude, at.longitude, amsl)
-        return self._frame.to_enu(at.latitude, at.longitude, amsl)
-
-
-def _attitude(seen: Attitude) -> Quaternion:
-    """Return the attitude of the FLU body in ENU."""
-    return attitude_ned_to_enu(euler_to_quaternion(*map(radians, seen)))

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.kernel.api import Kernel
-from volery.ros.graph import Node
 from volery.vehicles.driver import Driver, DriverFactory, Opener
 from volery.vehicles.drivers import ardupilot, px4
+
+if TYPE_CHECKING:
+    from volery.ros.graph import Node
 
 AUTOPILOTS: Mapping[str, Opener] = {"ardupilot": ardupilot.open_mavros, "px4": px4.open_mavros}
 

@@ -1,4 +1,4 @@
-"""What can be sent to an ArduPilot, over MAVLink and over MAVROS."""
+"""What can be sent to an ArduPilot, and how it is sent over MAVLink."""
 
 from __future__ import annotations
 
@@ -7,20 +7,15 @@ from math import radians
 from typing import Protocol
 
 from volery.base.errors import UsageError
-from volery.base.geoid import EGM96, Geoid
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns
-from volery.kernel.api import Kernel
 from volery.links.mavlink_messages import constant
-from volery.ros.graph import Node
-from volery.ros.messages import new
 from volery.vehicles.driver import Acceleration, AttitudeTarget
 from volery.vehicles.drivers.ardupilot.decoder import ArduPilotDecoder
 from volery.vehicles.drivers.ardupilot.modes import (
     FENCE_PARAMETERS,
     LINK_LOSS_PARAMETERS,
     NUMBERS,
-    RESTING,
     STATION_PARAMETERS,
 )
 from volery.vehicles.drivers.ardupilot.versions import COVERAGE, DRAWN_BACK, PARAMETER_RULES
@@ -31,19 +26,15 @@ from volery.vehicles.drivers.mavlink.backend import (
     SHORTEST_TURN,
     UNCHANGED_CHANNEL,
     VELOCITY_AND_YAW_RATE,
-    Ack,
     Backend,
     acceleration_fields,
 )
 from volery.vehicles.drivers.mavlink.client import Firmware, MavlinkClient
-from volery.vehicles.drivers.mavlink.mavros_backend import FirmwareBehind, MavrosBackend
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import Telemetry, Velocity
 
 RELEASED = 0
 """Pulse width that gives a channel back to the transmitter."""
-CHANNELS = 18
-"""Length of the array in MAVROS's OverrideRCIn."""
 
 ARDUPILOT_FIRMWARE = Firmware(
     number=constant("MAV_AUTOPILOT_ARDUPILOTMEGA"),
@@ -196,61 +187,3 @@ class ArduPilotMavlink(MavlinkClient):
     def start_mission(self) -> None:
         """Send MISSION_START."""
         self._command("MAV_CMD_MISSION_START", 0.0, 0.0)
-
-
-class ArduPilotMavros(MavrosBackend):
-    """ArduPilot over MAVROS. See ``ArduPilotBackend``."""
-
-    firmware = FirmwareBehind(
-        "ArduPilot",
-        RESTING,
-        home_first=True,
-        turning=ATTITUDE_AND_RATES,
-        drawn_back=DRAWN_BACK,
-        parameter_rules=PARAMETER_RULES,
-    )
-
-    def __init__(self, kernel: Kernel, node: Node, name: str, namespace: str, geoid: Geoid = EGM96) -> None:
-        super().__init__(kernel, node, name, namespace, geoid)
-        target = "mavros_msgs/msg/GlobalPositionTarget"
-        self._target = node.advertise(self._name("setpoint_raw/global"), target)
-        self._override = node.advertise(self._name("rc/override"), "mavros_msgs/msg/OverrideRCIn")
-
-    def lasting_reasons(self, since: Ns) -> Sequence[str]:
-        """Return the arming checks that fail since then and that waiting does not mend."""
-        return lasting_reasons(self.telemetry, since)
-
-    def turn(self, degrees: float) -> None:
-        """Call ``cmd/command`` with CONDITION_YAW."""
-        response = self._command("MAV_CMD_CONDITION_YAW", degrees, 0.0, SHORTEST_TURN, 0.0)
-        self._note_answer(Ack.HEADING, response)
-
-    def start_mission(self) -> None:
-        """Call ``cmd/command`` with MISSION_START."""
-        self._note_answer(Ack.START, self._command("MAV_CMD_MISSION_START", 0.0, 0.0))
-
-    def send_target(self, goal: Position) -> None:
-        """Publish on ``setpoint_raw/global``; the altitude is passed on in the stated frame."""
-        message = new(
-            "mavros_msgs/msg/GlobalPositionTarget",
-            coordinate_frame=INT_FRAMES[type(goal.altitude)],
-            type_mask=POSITION_ONLY,
-            latitude=goal.latitude,
-            longitude=goal.longitude,
-            altitude=goal.altitude.metres,
-        )
-        self._target.publish(message)
-
-    def send_velocity(self, velocity: Velocity, yaw_rate: float) -> None:
-        """Publish on ``setpoint_raw/local``."""
-        self._publish_velocity(velocity, yaw_rate)
-
-    def send_acceleration(self, acceleration: Acceleration, yaw_rate: float) -> None:
-        """Publish on ``setpoint_raw/local``."""
-        self._publish_acceleration(acceleration, yaw_rate)
-
-    def override_channels(self, channels: Sequence[int | None]) -> None:
-        """Publish on ``rc/override``."""
-        widths = [UNCHANGED_CHANNEL if width is None else width for width in channels]
-        widths += [UNCHANGED_CHANNEL] * (CHANNELS - len(widths))
-        self._override.publish(new("mavros_msgs/msg/OverrideRCIn", channels=widths))

@@ -1,19 +1,14 @@
-"""Steps that are the same for every MAVLink autopilot, and how such a driver is opened."""
+"""Steps that are the same for every MAVLink autopilot."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Generic, TypeVar
+from collections.abc import Sequence
+from dataclasses import replace
 
 from volery.base.errors import CapabilityError, Refused
-from volery.base.geoid import Geoid
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
-from volery.links.link import Link
-from volery.ros.graph import Node
-from volery.vehicles.address import MAVLINK_OPTIONS, check_options
 from volery.vehicles.driver import (
     Capability,
     Land,
@@ -26,7 +21,6 @@ from volery.vehicles.driver import (
 )
 from volery.vehicles.drivers.mavlink.backend import Ack, Backend
 from volery.vehicles.drivers.mavlink.client import MavlinkClient
-from volery.vehicles.drivers.mavlink.mavros_backend import namespace_and_geoid
 from volery.vehicles.drivers.steps import (
     ANSWERED_WITHIN,
     ARMED_WITHIN,
@@ -71,49 +65,6 @@ DRONE_CAPABILITIES = ROVER_CAPABILITIES | {
 }
 _CAPABILITIES = {DRONE_KIND: DRONE_CAPABILITIES, ROVER_KIND: ROVER_CAPABILITIES}
 _NONE: frozenset[Capability] = frozenset()
-
-D = TypeVar("D")
-
-
-@dataclass(frozen=True)
-class DriverOpeners(Generic[D]):
-    """Opens the driver of one firmware on a link or on a graph.
-
-    Args:
-        name: name of the driver in addresses.
-        driver: constructor of the driver.
-        mavlink: constructor of its backend on a MAVLink link.
-        mavros: constructor of its backend over MAVROS.
-    """
-
-    name: str
-    driver: Callable[[Kernel, str, Any], D]
-    mavlink: Callable[[Kernel, Link, str, Mapping[str, str]], Any]
-    mavros: Callable[[Kernel, Node, str, str, Geoid], Any]
-
-    def on_link(self, kernel: Kernel, link: Link, name: str, options: Mapping[str, str]) -> D:
-        """Open a vehicle on a MAVLink link; heartbeats are sent from now on.
-
-        Args:
-            kernel: clock and tasks.
-            link: link to the autopilot.
-            name: name of the vehicle.
-            options: see ``MAVLINK_OPTIONS``.
-        """
-        check_options(self.name, options, *MAVLINK_OPTIONS)
-        return self.driver(kernel, name, self.mavlink(kernel, link, name, options))
-
-    def on_graph(self, kernel: Kernel, node: Node, name: str, options: Mapping[str, str]) -> D:
-        """Open a vehicle behind MAVROS names.
-
-        Args:
-            kernel: clock and tasks.
-            node: the node that commands the vehicle.
-            name: name of the vehicle.
-            options: see ``namespace_and_geoid``.
-        """
-        where = namespace_and_geoid(self.name, name, options)
-        return self.driver(kernel, name, self.mavros(kernel, node, name, *where))
 
 
 class MavlinkDriver:

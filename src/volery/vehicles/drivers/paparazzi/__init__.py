@@ -8,19 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError
 from volery.kernel.api import Kernel
 from volery.links.link import Link
 from volery.links.paparazzi_aircraft import PaparazziAircraft, read_aircraft, stock_aircraft
 from volery.links.pprzlink_codec import PPRZLINK
-from volery.ros.graph import Node
 from volery.vehicles.address import check_options
 from volery.vehicles.driver import DriverFactory
-from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend, PprzrosLink
+from volery.vehicles.drivers.paparazzi.backend import PaparazziBackend
 from volery.vehicles.drivers.paparazzi.decoder import LAND_BLOCK, START_BLOCK, TAKEOFF_BLOCK
 from volery.vehicles.drivers.paparazzi.driver import Paparazzi
 from volery.vehicles.drivers.paparazzi.takeoff_and_landing import Blocks
+
+if TYPE_CHECKING:
+    from volery.ros.graph import Node
 
 __all__ = ["DRIVER", "Paparazzi", "open_driver", "open_pprzros"]
 
@@ -56,6 +59,8 @@ def open_pprzros(kernel: Kernel, node: Node, name: str, options: Mapping[str, st
         options: ``namespace`` of ``pprzros/to_ros`` and ``pprzros/from_ros`` (default: the root), and the
             options of ``open_driver``.
     """
+    from volery.vehicles.drivers.paparazzi.pprzros_link import PprzrosLink
+
     check_options("paparazzi", options, *OPTIONS, "namespace")
     aircraft, blocks = _aircraft(options), _blocks(options)
     link = PprzrosLink(kernel, node, options.get("namespace", "/"))

@@ -17,7 +17,8 @@ from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import sleep
 from volery.links.frame import Frame
 from volery.links.in_process_link import in_process_pair
-from volery.links.pprzlink_codec import PPRZLINK, PPRZROS_TYPE, to_message
+from volery.links.pprzlink_codec import PPRZLINK
+from volery.links.pprzros_messages import PPRZROS_TYPE, to_message
 from volery.ros.graph import EmbeddedGraph
 from volery.ros.messages import new
 from volery.trace.events import Operation
