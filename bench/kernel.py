@@ -12,6 +12,7 @@ import gc
 import os
 import threading
 from collections.abc import Callable, Generator
+from functools import partial
 from heapq import heappop, heapreplace
 from statistics import median
 from time import perf_counter
@@ -40,15 +41,12 @@ def sleepers(processes: int, events: int) -> float:
     kernel = VirtualKernel()
     each = events // processes
 
-    def body(period: int) -> Callable[[], None]:
-        def loop() -> None:
-            for _ in range(each):
-                kernel.sleep_until(kernel.now() + period)
-
-        return loop
+    def body(period: int) -> None:
+        for _ in range(each):
+            kernel.sleep_until(kernel.now() + period)
 
     for i in range(processes):
-        kernel.spawn(body(MS + i), str(i), ExecutionContext(str(i)))
+        kernel.spawn(partial(body, MS + i), str(i), ExecutionContext(str(i)))
     return each * processes / timed(lambda: kernel.run(FOREVER))
 
 
@@ -71,17 +69,14 @@ def computing(processes: int, events: int) -> float:
     processor = Processor(kernel, "core")
     each = events // processes // 2
 
-    def body(period: int) -> Callable[[], None]:
-        def loop() -> None:
-            task = current_task(kernel)
-            for _ in range(each):
-                task.charge(5 * US)
-                kernel.sleep_until(kernel.now() + period)
-
-        return loop
+    def body(period: int) -> None:
+        task = current_task(kernel)
+        for _ in range(each):
+            task.charge(5 * US)
+            kernel.sleep_until(kernel.now() + period)
 
     for i in range(processes):
-        kernel.spawn(body(MS + i), str(i), ExecutionContext(str(i), processor, i))
+        kernel.spawn(partial(body, MS + i), str(i), ExecutionContext(str(i), processor, i))
     return 2 * each * processes / timed(lambda: kernel.run(FOREVER))
 
 

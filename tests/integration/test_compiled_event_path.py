@@ -22,7 +22,6 @@ RUNS = (
 COMMAND = "from volery.cli.main import main; main()"
 MODULES = (
     "kernel.virtual",
-    "kernel.event_heap",
     "requirements.ledgers",
     "trace.chunk",
     "trace.spans",

@@ -159,7 +159,7 @@ class Polling:
         self._turns_here += TURNS
         if self._turns_here <= FREE_TURNS:
             return
-        if task.contexts[-1].meter is None:
+        if task.meter is None:
             task.polled_ns += max(counted, TURNS * TURN)
         execute_polled(kernel, task)
         self._now = kernel.now()

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.time import MS, Ns
 from volery.kernel.task import NO_DEADLINE, ExecutionContext, Task
-from volery.kernel.virtual import FOREVER, NEVER, VOID, Timer, VirtualKernel
+from volery.kernel.virtual import FOREVER, NEVER, Timer, VirtualKernel
 from volery.trace.events import Preemption, Slice, ignore
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ class Processor:
         self._halted = False
 
     def _core(self, number: int) -> Core:
-        core = Core(number, Timer(_nothing, VOID))
+        core = Core(number, Timer(_nothing))
         core.timer.action = partial(self._expire, core)
         return core
 
@@ -172,7 +172,7 @@ class Processor:
         """Block `task` until `amount` ns have been executed for it, at the priority that it has now."""
         if amount <= 0:
             return
-        component = task.contexts[-1].component
+        component = task.context.component
         if self._free and not self._halted:  # no job competes, and perhaps no event is due before the end
             core = self._free[0]
             total = amount if core.last is task else amount + self._context_switch
@@ -272,7 +272,7 @@ class Processor:
 
     def _stop(self, job: Job, core: Core) -> None:
         now = self._kernel.now()
-        core.timer.ticket = VOID
+        core.timer.cancel()
         if now > job.started:
             job.remaining -= now - job.started
             self._busy += now - job.started

@@ -70,9 +70,18 @@ class Task:
     the component's code. Waits inside the framework (for a processor, a network, a lock) do not end it.
     """
 
+    __slots__ = (
+        "_callers", "adopted", "context", "counted_from", "done", "event", "flow", "is_activated", "meter",
+        "name", "own", "pending_cancellation", "pending_ns", "polled_ns", "polls", "readings", "released",
+        "scope", "swallowed", "waiting_for", "woken",
+    )  # fmt: skip
+
     def __init__(self, name: str, context: ExecutionContext, scope: Scope) -> None:
         self.name = name
-        self.contexts = [context]
+        self.own = context  # of the component that it belongs to
+        self.context = context  # it executes in: its own, or of the component that it calls through a port
+        self.meter = context.meter  # of the context that it executes in
+        self._callers: tuple[ExecutionContext, ...] = ()  # contexts that it returns to, the innermost last
         self.scope = scope
         self.pending_ns: Ns = 0
         self.released: Ns | None = None  # release time of the activation in progress
@@ -86,7 +95,7 @@ class Task:
         self.flow: Any = None
         self.waiting_for = ""
         self.woken = False
-        self.ticket = 0  # of the next resumption; heap entries with another ticket are void
+        self.event = 0  # that resumes it; see ``VirtualKernel``
         self.swallowed = 0  # cancellations that it has caught without ending
         self.pending_cancellation: BaseException | None = (
             Cancelled(scope.cancelled) if scope.cancelled else None
@@ -118,7 +127,7 @@ class Task:
         self.counted_from = due if counted_from is None else counted_from
         self.readings.clear()
         self.polls = self.polled_ns = 0
-        hook = self.contexts[0].on_release
+        hook = self.own.on_release
         if hook is not None:
             hook(self)
 
@@ -128,19 +137,29 @@ class Task:
         if released is None:
             return None
         self.released = None
-        own = self.contexts[0]
+        own = self.own
         deadline = NONE if own.deadline is None else released + own.deadline
         return Activation(released, now, own.component, deadline)
 
     @property
-    def context(self) -> ExecutionContext:
-        """Context it executes in: its own, or that of the component that it is calling through a port."""
-        return self.contexts[-1]
+    def is_in_call(self) -> bool:
+        """Whether it executes a call through a port, in the context of another component."""
+        return bool(self._callers)
+
+    def enter(self, context: ExecutionContext) -> None:
+        """Execute in `context` until ``leave``."""
+        self._callers = (*self._callers, self.context)
+        self.context, self.meter = context, context.meter
+
+    def leave(self) -> None:
+        """Return to the context of the caller."""
+        *callers, self.context = self._callers
+        self._callers, self.meter = tuple(callers), self.context.meter
 
     @property
     def priority(self) -> int:
         """Priority of the innermost context that states one."""
-        for context in reversed(self.contexts):
+        for context in (self.context, *reversed(self._callers)):
             if context.priority is not None:
                 return context.priority
         return 0
@@ -148,7 +167,7 @@ class Task:
     @property
     def deadline(self) -> Ns:
         """Absolute deadline of the activation in progress, ns; ``NO_DEADLINE`` without one."""
-        relative = self.contexts[0].deadline
+        relative = self.own.deadline
         return NO_DEADLINE if relative is None or self.released is None else self.released + relative
 
     def charge(self, amount: Ns) -> None:
@@ -158,8 +177,7 @@ class Task:
     def take_pending(self) -> Ns:
         """Return the pending execution time, the meter's reading included, and reset it to zero."""
         amount, self.pending_ns = self.pending_ns, 0
-        meter = self.contexts[-1].meter
-        return amount + meter() if meter else amount
+        return amount + self.meter() if self.meter else amount
 
 
 @dataclass(eq=False)

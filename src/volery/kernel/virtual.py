@@ -1,11 +1,14 @@
-"""Virtual time: a task is a greenlet, and future events lie in one heap ordered by (time, ticket).
+"""Virtual time: a task is a greenlet, and future events lie in one heap of their times.
 
 The hub is a greenlet of its own that takes events from the heap: framework callbacks execute there, and tasks
 are started from there. A task that blocks executes the timers that are due next and switches directly to the
 task that is due after them; it does not switch at all where no event precedes the end of its wait (``skip``).
-Every entry of the heap has a ticket; an entry is void once its target has another one. Threads that pass a
-baton were measured to be fifty times slower than greenlets, and generators would make every blocking call of
-a component visible in its code.
+Threads that pass a baton were measured to be fifty times slower than greenlets, and generators would make
+every blocking call of a component visible in its code.
+
+An event is a number in the heap, its time with its ticket in the lower bits, so that events of one time
+happen in the order in which they were made and a comparison is one of numbers. What happens then is found by
+that number. It is void once its target has another one, or none.
 """
 
 from __future__ import annotations
@@ -14,6 +17,7 @@ import threading
 from collections import deque
 from contextlib import contextmanager
 from functools import partial
+from heapq import heappop, heappush, heapreplace
 from itertools import count
 from time import monotonic_ns
 from typing import TYPE_CHECKING, Any, Self
@@ -24,7 +28,6 @@ from volery.base.errors import Deadlock, UsageError
 from volery.base.time import Ns, to_seconds
 from volery.kernel.api import PeriodicAction
 from volery.kernel.auto_reset_event import AutoResetEvent
-from volery.kernel.event_heap import EventHeap, heappop, heappush, heapreplace
 from volery.kernel.interrupts import LONGEST_WAIT_S, Interrupts, Watchdog
 from volery.kernel.task import Cancelled, ExecutionContext, Scope, Task
 from volery.trace.events import Record, ignore
@@ -39,6 +42,10 @@ if TYPE_CHECKING:
 FOREVER: Ns = 2**63 - 1
 NEVER: Ns = -1
 VOID = 0
+"""The event of a target that waits for none."""
+
+TICKET_BITS = 48
+"""Bits of an event below its time: a ticket for each microsecond of nine years."""
 
 
 LATE_S = 0.05
@@ -85,14 +92,14 @@ class Pacer:
 class Entry:
     """A framework callback in the heap."""
 
-    __slots__ = ("action", "ticket")
+    __slots__ = ("action", "event")
 
-    def __init__(self, action: Action, ticket: int) -> None:
-        self.action, self.ticket = action, ticket
+    def __init__(self, action: Action, event: int = VOID) -> None:
+        self.action, self.event = action, event
 
     def cancel(self) -> None:
         """Make the entry void."""
-        self.ticket = VOID
+        self.event = VOID
 
 
 class Timer(Entry):
@@ -129,10 +136,10 @@ class VirtualKernel:
         self.guard: AbstractContextManager[object] = threading.RLock()  # cheaper than nullcontext()
         self._now: Ns = 0
         self._until: Ns = 0
-        self._horizon: Ns = NEVER  # until then tasks may switch without the hub
-        self._heap: EventHeap[tuple[Ns, int, Task | Entry]] = EventHeap(
-            [(FOREVER + 1, VOID, Entry(_end_of_time, VOID))]
-        )
+        self._horizon = VOID  # tasks may switch without the hub to events below it
+        end = FOREVER + 1 << TICKET_BITS
+        self._heap = [end]
+        self._targets: dict[int, Task | Entry] = {end: Entry(_end_of_time, end)}
         self._tickets = count(1)
         self._current: Task | None = None
         self._adopted: Task | None = None
@@ -164,15 +171,19 @@ class VirtualKernel:
 
     def call_at(self, when: Ns, action: Action) -> Entry:
         """Execute a framework callback at `when`, ns, or now if that is past."""
-        ticket = next(self._tickets)
-        entry = Entry(action, ticket)
-        heappush(self._heap, (when if when > self._now else self._now, ticket, entry))
+        entry = Entry(action)
+        self._schedule(entry, when)
         return entry
 
     def set_timer(self, timer: Timer, when: Ns) -> None:
         """Let a timer execute at `when`, ns, or now if that is past, and at no other time."""
-        timer.ticket = ticket = next(self._tickets)
-        heappush(self._heap, (when if when > self._now else self._now, ticket, timer))
+        self._schedule(timer, when)
+
+    def _schedule(self, target: Task | Entry, when: Ns) -> None:
+        event = ((when if when > self._now else self._now) << TICKET_BITS) + next(self._tickets)
+        target.event = event
+        self._targets[event] = target
+        heappush(self._heap, event)
 
     def every(self, period: Ns, action: Action) -> PeriodicAction:
         """Execute a framework callback now and then every `period` ns."""
@@ -181,7 +192,7 @@ class VirtualKernel:
     def post(self, action: Action) -> None:
         """Execute a framework callback as soon as possible; from any thread, and from signal handlers."""
         self._inbox.append(action)
-        self._horizon = NEVER
+        self._horizon = VOID
         if self.pacer is not None:
             self.pacer.wake_up()
 
@@ -189,14 +200,13 @@ class VirtualKernel:
         """Start a task at this instant, after what is already due."""
         task = Task(name, context, scope or self.root)
         task.woken = True  # it cannot be woken before it has begun
-
-        def begin() -> None:
-            if not task.done:
-                task.flow = greenlet(lambda: self._live(task, body), self._hub)
-                self._resume(task)
-
-        self.call_at(self._now, begin)
+        self.call_at(self._now, partial(self._begin, task, body))
         return task
+
+    def _begin(self, task: Task, body: Action) -> None:
+        if not task.done:
+            task.flow = greenlet(partial(self._live, task, body), self._hub)
+            self._resume(task)
 
     def _live(self, task: Task, body: Action) -> None:
         try:
@@ -214,7 +224,7 @@ class VirtualKernel:
 
     def _bury(self, task: Task) -> None:
         task.done = True
-        task.ticket = VOID
+        task.event = VOID
         task.scope.tasks.remove(task)
 
     # -- interaction points
@@ -222,7 +232,7 @@ class VirtualKernel:
     def __enter__(self) -> Self:
         task = self._current
         if task is not None and (
-            task.pending_ns or task.pending_cancellation is not None or task.contexts[-1].meter is not None
+            task.pending_ns or task.pending_cancellation is not None or task.meter is not None
         ):
             self._interact(task)
         return self
@@ -236,18 +246,15 @@ class VirtualKernel:
         """Deliver a pending cancellation, else block until the pending execution time has been served."""
         if task.pending_cancellation is not None:
             self._cancel_task(task)
-        context = task.contexts[-1]
-        amount, task.pending_ns = task.pending_ns, 0
-        if context.meter is not None:
-            amount += context.meter()
-        processor = context.processor
+        amount = task.take_pending()
+        processor = task.context.processor
         if amount and processor is not None:
             processor.serve(task, amount)
 
     def _cancel_task(self, task: Task) -> None:
         task.deliver_cancellation()
         while True:  # it has swallowed too many cancellations: this interaction point never returns
-            task.ticket = VOID
+            task.event = VOID
             self._switch_to_hub()
 
     def consume(self, amount: Ns) -> bool:
@@ -267,24 +274,29 @@ class VirtualKernel:
         task = self._current
         if task is None:
             raise UsageError("a framework callback must not block, but waits for a time")
-        if task.pending_ns or task.pending_cancellation is not None or task.contexts[-1].meter is not None:
+        if task.pending_ns or task.pending_cancellation is not None or task.meter is not None:
             self._interact(task)
         if when <= self._now:
             return
-        due, due_ticket, target = self._heap[0]
-        if when < due and when <= self._horizon:
+        event = (when << TICKET_BITS) + next(self._tickets)
+        due = self._heap[0]
+        if event < due and event < self._horizon:
             self._now = when
             return
         task.woken = False
         task.waiting_for = "a time"
-        task.ticket = ticket = next(self._tickets)
-        if due <= self._horizon and target.ticket == due_ticket and isinstance(target, Task):
-            heapreplace(self._heap, (when, ticket, task))
-            self._now = due
+        task.event = event
+        self._targets[event] = task
+        target = self._targets[due]
+        if due < self._horizon and target.event == due and isinstance(target, Task):
+            heapreplace(self._heap, event)
+            del self._targets[due]
+            self._now = due >> TICKET_BITS
             self._current = target
-            target.flow.switch()
+            del due, target  # else this frame, resumed, would release objects that have left the caches
+            self._current.flow.switch()
         else:
-            heappush(self._heap, (when, ticket, task))
+            heappush(self._heap, event)
             self._switch_to_next(task)
         if task.pending_cancellation is not None:
             self._cancel_task(task)
@@ -293,7 +305,8 @@ class VirtualKernel:
         """Let `amount` ns pass if no event is due meanwhile; return when they began, else ``NEVER``."""
         start = self._now
         end = start + amount
-        if end > self._horizon or self._heap[0][0] <= end:
+        after = end + 1 << TICKET_BITS
+        if after > self._horizon or self._heap[0] < after:
             return NEVER
         self._now = end
         return start
@@ -307,9 +320,10 @@ class VirtualKernel:
             self._cancel_task(task)
         task.woken = False
         task.waiting_for = waiting_for
-        task.ticket = next(self._tickets)
-        if deadline is not None:
-            heappush(self._heap, (max(deadline, self._now), task.ticket, task))
+        if deadline is None:
+            task.event = VOID
+        else:
+            self._schedule(task, deadline)
         self._switch_to_next(task)
         if task.pending_cancellation is not None:
             self._cancel_task(task)
@@ -319,8 +333,7 @@ class VirtualKernel:
         """End the wait that `task` is in."""
         if not task.woken and not task.done and task is not self._current:
             task.woken = True
-            task.ticket = next(self._tickets)
-            heappush(self._heap, (self._now, task.ticket, task))
+            self._schedule(task, self._now)
 
     def cancel(self, scope: Scope, why: str) -> None:
         """Deliver ``Cancelled`` to every task of `scope` at its next interaction point."""
@@ -332,22 +345,22 @@ class VirtualKernel:
 
     def _switch_to_next(self, task: Task) -> None:
         """Execute the timers that are due next, then switch to the task or, for other events, to the hub."""
-        heap = self._heap
-        while heap[0][0] <= self._horizon:
-            due, ticket, target = heap[0]
-            if isinstance(target, Task):
-                heappop(heap)
-                if target.ticket == ticket:
-                    self._now = due
-                    self._current = target
-                    if target is not task:
-                        target.flow.switch()
-                    return
-            elif target.ticket != ticket:
-                heappop(heap)
+        heap, targets = self._heap, self._targets
+        while heap[0] < self._horizon:
+            due = heap[0]
+            target = targets[due]
+            if target.event != due:
+                del targets[heappop(heap)]
+            elif isinstance(target, Task):
+                del targets[heappop(heap)]
+                self._now = due >> TICKET_BITS
+                self._current = target
+                if target is not task:
+                    target.flow.switch()
+                return
             elif isinstance(target, Timer):
-                heappop(heap)
-                self._now = due
+                del targets[heappop(heap)]
+                self._now = due >> TICKET_BITS
                 self._current = None
                 self._execute(target)
             else:
@@ -361,7 +374,7 @@ class VirtualKernel:
         except BaseException as error:
             self.post(partial(_raise, error))
         if self.root.cancelled:
-            self._horizon = NEVER
+            self._horizon = VOID
 
     def _switch_to_hub(self) -> None:
         if self._hub is None:
@@ -403,7 +416,7 @@ class VirtualKernel:
     def _serve(self) -> None:
         while True:
             error = self._error_of_loop()
-            self._horizon = NEVER
+            self._horizon = VOID
             self._current = self._adopted
             if self.pacer is not None:
                 self.pacer.rest()
@@ -422,15 +435,15 @@ class VirtualKernel:
         return None
 
     def _loop(self) -> None:
-        heap, inbox, pacer = self._heap, self._inbox, self.pacer
+        heap, targets, inbox, pacer = self._heap, self._targets, self._inbox, self.pacer
         while True:
             self._current = None
-            self._horizon = self._until if pacer is None else NEVER
+            self._horizon = self._until + 1 << TICKET_BITS if pacer is None else VOID
             for _ in range(len(inbox)):  # what is posted meanwhile waits: it must not delay what is due
                 inbox.popleft()()
             if self.root.cancelled:
                 return
-            due = heap[0][0]
+            due = heap[0] >> TICKET_BITS
             if pacer is not None:
                 now = pacer.wait(self._now, min(due, self._until))
                 if now is not None:
@@ -439,8 +452,9 @@ class VirtualKernel:
             if due > self._until:
                 self._end_loop()
                 return
-            _, ticket, target = heappop(heap)
-            if target.ticket == ticket:
+            event = heappop(heap)
+            target = targets.pop(event)
+            if target.event == event:
                 self._now = due
                 if isinstance(target, Task):
                     self._resume(target)
@@ -449,9 +463,9 @@ class VirtualKernel:
 
     def _end_loop(self) -> None:
         """Advance to the end of ``run``, or raise ``Deadlock`` if no event is left while tasks wait."""
-        heap = self._heap
-        while heap[0][2].ticket != heap[0][1]:
-            heappop(heap)
+        heap, targets = self._heap, self._targets
+        while targets[heap[0]].event != heap[0]:
+            del targets[heappop(heap)]
         if len(heap) > 1 or self.pacer is not None:
             self._now = max(self._now, self._until)
             return
@@ -482,7 +496,7 @@ class VirtualKernel:
             pass
         finally:
             self._adopted = self._current = None
-            self._horizon = NEVER
+            self._horizon = VOID
             self._bury(task)
 
     @contextmanager

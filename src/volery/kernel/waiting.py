@@ -88,8 +88,8 @@ def execute_polling(kernel: Kernel, amount: Ns) -> None:
 
 def execute_polled(kernel: Kernel, task: Task) -> None:
     """Execute what a loop of `task` has polled, and the code that is counted, once that is ``POLLED`` ns."""
-    context = task.contexts[-1]
-    counted = 0 if context.meter is None else context.meter()
+    context = task.context
+    counted = 0 if task.meter is None else task.meter()
     if context.processor is None:
         task.polled_ns += counted
     else:
@@ -115,7 +115,7 @@ def poll(kernel: Kernel, price: Ns, *, executed: bool = False) -> bool:
     if task is None or task.adopted:
         return False
     polls = task.polls = task.polls + 1
-    if executed and task.contexts[-1].processor is not None:
+    if executed and task.context.processor is not None:
         kernel.consume(price)
         return True
     if polls <= FREE_POLLS:
@@ -128,8 +128,8 @@ def poll(kernel: Kernel, price: Ns, *, executed: bool = False) -> bool:
 
 def _period_of(task: Task) -> Ns | None:
     """Return the time after which a task is late, ns; None for one without, and within a call of a port."""
-    own = task.contexts[0]
-    return (own.period or own.deadline) if len(task.contexts) == 1 else None
+    own = task.own
+    return None if task.is_in_call else (own.period or own.deadline)
 
 
 def _end_if_late(kernel: Kernel, task: Task, ended: Ns) -> None:
@@ -138,7 +138,7 @@ def _end_if_late(kernel: Kernel, task: Task, ended: Ns) -> None:
     if task.released is None or period is None or ended < task.counted_from + period:
         return
     due, counted_from = next_release(task.counted_from, period, ended)
-    if task.contexts[0].period is None:  # no release was due: the loop has just come round
+    if task.own.period is None:  # no release was due: the loop has just come round
         due = counted_from = ended
     activation = task.finish(ended)
     if activation is not None:
@@ -386,7 +386,7 @@ def executing_in(kernel: Kernel, context: ExecutionContext) -> Iterator[None]:
     """
     with kernel:
         task = current_task(kernel)
-        task.contexts.append(context)
+        task.enter(context)
     try:
         try:
             yield
@@ -398,4 +398,4 @@ def executing_in(kernel: Kernel, context: ExecutionContext) -> Iterator[None]:
             pass
     finally:
         task.take_pending()
-        task.contexts.pop()
+        task.leave()

@@ -57,18 +57,18 @@ def test_pending_time_is_what_was_charged_and_what_the_meter_of_the_innermost_co
     task.charge(3)
     task.charge(4)
     assert [task.take_pending(), task.take_pending()] == [1007, 1000]
-    task.contexts.append(ExecutionContext("called", meter=lambda: 50))
+    task.enter(ExecutionContext("called", meter=lambda: 50))
     assert task.take_pending() == 50
-    task.contexts.append(ExecutionContext("deeper"))
+    task.enter(ExecutionContext("deeper"))
     task.charge(2)
     assert [task.take_pending(), task.take_pending()] == [2, 0]
 
 
 def test_a_passive_context_inherits_the_priority() -> None:
     task = task_of()
-    task.contexts.append(ExecutionContext("passive", priority=None))
+    task.enter(ExecutionContext("passive", priority=None))
     assert (task.priority, task.context.component) == (3, "passive")
-    task.contexts.append(ExecutionContext("urgent", priority=9))
+    task.enter(ExecutionContext("urgent", priority=9))
     assert task.priority == 9
     assert task_of(ExecutionContext("nowhere", priority=None)).priority == 0
     assert ExecutionContext("plain").priority == 0
@@ -78,7 +78,7 @@ def test_a_new_task_is_in_its_scope_and_at_its_beginning() -> None:
     scope = Scope("s")
     task = task_of(scope=scope)
     assert scope.tasks == [task]
-    assert (task.pending_ns, task.released, task.counted_from, task.ticket, task.swallowed) == (
+    assert (task.pending_ns, task.released, task.counted_from, task.event, task.swallowed) == (
         0,
         None,
         0,
@@ -86,7 +86,7 @@ def test_a_new_task_is_in_its_scope_and_at_its_beginning() -> None:
         0,
     )
     assert (task.done, task.adopted, task.woken, task.pending_cancellation) == (False, False, False, None)
-    assert (task.name, task.waiting_for, task.contexts) == ("t", "", [OWN])
+    assert (task.name, task.waiting_for, task.context) == ("t", "", OWN)
 
 
 def test_a_cancellation_is_delivered_until_the_task_has_swallowed_ten() -> None:
@@ -158,7 +158,7 @@ def test_children_that_have_ended_are_forgotten() -> None:
 def test_hooks_and_deadlines_are_those_of_the_tasks_own_context_within_a_call_too() -> None:
     released: list[str] = []
     task = task_of(replace(OWN, on_release=lambda one: released.append(one.context.component)))
-    task.contexts.append(ExecutionContext("called", deadline=MS, on_release=lambda _: released.append("no")))
+    task.enter(ExecutionContext("called", deadline=MS, on_release=lambda _: released.append("no")))
     task.release(5 * MS)
     assert (released, task.deadline) == (["called"], 25 * MS)
     assert task.finish(6 * MS) == Activation(5 * MS, 6 * MS, "own", 25 * MS)

@@ -121,7 +121,7 @@ def _thread_handlers(kernel: Kernel, component: str) -> dict[str, RequestHandler
     def thread(fiber: CppFiber, arguments: Reader) -> bytes:
         number = arguments.integer()
         task = current_task(kernel)
-        context = replace(task.contexts[0], deadline=None, period=None, on_release=None)
+        context = replace(task.own, deadline=None, period=None, on_release=None)
 
         def body() -> None:
             try:

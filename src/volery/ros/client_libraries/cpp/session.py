@@ -73,7 +73,7 @@ class CppSession(ABC):
         """Run *body* in a task beside that of ``main``, as a thread; what it raises is a failure."""
         task = self.kernel.current() or self.main
         assert task is not None, "a thread begins in a task or after the library has begun to be used"
-        context = replace(task.contexts[0], deadline=None, period=None, on_release=None)
+        context = replace(task.own, deadline=None, period=None, on_release=None)
 
         def guarded() -> None:
             try:

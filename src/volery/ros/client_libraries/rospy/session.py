@@ -273,7 +273,7 @@ class Sessions(LaunchedComponents):
     def initialised(self) -> Session:
         """Return the session of the current component; raise ``ROSInitException`` before ``init_node``."""
         task = self.kernel.current()
-        session = None if task is None else self._open.get(task.contexts[-1].component)
+        session = None if task is None else self._open.get(task.context.component)
         if session is None or not session.initialised:
             raise ROSInitException(f"{self.component}: call rospy.init_node() first")
         return session
@@ -291,7 +291,7 @@ class Sessions(LaunchedComponents):
         A component that was started again has none.
         """
         task = self.kernel.current() or current_task(self.kernel)
-        found = self._open.get(task.contexts[-1].component)
+        found = self._open.get(task.context.component)
         if found is not None and found.scope.cancelled and self.started_again(found.scope):
             return None
         return found
