@@ -18,9 +18,9 @@ from volery.base.errors import EstimateError, UsageError
 from volery.base.time import Ns, S
 from volery.calibration.node_processes import MeasuredRun, NodeProgram, measurement_session, node_programs
 from volery.calibration.ros.probe_environment import check_client
-from volery.ros.transports.ros1.master import own_roscore
 from volery.model.system import System
 from volery.requirements.record import RunRecord
+from volery.ros.transports.ros1.master import own_roscore
 from volery.run.result import Options
 from volery.run.simulate import simulate
 

@@ -20,10 +20,10 @@ from volery.calibration.node_processes import measurement_session
 from volery.calibration.ros.call_costs import CallCost, call_costs
 from volery.calibration.ros.campaign import Conditions, ros_law, write_entry
 from volery.calibration.ros.probe_environment import Pace, probe_setup
-from volery.ros.transports.ros1.master import own_roscore
 from volery.cli.main import application
 from volery.cost import load_catalogue
 from volery.model.system_loader import load
+from volery.ros.transports.ros1.master import own_roscore
 from volery.run.assembly.model_checks import vocabulary
 
 pytestmark = pytest.mark.integration
