@@ -32,7 +32,10 @@ from volery.simulation.world.state_layout import (
     ADVANCED,
     BODIES_ARGUMENTS,
     MOTION,
+    MOTION_AWAITED,
+    MOTION_GIVEN,
     MULTIROTOR,
+    OWN_LAWS,
     P_FEET,
     P_GRAVITY,
     P_IDLE_POWER,
@@ -63,7 +66,11 @@ from volery.simulation.world.state_layout import (
     S_VELOCITY,
     S_VOLTS,
     STEP_S,
+    U_FORCE,
+    U_MOTION,
+    U_MOVED,
     U_PAYLOAD,
+    U_SPEEDS,
     U_THROTTLE,
     U_WIND,
     W_AIR_VELOCITY,
@@ -132,6 +139,18 @@ def _advance(row: Array, flying: bool) -> None:
 
 
 @numeric
+def _take_motion(row: Array) -> None:
+    """Take the motion that was given, and rotor speeds, which follow their own law where none are given."""
+    for i in range(MOTION):
+        row[i] = row[U_MOTION + i]
+    turn_rotors(row, 0, W_STATE)
+    turn_rotors(row, W_STATE, 0)
+    for i in range(int(row[P_ROTORS])):
+        if row[U_SPEEDS + i] == row[U_SPEEDS + i]:
+            row[S_ROTORS + i] = row[U_SPEEDS + i]
+
+
+@numeric
 def _normalise(row: Array) -> None:
     square = 0.0
     for i in range(4):
@@ -167,7 +186,7 @@ def _settle_multirotor(row: Array) -> None:
         speed = max(speed, abs(row[S_VELOCITY + axis]), abs(row[W_LAST_VELOCITY + axis]))  # not a rebound
         spin = max(spin, abs(row[S_RATES + axis]))
     still = row[S_RESTING] > 0.5 or (speed < _STILL_SPEED and spin < _STILL_RATE)
-    resting = touching and light and still
+    resting = touching and light and still and row[U_MOVED] == OWN_LAWS
     row[S_RESTING] = 1.0 if resting else 0.0
     if resting:
         for axis in range(3):
@@ -201,6 +220,9 @@ def _measure_motion(row: Array) -> None:
         row[S_SPECIFIC_FORCE + axis] = (
             row[W_ROTATION + axis] * ae + row[W_ROTATION + 3 + axis] * an + row[W_ROTATION + 6 + axis] * au
         )
+    if row[U_MOVED] != OWN_LAWS and row[U_FORCE] == row[U_FORCE]:
+        for axis in range(3):
+            row[S_SPECIFIC_FORCE + axis] = row[U_FORCE + axis]
     square = 0.0
     for axis in range(3):
         square += row[S_VELOCITY + axis] * row[S_VELOCITY + axis]
@@ -240,7 +262,7 @@ def _rover_power(row: Array) -> float:
 def _collide(scene: SceneArrays, row: Array, flying: bool, k: int) -> None:
     """Hold a body off the solids of the scene; a multirotor that flies into one breaks its blades.
 
-    A rover stops, and can go on in another direction.
+    A rover stops, and can go on in another direction. A body that is moved from outside is not held off.
     """
     east, north, up = row[S_POSITION], row[S_POSITION + 1], row[S_POSITION + 2]
     tall = row[P_FEET + 2] if flying else row[P_REACH]
@@ -250,18 +272,20 @@ def _collide(scene: SceneArrays, row: Array, flying: bool, k: int) -> None:
     solid, depth, out_east, out_north, out_up = contact(scene, body)
     if solid < 0:
         return
-    row[S_POSITION] += depth * out_east
-    row[S_POSITION + 1] += depth * out_north
-    row[S_POSITION + 2] += depth * out_up
+    held = row[U_MOVED] == OWN_LAWS
+    if held:
+        row[S_POSITION] += depth * out_east
+        row[S_POSITION + 1] += depth * out_north
+        row[S_POSITION + 2] += depth * out_up
     into = -(out_east * row[S_VELOCITY] + out_north * row[S_VELOCITY + 1] + out_up * row[S_VELOCITY + 2])
     if into <= 0.0:
         return
-    if flying:
+    if flying and held:
         back = (1.0 + _REBOUND) * into
         row[S_VELOCITY] += back * out_east
         row[S_VELOCITY + 1] += back * out_north
         row[S_VELOCITY + 2] += back * out_up
-    else:
+    elif not flying:
         row[S_SPEED] = 0.0
     if into > _BREAKS and not (flying and row[S_COLLISIONS] > 0.0):
         row[S_COLLISIONS] += 1.0
@@ -276,6 +300,8 @@ def _collide(scene: SceneArrays, row: Array, flying: bool, k: int) -> None:
 @numeric
 def step_body(bodies: Bodies, body: int, row: Array) -> None:
     """Advance one body to its next grid step under the commands in ``W_THROTTLE``, and take its samples.
+
+    The motion of one that is moved from outside must have been given.
 
     Args:
         bodies: All arrays.
@@ -292,7 +318,10 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
         row[W_LAST_VELOCITY + axis] = row[S_VELOCITY + axis]
         row[W_AIR_VELOCITY + axis] = row[U_WIND + axis] + row[S_GUST + axis]
     row[W_GROUND] = row[S_GROUND]
-    _advance(row, flying)
+    if row[U_MOVED] == OWN_LAWS:
+        _advance(row, flying)
+    else:
+        _take_motion(row)
     _collide(scene, row, flying, bodies.reached[body] + 1)
     height_before = row[S_POSITION + 2]
     row[S_GROUND] = max(
@@ -309,6 +338,8 @@ def step_body(bodies: Bodies, body: int, row: Array) -> None:
         rotation_matrix(row, S_ATTITUDE, W_ROTATION)
     _measure_motion(row)
     _discharge(row, flying)
+    if row[U_MOVED] == MOTION_GIVEN:
+        row[U_MOVED] = MOTION_AWAITED
     k = bodies.reached[body] + 1
     bodies.reached[body] = k
     if k % GUST_EVERY == 0:
@@ -359,6 +390,8 @@ def _compose(digest: str) -> Callable[..., int]:
             while reached[body] < goal:
                 for i in range(ROTORS):
                     row[W_THROTTLE + i] = row[U_THROTTLE + i]
+                if row[U_MOVED] == MOTION_AWAITED:
+                    break
                 step_body(bodies, body, row)
             finite = finite and is_finite(row)
         return 1 if digest and finite else 0

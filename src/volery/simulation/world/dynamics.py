@@ -48,6 +48,7 @@ from math import sqrt
 from volery.base.elementary import sine_cosine
 from volery.base.numeric_code import numeric
 from volery.simulation.world.state_layout import (
+    OWN_LAWS,
     P_CAPACITY,
     P_CELLS,
     P_DAMPING,
@@ -92,7 +93,9 @@ from volery.simulation.world.state_layout import (
     S_VELOCITY,
     S_VOLTS,
     STEP_S,
+    U_CURRENT,
     U_MOTOR_HEALTH,
+    U_MOVED,
     U_PAYLOAD,
     U_PUSH,
     W_AIR_VELOCITY,
@@ -156,6 +159,9 @@ _REBOUND = 3.0  # damping of a rising foot over that of a sinking one: no bounce
 @numeric
 def electrical_power(row: Array) -> float:
     """Return the power [W] that rotors, autopilot and payload draw."""
+    if row[U_MOVED] != OWN_LAWS and row[U_CURRENT] == row[U_CURRENT]:
+        given: float = row[U_CURRENT] * row[S_VOLTS] + row[P_IDLE_POWER] + row[U_PAYLOAD]
+        return given
     cubes = 0.0
     for i in range(int(row[P_ROTORS])):
         speed = row[S_ROTORS + i]

@@ -128,6 +128,13 @@ U_GPS_DRIFT = _add("U_GPS_DRIFT", "m/s", "speed at which the reported position d
 U_GPS_DRIFT_START = _add("U_GPS_DRIFT_START", "1", "grid step at which the drift began")
 U_GPS_OFFSET = _add("U_GPS_OFFSET", "m", "error that is added to the reported position", 2, "north, east")
 U_PUSH = _add("U_PUSH", "m/s^2", "acceleration by a force from outside; multirotors only", 3, FLU)
+OWN_LAWS, MOTION_AWAITED, MOTION_GIVEN = 0.0, 1.0, 2.0
+"""What moves a multirotor in its next step: the world's laws, or motion from outside, awaited or given."""
+U_MOVED = _add("U_MOVED", "1", "OWN_LAWS, MOTION_AWAITED or MOTION_GIVEN")
+U_MOTION = _add("U_MOTION", "mixed", "given motion at the end of the step", MOTION, "as the first columns")
+U_SPEEDS = _add("U_SPEEDS", "rad/s", "given rotor speeds; NaN: by the world's own law", ROTORS, MOTORS)
+U_FORCE = _add("U_FORCE", "m/s^2", "given specific force; NaN: that of the velocities", 3, FLU)
+U_CURRENT = _add("U_CURRENT", "A", "given current of the rotors; NaN: by the world's own law")
 
 # --- measurements: last sample of each sensor, in the axes of autopilots ---
 M_GYRO = _add("M_GYRO", "rad/s", "body rates", 3, FRD)

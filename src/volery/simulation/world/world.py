@@ -32,6 +32,8 @@ from volery.simulation.world.sensors import (
 )
 from volery.simulation.world.state_layout import (
     ACTIVE_STEPS,
+    MOTION_AWAITED,
+    MOTION_GIVEN,
     OCTETS,
     P_CAPACITY,
     ROTORS,
@@ -55,8 +57,11 @@ from volery.simulation.world.state_layout import (
     S_VELOCITY,
     S_VOLTS,
     STATE,
+    U_CURRENT,
     U_GUST,
+    U_MOTION,
     U_MOTOR_HEALTH,
+    U_MOVED,
     U_PAYLOAD,
     U_THROTTLE,
     U_WIND,
@@ -138,6 +143,21 @@ class Attendant(Protocol):
 
     def attend(self) -> None:
         """Act at ``next_step``, which the body has reached and not left, and set the next one."""
+
+
+class MotionSource(Protocol):
+    """What moves a multirotor in place of the world's laws, one grid step after the other."""
+
+    def advance(self, step: int, row: Array) -> Sequence[float]:
+        """Return the motion at grid step *step*.
+
+        Args:
+            step: The grid step after the one that the body has reached.
+            row: The body's state row, with the motor commands in ``W_THROTTLE``; not to be written.
+
+        Returns:
+            The columns from ``U_MOTION`` to ``U_CURRENT``.
+        """
 
 
 class _PendingInput:
@@ -232,6 +252,7 @@ class World:
             if spec.added_sensors
         }
         self._attendants: dict[int, Attendant] = {}
+        self._sources: dict[int, MotionSource] = {}
         self._advance()
         for body in self._mounted:
             self._sample_mounted(body)
@@ -260,6 +281,14 @@ class World:
             self._attendants.pop(body, None)
         else:
             self._attendants[body] = attendant
+
+    def move_by(self, body: int, source: MotionSource | None) -> None:
+        """Let *source* move a multirotor from now on; ``None``, or if it raises: it stays where it is."""
+        if source is None:
+            self._sources.pop(body, None)
+        else:
+            self._sources[body] = source
+        self.arrays.rows[body, U_MOVED] = MOTION_AWAITED
 
     def command_motors(self, body: int, commands: Sequence[float]) -> None:
         """Set the motor commands of the step that *body* is about to take; for its attendant."""
@@ -339,14 +368,18 @@ class World:
 
     def _catch_up(self, step: int) -> None:
         """Advance every active body to *step*: those with stops one by one, then all in one call."""
-        if self._pending or self._mounted or self._attendants:
-            for body in dict.fromkeys((*self._pending, *self._mounted, *self._attendants)):
+        if self._pending or self._mounted or self._attendants or self._sources:
+            stopping = (*self._pending, *self._mounted, *self._attendants, *self._sources)
+            for body in dict.fromkeys(stopping):
                 if step - self._read[body] < ACTIVE_STEPS:
                     self._catch_up_by_stops(body, step)
         self._advance_span(0, len(self.specs), step)
 
     def _catch_up_by_stops(self, body: int, step: int) -> None:
-        """Advance *body* to its last stop up to *step*; at a stop an input, a sample or a call is due."""
+        """Advance *body* to its last stop up to *step*; at a stop an input, a sample or a call is due.
+
+        A body that is moved from outside is advanced to *step*, or stays where its source failed.
+        """
         while True:
             stops = [sensor.next_step for sensor in self._mounted.get(body, {}).values()]
             if body in self._pending:
@@ -355,13 +388,31 @@ class World:
             if attendant is not None:
                 stops.append(attendant.next_step)
             stop = min(stops, default=step + 1)
+            if body in self._sources:
+                self._advance_by_source(body, min(stop, step))
             if stop > step:
                 return
             self._advance_span(body, body + 1, stop)
+            if self._reached[body] < stop:
+                return
             self._sample_mounted(body)
             self._apply_inputs(body)
             if attendant is not None and attendant.next_step == stop:
                 attendant.attend()
+
+    def _advance_by_source(self, body: int, step: int) -> None:
+        """Advance *body* to *step* by its source: the compiled step writes the commands and awaits motion."""
+        row = self.arrays.rows[body]
+        while self._reached[body] < step:
+            following = self._reached[body] + 1
+            self._advance_span(body, body + 1, following)
+            try:
+                row[U_MOTION : U_CURRENT + 1] = self._sources[body].advance(following, row)
+            except BaseException:
+                del self._sources[body]
+                raise
+            row[U_MOVED] = MOTION_GIVEN
+            self._advance_span(body, body + 1, following)
 
     def _advance_span(self, first: int, end: int, step: int) -> None:
         """Advance the active ones of the bodies from *first* to before *end* in one compiled call."""

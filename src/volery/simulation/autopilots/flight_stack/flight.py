@@ -71,7 +71,7 @@ from volery.simulation.world.state_layout import (
     U_WIND,
     W_ROTATION,
 )
-from volery.simulation.world.world import STEP, Attendant, Collision, Truth, World
+from volery.simulation.world.world import STEP, Attendant, Collision, MotionSource, Truth, World
 
 __all__ = ["Control", "Estimate", "Flight", "GpsFix", "Setpoint", "make_world"]
 
@@ -305,6 +305,10 @@ class Flight:
             self._world.set_input(self._body, C_CONTROL, *self._driven)
         inputs = commands if self.flying else (-commands[0], commands[1])
         self._world.set_input(self._body, U_THROTTLE, *inputs)
+
+    def move_by(self, source: MotionSource | None) -> None:
+        """See ``World.move_by``."""
+        self._world.move_by(self._body, source)
 
     def attend(self, attendant: Attendant | None) -> None:
         """Let *attendant* give the motor commands and read ``row`` at grid steps of its own: a firmware.

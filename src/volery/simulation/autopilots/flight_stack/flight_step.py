@@ -2,7 +2,8 @@
 
 One grid step of a vehicle is: guidance (every fifth step) and attitude loops on the estimate of step k, then
 the body's motion from k to k + 1 with the samples due there, then the estimate of k + 1. Under external
-control only the body moves, by the motor commands in its inputs.
+control only the body moves, by the motor commands in its inputs. For a body that is moved from outside the
+step halts after the loops until the motion is given.
 """
 
 from __future__ import annotations
@@ -42,11 +43,14 @@ from volery.simulation.world.body_step import (
 )
 from volery.simulation.world.state_layout import (
     BODIES_ARGUMENTS,
+    MOTION_AWAITED,
+    MOTION_GIVEN,
     MULTIROTOR,
     P_KIND,
     P_ROTORS,
     ROTORS,
     S_STARTED,
+    U_MOVED,
     U_THROTTLE,
     W_THROTTLE,
     Array,
@@ -83,6 +87,16 @@ def _control(row: Array, k: int) -> None:
         row[W_THROTTLE + i] = row[K_MOTORS + i]
 
 
+@numeric
+def _command_motors(row: Array, k: int, external: bool) -> None:
+    """Write the motor commands of step *k*, unless they are there because the motion waited for them."""
+    if external:
+        for i in range(ROTORS):
+            row[W_THROTTLE + i] = row[U_THROTTLE + i]
+    elif row[U_MOVED] != MOTION_GIVEN:
+        _control(row, k)
+
+
 def _compose(digest: str) -> Callable[..., int]:
     def advance_flights(  # noqa: PLR0913, PLR0917  # the arrays of Bodies
         rows: Array, keys: NDArray[np.uint64], reached: NDArray[np.int64], heights: Array, grid: Array,
@@ -98,13 +112,13 @@ def _compose(digest: str) -> Callable[..., int]:
                 _boot(row)
             goal = goal_of(bodies, body)
             while reached[body] < goal:
-                if row[C_CONTROL] == EXTERNAL:
-                    for i in range(ROTORS):
-                        row[W_THROTTLE + i] = row[U_THROTTLE + i]
-                    step_body(bodies, body, row)
-                    continue
-                _control(row, reached[body])
+                external = row[C_CONTROL] == EXTERNAL
+                _command_motors(row, reached[body], external)
+                if row[U_MOVED] == MOTION_AWAITED:
+                    break
                 step_body(bodies, body, row)
+                if external:
+                    continue
                 k = reached[body]
                 update_estimate(row, k)
                 if k % GUIDE_EVERY == 0 or k == goal:  # for guidance, and for those who read
