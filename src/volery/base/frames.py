@@ -163,6 +163,12 @@ def attitude_ned_to_enu(q: Quaternion) -> Quaternion:
 attitude_enu_to_ned = attitude_ned_to_enu
 
 
+def attitude_frd_to_flu(q: Quaternion) -> Quaternion:
+    """Convert an attitude of FRD axes in other FRD axes to that of FLU in FLU. Its own inverse."""
+    w, x, y, z = q
+    return w, x, -y, -z
+
+
 def euler_to_quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Convert intrinsic yaw, pitch, roll (z, y', x'') in radians to a quaternion."""
     sr, cr = sine_cosine(roll / 2)

@@ -77,6 +77,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = {
     "explore": ("scipy", "optuna", "SALib", "pandas", "pyarrow", "matplotlib"),
     "autonomy": ("scipy",),
     "vision": ("cv2",),
+    "fmi": ("fmpy",),
     "dask": ("distributed",),
     "ray": ("ray",),
 }

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path as FilePath
 from typing import Annotated
 
 from volery.base.errors import Location
@@ -420,6 +421,25 @@ def check_inside(reading: Reading, path: Path, name: str) -> None:
     allowed = [reading.folder, *(reading.folder / one for one in stated_texts(reading.root, "files_from"))]
     if not is_inside(reading.folder / name, allowed):
         reading.problems.add(path, outside(name), rule=rules.OUTSIDE)
+
+
+class FileBeside(Syntax):
+    """A file beside the model, which has to be there."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> FilePath:
+        """See ``Syntax``."""
+        if not isinstance(node.value, str):
+            raise expected("text", node)
+        check_inside(reading, path, node.value)
+        file = reading.folder / node.value
+        if not file.is_file():
+            what = f"there is no file {node.value!r} beside the model"
+            raise WrongValueError(what, rules.MISSING_FILE)
+        return file
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return {"type": "string"}
 
 
 class _File(Syntax):

@@ -23,7 +23,7 @@ from volery.base.time import Ns
 from volery.model import rules
 from volery.model.added_sensors import ADDED_SENSOR, AddedSensor, Odometry
 from volery.model.airframes import AIRFRAME, BATTERY, LOAD, MASS, Airframe, Battery
-from volery.model.components import check_inside
+from volery.model.components import FileBeside
 from volery.model.faults import FAULT, Fault
 from volery.model.fields import (
     AUTOPILOT,
@@ -51,10 +51,10 @@ from volery.model.fields import (
     Syntax,
     Whole,
     WrongValueError,
-    expected,
     read_child,
 )
 from volery.model.floor_plan import FLOOR_PLAN, FloorPlan
+from volery.model.fmu_bodies import FMU, Fmu
 from volery.model.prices import PRICE, Price
 from volery.model.reading import Reading
 from volery.model.recorded_inputs import INPUTS, RecordedInput
@@ -448,25 +448,6 @@ class Firmware:
     repeatable: bool = False
 
 
-class _ParameterFile(Syntax):
-    """A file of parameters beside the model."""
-
-    def read(self, node: Node, path: Path, reading: Reading) -> FilePath:
-        """See ``Syntax``."""
-        if not isinstance(node.value, str):
-            raise expected("text", node)
-        check_inside(reading, path, node.value)
-        file = reading.folder / node.value
-        if not file.is_file():
-            what = f"there is no file {node.value!r} beside the model"
-            raise WrongValueError(what, rules.MISSING_FILE)
-        return file
-
-    def schema(self, definitions: Schema) -> Schema:
-        """See ``Syntax``."""
-        return {"type": "string"}
-
-
 @dataclass(frozen=True, slots=True)
 class AutopilotText:
     """What flies a vehicle: a simulated autopilot, or with `firmware` a program of the real one."""
@@ -481,7 +462,7 @@ class AutopilotText:
     ] = ""
     parameters: Annotated[
         tuple[FilePath, ...],
-        ListOf(_ParameterFile(), bare=True),
+        ListOf(FileBeside(), bare=True),
         "Files of parameters of that program, as ground stations write them: a later one wins, and the "
         "`parameters` of the vehicle win over all.",
     ] = ()
@@ -573,6 +554,11 @@ class Vehicle:
         AIRFRAME,
         "Airframe of a multirotor, as a rule the name of its file; by default a usual quadrotor of 3 kg.",
     ] = None
+    body: Annotated[
+        Fmu | None,
+        FMU,
+        "What moves a multirotor: an FMU; by default the laws of its airframe.",
+    ] = None
     payload_kg: Annotated[float, LOAD, "Mass that it carries from the start, beside its own."] = 0.0
     price: Annotated[
         Price | None, PRICE, "Its price without battery and computers; that of its airframe by default."
@@ -644,6 +630,8 @@ class _Vehicle(Record):
             problems.add((*path, "added_sensors"), what, rule=rules.DUPLICATE_NAME)
         if sum(isinstance(one, Odometry) for one in made.added_sensors) > 1:
             problems.add((*path, "added_sensors"), "it has two odometries; only one can move base_link")
+        if made.kind != "multirotor" and made.body is not None:
+            problems.add((*path, "body"), f"a {made.kind} has no body of its own; only a multirotor has one")
         if made.kind != "multirotor" and airframe is not None:
             here = reading.where((*path, "airframe", "file"))
             problems.add(

@@ -321,6 +321,13 @@ NO_FIRMWARE = _rule(
     "Correct the program; `volery doctor` prints how one is built.",
 )
 
+UNFIT_FMU = _rule(
+    "V707",
+    "unfit-fmu",
+    "An FMU that cannot move its vehicle on this machine.",
+    "Export it as the message says, or name its variables below `body`.",
+)
+
 # -- models of other tools
 
 NOT_MAPPED = _warning(

@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 
 from volery.base.errors import UsageError, choices
 from volery.model.environment import Firmware, Vehicle
+from volery.run.assembly.moved_bodies import check_body
 from volery.run.result import Tell
 from volery.simulation.autopilots.fleet_autopilot import AutopilotFamily, firmwares
 from volery.simulation.real_firmware.family import PROJECTS, RealFirmwareFamily
@@ -22,8 +23,8 @@ from volery.simulation.real_firmware.lock_step import RealFirmware
 from volery.simulation.real_firmware.program_search import NOT_IN_STEP, PROGRAMS, find_program
 from volery.vehicles.parameters import read_parameter_file
 
-FOLDER = "firmware"
-"""Folder of the programs in a run folder; each has one in it, named after its vehicle."""
+FOLDER, BODIES = "firmware", "bodies"
+"""Folders of firmware and of FMUs in a run folder; each program has one in it, named after its vehicle."""
 
 
 def usual_firmware(autopilot: str, kind: str) -> Firmware | None:
@@ -59,11 +60,20 @@ class ProgramFolder:
 
     @property
     def path(self) -> Path:
-        """The folder."""
+        """The folder of firmware."""
+        return self._root / FOLDER
+
+    @property
+    def bodies(self) -> Path:
+        """The folder of the FMUs that move bodies."""
+        return self._root / BODIES
+
+    @property
+    def _root(self) -> Path:
         if self._run_folder is not None:
-            return self._run_folder.absolute() / FOLDER
+            return self._run_folder.absolute()
         if self._temporary is None:
-            self._temporary = TemporaryDirectory(prefix="volery-firmware-", ignore_cleanup_errors=True)
+            self._temporary = TemporaryDirectory(prefix="volery-programs-", ignore_cleanup_errors=True)
         return Path(self._temporary.name)
 
     def prepare(self, vehicle: Vehicle) -> None:
@@ -142,7 +152,7 @@ def check_autopilot(vehicle: Vehicle) -> None:
 
 
 def check_programs(vehicles: Iterable[Vehicle]) -> None:
-    """Check that all programs of real firmware and their files are there, before any starts.
+    """Check that all programs of real firmware, their files and FMUs are there, before any starts.
 
     Raises:
         UsageError: Some are not; the text names every vehicle, and what to do.
@@ -152,6 +162,7 @@ def check_programs(vehicles: Iterable[Vehicle]) -> None:
         try:
             if vehicle.firmware is not None:
                 check_autopilot(vehicle)
+            check_body(vehicle)
         except UsageError as error:
             problems.setdefault(str(error), []).append(vehicle.name)
     if problems:

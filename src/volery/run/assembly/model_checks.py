@@ -3,7 +3,7 @@
 Every Python file is loaded as a run loads it: its imports and its top level are executed, its classes are
 compared with the ports, parameters and operations of the model. Nothing is constructed and no time passes.
 C++ components are compiled, unless there is no compiler; the objects are kept for the run. The firmware of
-each vehicle has to be there in its version and with its features.
+each vehicle has to be there in its version and with its features, and its FMU must fit.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from volery.run.assembly.component_builder import (
 )
 from volery.run.assembly.cpp import compile_all, describe_component, is_cpp
 from volery.run.assembly.firmware_programs import check_autopilot
+from volery.run.assembly.moved_bodies import check_body
 from volery.run.ending import Ending
 from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.simulation.world.sensors import sensors
@@ -79,12 +80,7 @@ def check_components(system: System) -> None:
 
 
 def _faults(system: System) -> Iterator[ModelError]:
-    for vehicle in system.environment.vehicles:
-        try:
-            check_autopilot(vehicle)
-        except UsageError as error:
-            code = rules.NO_FIRMWARE.code if vehicle.firmware else ""
-            yield ModelError(str(error), f"environment.vehicles.{vehicle.name}", vehicle.where, code)
+    yield from _vehicle_faults(system)
     try:
         system = with_executables(system)
     except ModelError as error:
@@ -108,6 +104,16 @@ def _faults(system: System) -> Iterator[ModelError]:
             yield error
         except VoleryError as error:
             yield ModelError(str(error), f"components.{component.name}", component.where)
+
+
+def _vehicle_faults(system: System) -> Iterator[ModelError]:
+    for vehicle in system.environment.vehicles:
+        code = rules.NO_FIRMWARE.code if vehicle.firmware else ""
+        for check, at, rule in ((check_autopilot, "", code), (check_body, ".body", rules.UNFIT_FMU.code)):
+            try:
+                check(vehicle)
+            except UsageError as error:
+                yield ModelError(str(error), f"environment.vehicles.{vehicle.name}{at}", vehicle.where, rule)
 
 
 def _check_instance(system: System, instance: Instance, loader: Loader) -> None:

@@ -35,12 +35,15 @@ from volery.run.assembly.firmware_programs import (
     parameters_of,
     remark_on,
 )
+from volery.run.assembly.moved_bodies import remark_on_body, start_body
 from volery.run.assembly.sensor_node import Alteration
 from volery.run.assembly.simulated_vehicles import LINK_DELAY, SimulatedVehicle
 from volery.run.result import SAMPLING_PERIOD, VehicleProgress
 from volery.simulation.autopilots.fleet_autopilot import AutopilotFamily, FleetAutopilot
 from volery.simulation.autopilots.flight_stack.flight import Flight, make_world
+from volery.simulation.fmu.fmu_body import FmuBody
 from volery.simulation.real_firmware.lock_step import RealFirmware
+from volery.simulation.world.body_specs import BodySpec
 from volery.simulation.world.environment_models import Wind
 from volery.simulation.world.scene import DAY_LUX, DUSK_LUX, Marker, Scene, Solid
 from volery.simulation.world.world import World
@@ -95,7 +98,14 @@ class SimulatedFleet:
         self._seed = seed
         self._faulty: dict[str, list[FaultyLink]] = {vehicle: [] for vehicle in through_bytes}
         self.frame = surroundings.frame
-        specs = [body_of(vehicle) for vehicle in vehicles]
+        self._moved: dict[str, FmuBody] = {}
+        self.flights: dict[str, Flight] = {}
+        self.autopilots: dict[str, FleetAutopilot] = {}
+        try:
+            specs = [self._body(vehicle) for vehicle in vehicles]
+        except BaseException:
+            self.close()
+            raise
         self._world: World | None = None
         flights: list[Flight] = []
         if specs:  # a model of computers alone has no world
@@ -112,13 +122,14 @@ class SimulatedFleet:
         """Called with each collision, when it is recorded."""
         self.alterations: dict[str, dict[str, dict[str, Alteration]]] = {one.name: {} for one in vehicles}
         """What faults make of the samples of added sensors: by vehicle, sensor and fault."""
-        self.flights: dict[str, Flight] = {}
-        self.autopilots: dict[str, FleetAutopilot] = {}
         self._families: dict[str, AutopilotFamily] = {}
         ids = _ids([vehicle.name for vehicle in vehicles], systems or {})
         try:
             for vehicle, flight in zip(vehicles, flights, strict=True):
                 self.flights[vehicle.name] = flight
+                if vehicle.name in self._moved:
+                    self._moved[vehicle.name].begin(flight.row)
+                    flight.move_by(self._moved[vehicle.name])
                 if outside is not None and vehicle.name in outside:
                     self.autopilots[vehicle.name] = outside[vehicle.name](flight)
                     continue
@@ -140,6 +151,13 @@ class SimulatedFleet:
         except BaseException:
             self.close()
             raise
+
+    def _body(self, vehicle: VehicleModel) -> BodySpec:
+        """Return the body of a vehicle; an FMU that moves it is started."""
+        if vehicle.body is None:
+            return body_of(vehicle)
+        moved = self._moved[vehicle.name] = start_body(vehicle, self._programs.bodies)
+        return moved.spec
 
     @property
     def world(self) -> World:
@@ -242,15 +260,21 @@ class SimulatedFleet:
         return autopilot.process.program if isinstance(autopilot, RealFirmware) else ""
 
     def remarks(self) -> Iterator[str]:
-        """Yield, for each program of real firmware, what flew and which sensors were its own."""
+        """Yield what flew of real firmware, which sensors were its own, and which FMUs moved bodies."""
+        for name, body in self._moved.items():
+            yield remark_on_body(name, body)
         for name, autopilot in self.autopilots.items():
             if isinstance(autopilot, RealFirmware):
                 yield remark_on(name, self._families[name].name, autopilot)
 
     def close(self) -> None:
-        """End the autopilots; their states can still be read."""
+        """End the autopilots and the FMUs; their states can still be read."""
         for autopilot in self.autopilots.values():
             autopilot.close()
+        for name, moved in self._moved.items():
+            if name in self.flights:
+                self.flights[name].move_by(None)
+            moved.fmu.close()
         self._programs.close()
 
     def record_states(self) -> None:

@@ -15,6 +15,7 @@ from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns, from_seconds
 from volery.links.wire_faults import FAULT_OPTIONS, WireFaults, parse_wire_faults
 from volery.model.environment import SENSOR_SETS, STARTS, VEHICLE_KINDS, Firmware, Place, Vehicle, Wind
+from volery.model.fmu_bodies import Fmu
 from volery.simulation.real_firmware.program_search import PROGRAMS
 from volery.vehicles.address import Address
 
@@ -25,6 +26,7 @@ RATE_OPTIONS = ("attitude", "rate", "rc")
 """Rates that the driver of a simulated MAVLink autopilot requests, Hz."""
 
 OPTIONS = (
+    "body",
     "features",
     "heading",
     "home",
@@ -91,7 +93,8 @@ def parse_simulated(
 ) -> SimulatedVehicle:
     """Parse a ``sim:`` or a ``firmware:`` address.
 
-    Options: ``home=LAT,LON,AMSL``, ``heading=DEG``, ``kind=multirotor|rover``, ``sensors=consumer|rtk``,
+    Options: ``body=FILE`` of an FMU with the usual names, ``home=LAT,LON,AMSL``,
+    ``heading=DEG``, ``kind=multirotor|rover``, ``sensors=consumer|rtk``,
     ``start=warm|cold``, ``system=ID``, ``version`` of the firmware, its ``features=all|NAME,...``,
     ``wind=SPEED,FROM_DEG,GUSTS``, ``parameters=NAME:VALUE,...`` of the autopilot, ``names`` of its ROS node,
     ``transmitter=CHANNEL:PULSE@SECONDS,...``, ``rate``, ``attitude`` and ``rc`` in Hz, ``wire=values|bytes``
@@ -119,6 +122,7 @@ def parse_simulated(
         version=address.options.get("version", ""),
         features=address.options.get("features", ""),
         firmware=_firmware(address, kind) if real else None,
+        body=_body(address, kind),
     )
     wind = Wind(*(address.numbers("wind", 3) or ()))
     frame = LocalFrame(latitude, longitude, amsl)
@@ -133,6 +137,15 @@ def parse_simulated(
         {name: value for name, value in address.options.items() if name in RATE_OPTIONS},
         _transmitter(address),
     )
+
+
+def _body(address: Address, kind: str) -> Fmu | None:
+    file = address.options.get("body")
+    if file is None:
+        return None
+    if kind != "multirotor":
+        raise UsageError(f"{address}: a {kind} has no body of its own; only a multirotor has one")
+    return Fmu(Path(file).absolute())
 
 
 def _firmware(address: Address, kind: str) -> Firmware:

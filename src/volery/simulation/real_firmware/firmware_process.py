@@ -37,7 +37,7 @@ _PARTING_S = 0.5
 
 
 class FirmwareError(VoleryError):
-    """A firmware does not start, has died, hangs, or does not fit; the text names the vehicle."""
+    """A firmware or an FMU does not start, has died, hangs, or does not fit; the text names the vehicle."""
 
 
 class Port(NamedTuple):
@@ -54,7 +54,7 @@ class Port(NamedTuple):
 
 
 class FirmwareProcess:
-    """A firmware that runs.
+    """A firmware, or another program of a vehicle, that runs.
 
     Args:
         name: The vehicle, for messages.
@@ -65,12 +65,13 @@ class FirmwareProcess:
         environment: Environment variables to add.
         lock: File that an instance locks while it runs, with ``{instance}`` in its name; empty: none.
         core: Number of the processor core that it runs on alone, modulo those that there are; None: on all.
+        program: What it is called in messages; empty: the name of the program.
 
     Raises:
         FirmwareError: It cannot be started.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913  # each is an option
         self,
         name: str,
         command: Sequence[str],
@@ -81,9 +82,10 @@ class FirmwareProcess:
         environment: Mapping[str, str] | None = None,
         lock: str = "",
         core: int | None = None,
+        program: str = "",
     ) -> None:
         self.name = name
-        self.program = Path(command[0]).name
+        self.program = program or Path(command[0]).name
         self.console = folder / CONSOLE_FILE
         self.instance = 0
         """Number from which it derives its ports."""

@@ -118,8 +118,9 @@ def test_a_folder_of_an_earlier_run_is_removed_and_nothing_else(tmp_path):
 def test_without_a_run_folder_there_is_a_temporary_one():
     folder = ProgramFolder()
     path = folder.path
-    assert path.is_dir()
+    assert path.parent.is_dir()
     assert folder.path == path
+    assert folder.bodies.parent == path.parent
     folder.close()
-    assert not path.exists()
+    assert not path.parent.exists()
     folder.close()

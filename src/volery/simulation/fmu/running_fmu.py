@@ -1,0 +1,129 @@
+"""An FMU that runs in a process of its own: started, asked for each step, and ended."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+import struct
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from zipfile import ZipFile
+
+from volery.simulation.fmu.fmu_interface import FmuInterface
+from volery.simulation.real_firmware.firmware_process import FirmwareError, FirmwareProcess, Port
+from volery.simulation.world.state_layout import STEP_S
+
+_START_LIMIT_S, _ANSWER_LIMIT_S = 60, 10
+"""Time of the wall clock after which an FMU hangs: until it is initialised, and in a step."""
+_EXTRACTED = "extracted"
+
+
+class RunningFmu:
+    """An FMU that is loaded and waits for its first inputs.
+
+    Args:
+        name: The vehicle, for messages.
+        interface: The FMU.
+        folder: Folder for what it prints and, while it runs, for its extracted files.
+
+    Raises:
+        FirmwareError: It cannot be started.
+    """
+
+    def __init__(self, name: str, interface: FmuInterface, folder: Path) -> None:
+        self.interface = interface
+        self._extracted = folder / _EXTRACTED
+        self._inputs = struct.Struct(f"{interface.inputs.size}d")
+        self._outputs = struct.Struct(f"=i{interface.outputs.size}d")
+        self._peer: socket.socket | None = None
+        asked = {
+            "folder": str(self._extracted),
+            "identifier": interface.identifier,
+            "token": interface.token,
+            "version": interface.version,
+            "step": STEP_S,
+            "parameters": interface.parameters,
+            "inputs": (interface.inputs.references, interface.inputs.size),
+            "outputs": (interface.outputs.references, interface.outputs.size),
+        }
+        program = str(Path(__file__).with_name("fmu_program.py"))
+        try:
+            self._extract()
+            self.process = FirmwareProcess(
+                name,
+                [sys.executable, "-I", "-u", program, "{port0}", json.dumps(asked)],
+                folder,
+                program=interface.file.name,
+                sockets=[Port("tcp", 0, 0)],
+            )
+        except BaseException:
+            self._remove()
+            raise
+
+    def _extract(self) -> None:
+        self._remove()
+        try:
+            with ZipFile(self.interface.file) as archive:
+                archive.extractall(self._extracted)
+        except OSError as error:
+            raise FirmwareError(f"{self.interface.file} cannot be extracted: {error}") from error
+
+    def _remove(self) -> None:
+        shutil.rmtree(self._extracted, ignore_errors=True)
+
+    def exchange(self, inputs: Sequence[float]) -> tuple[float, ...]:
+        """Give the inputs of a step and return the outputs at its end; the first time those of the start.
+
+        Raises:
+            FirmwareError: It has ended, does not answer, or answers that it cannot.
+        """
+        peer = self._connected() if self._peer is None else self._peer
+        try:
+            peer.sendall(self._inputs.pack(*inputs))
+            octets = peer.recv(self._outputs.size, socket.MSG_WAITALL)
+        except BlockingIOError:
+            raise self.process.error("does not answer") from None
+        except OSError:
+            octets = b""
+        if len(octets) == self._outputs.size:
+            length, *outputs = self._outputs.unpack(octets)
+            if not length:
+                return tuple(outputs)
+        if not octets:
+            raise self.process.parting("has closed its connection")
+        with suppress(OSError):  # it is gone after its words
+            while more := peer.recv(4096):
+                octets += more
+        words = self.process.last_words()
+        raise FirmwareError(
+            f"{self.process.name}: {self.process.program} {octets[4:].decode(errors='replace')}"
+            f"{f'; its last words: {words}' if words else ''}"
+        )
+
+    def _connected(self) -> socket.socket:
+        listener = self.process.sockets[0]
+        listener.settimeout(1.0)
+        for _ in range(_START_LIMIT_S):
+            try:
+                self._peer, _ = listener.accept()
+            except TimeoutError:
+                if self.process.ending():
+                    break
+            else:
+                self._peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                limit = struct.pack("ll", _ANSWER_LIMIT_S, 0)
+                self._peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, limit)
+                return self._peer
+        raise self.process.error("is not loaded within a minute")
+
+    def close(self) -> None:
+        """Let it free what it has, end it, and remove its extracted files."""
+        if self._peer is not None:
+            with suppress(OSError):
+                self._peer.shutdown(socket.SHUT_RDWR)
+            self._peer.close()
+        self.process.end()
+        self._remove()
