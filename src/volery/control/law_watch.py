@@ -1,6 +1,6 @@
 """What ends a law in flight: an error that grows, and a vehicle that does not follow its commands.
 
-``vehicles.control_monitors.FollowMonitor`` notices set-points without any effect in every program. Here, the
+``vehicles.monitors.FollowMonitor`` notices set-points without any effect in every program. Here, the
 effect of a law's commands is measured, also of those that are given by sticks. Both watches look at each
 sample of a flight and return what is wrong in words. What the vehicle does then is decided in ``flight``: it
 holds, then lands by the autopilot.

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from volery.base.errors import VoleryError
 from volery.vehicles import Drone
-from volery.vehicles.observed_vehicle import ON_LINK_LOSS
+from volery.vehicles.vehicle_connection import ON_LINK_LOSS
 
 BY_STICKS = f"{ON_LINK_LOSS}, by RC override"
 """Beginning of each line in the record."""

@@ -10,7 +10,7 @@ from volery.base.errors import VoleryError
 from volery.trace.events import Text
 from volery.vehicles import Vehicle
 from volery.vehicles.driver import LinkLossAction
-from volery.vehicles.observed_vehicle import ON_LINK_LOSS
+from volery.vehicles.vehicle_connection import ON_LINK_LOSS
 
 WARNING, INFO = 4, 6
 """Severities of syslog."""

@@ -18,7 +18,7 @@ from volery.run.event_log import LEVELS, LogOptions
 from volery.run.vehicle_arrays import INDEX, vehicle_arrays
 from volery.trace.events import Collision, Event, Failure, Milestone, Text
 from volery.vehicles.driver import LINK_LOSS_ACTIONS, LinkLossAction
-from volery.vehicles.observed_vehicle import ON_LINK_LOSS
+from volery.vehicles.vehicle_connection import ON_LINK_LOSS
 
 if TYPE_CHECKING:
     from volery.requirements.record import RunRecord

@@ -8,13 +8,14 @@ from volery.base.errors import OutOfBounds, Refused, UsageError
 from volery.base.frames import LocalFrame
 from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S, from_seconds
-from volery.vehicles.bounded_vehicle import path_timeout, travel_timeout
-from volery.vehicles.control_monitors import Demand
 from volery.vehicles.driver import Acceleration, AttitudeTarget, Capability, ManualControl
-from volery.vehicles.executor import LANDING, NO_GOAL, RESTARTS, STREAM, TO_SAFETY, TRAVEL, TURN, Goal
+from volery.vehicles.executor import RESTARTS
 from volery.vehicles.limits import height_violation
+from volery.vehicles.monitors import NO_GOAL, Demand, Goal
+from volery.vehicles.operations import LANDING, STREAM, TO_SAFETY, TRAVEL, TURN
 from volery.vehicles.telemetry import Velocity
 from volery.vehicles.vehicle import Vehicle
+from volery.vehicles.vehicle_bounds import path_timeout, travel_timeout
 
 VELOCITY_LASTS_S = 3.0
 SETPOINT_LASTS_S = 1.0
@@ -39,7 +40,7 @@ class Drone(Vehicle):
     @property
     def flying(self) -> bool:
         """Whether it is off the ground, as judged by the autopilot."""
-        return self._poll().flying
+        return self._connection.poll().flying
 
     @property
     def landed(self) -> bool:
@@ -61,12 +62,12 @@ class Drone(Vehicle):
             OutOfBounds: limits or fence forbid it; raised before anything is sent.
             Refused: it flies already, or the autopilot refuses.
         """
-        self._connect(Capability.TAKEOFF)
+        self._connection.require(Capability.TAKEOFF)
         self._check_numbers(f"takeoff({height!r})", height, example="takeoff(10), in metres above home")
         asked = f"take off to {height:g} m"
         if height <= 0:
             raise UsageError(f"{self.name}: {asked}: give metres above home, above 0")
-        telemetry = self._driver.telemetry
+        telemetry = self._telemetry
         if self.flying and not telemetry.armed:  # it has landed, and will report so
             self._executor.wait(lambda: not telemetry.flying, LANDED_STATE_WITHIN)
         if telemetry.flying:
@@ -79,7 +80,9 @@ class Drone(Vehicle):
             if telemetry.home is None:
                 self.wait_ready()
             ground = self.position
-            self._check_path(asked, ground, Position(ground.latitude, ground.longitude, AboveHome(height)))
+            self._bounds.check_path(
+                asked, ground, Position(ground.latitude, ground.longitude, AboveHome(height))
+            )
         here = telemetry.position
         within = travel_timeout(0.0, height)
 
@@ -88,9 +91,9 @@ class Drone(Vehicle):
             if home is None:
                 return NO_GOAL
             over = here or home
-            return self._goal(Position(over.latitude, over.longitude, AboveHome(height)))
+            return self._bounds.goal(Position(over.latitude, over.longitude, AboveHome(height)))
 
-        self._operate(
+        self._operations.run(
             "takeoff",
             asked,
             lambda: self._driver.takeoff(height, within),
@@ -111,7 +114,7 @@ class Drone(Vehicle):
                 sent), or were violated on the way.
             Refused: it is on the ground, or the autopilot refuses.
         """
-        self._connect(Capability.GOTO)
+        self._connection.require(Capability.GOTO)
         if not isinstance(goal, Position):
             raise UsageError(
                 f"{self.name}: goto({goal!r}): a goal is a Position, as in "
@@ -121,15 +124,15 @@ class Drone(Vehicle):
         if speed is not None:
             self._check_speed(asked, speed)
         self._check_flying(asked)
-        self._check_altitude(goal)
-        path = self._check_path(asked, self._poll().position, goal)
+        self._bounds.check_altitude(goal)
+        path = self._bounds.check_path(asked, self._connection.poll().position, goal)
         within = path_timeout(path, speed)
-        self._operate(
+        self._operations.run(
             "goto",
             asked,
             lambda: self._driver.goto(goal, speed, within),
             policy=TRAVEL,
-            goal=lambda: self._goal(goal),
+            goal=lambda: self._bounds.goal(goal),
         )
 
     def return_home(self) -> None:
@@ -140,12 +143,14 @@ class Drone(Vehicle):
         Raises:
             OutOfBounds: the straight path violates the fence, unless the drone is out of bounds already.
         """
-        self._connect(Capability.RETURN_HOME)
+        self._connection.require(Capability.RETURN_HOME)
         home, here = self.home, self.position
-        if not self._is_out_of_bounds():
-            self._check_path("return home", here, Position(home.latitude, home.longitude, here.altitude))
-        within = self._timeout_to(home) + self._landing_timeout(RETURN_CLIMB)
-        self._operate(
+        if not self._bounds.is_out_of_bounds():
+            self._bounds.check_path(
+                "return home", here, Position(home.latitude, home.longitude, here.altitude)
+            )
+        within = self._bounds.timeout_to(home) + self._bounds.landing_timeout(RETURN_CLIMB)
+        self._operations.run(
             "return_home",
             "return home",
             lambda: self._driver.return_home(within),
@@ -178,7 +183,7 @@ class Drone(Vehicle):
         Raises:
             OutOfBounds: it would leave limits or fence within *lasting* seconds.
         """
-        self._connect(Capability.VELOCITY)
+        self._connection.require(Capability.VELOCITY)
         velocity = Velocity(north, east, up)
         call = f"set_velocity({north!r}, {east!r}, {up!r}, {yaw_rate!r}, lasting={lasting!r})"
         self._check_numbers(call, north, east, up, yaw_rate, lasting, example="set_velocity(north=2.0)")
@@ -186,13 +191,13 @@ class Drone(Vehicle):
         asked = f"fly at {north:g} m/s north, {east:g} m/s east, {up:g} m/s up"
         self._check_flying(asked)
         self._check_way(asked, velocity, lasting)
-        self._operate(
+        self._operations.run(
             "set_velocity",
             asked,
             lambda: self._driver.velocity(velocity, yaw_rate, from_seconds(lasting)),
             policy=STREAM,
         )
-        self._note_streamed(Demand(velocity=velocity, yaw_rate=yaw_rate), lasting)
+        self._operations.note_streamed(Demand(velocity=velocity, yaw_rate=yaw_rate), lasting)
 
     def set_acceleration(
         self,
@@ -215,7 +220,7 @@ class Drone(Vehicle):
         Raises:
             OutOfBounds: it would leave limits or fence within *lasting* seconds.
         """
-        self._connect(Capability.ACCELERATION)
+        self._connection.require(Capability.ACCELERATION)
         call = f"set_acceleration({north!r}, {east!r}, {up!r}, {yaw_rate!r}, lasting={lasting!r})"
         self._check_numbers(call, north, east, up, yaw_rate, lasting, example="set_acceleration(north=1.0)")
         self._check_lasting(call, lasting)
@@ -224,13 +229,13 @@ class Drone(Vehicle):
         seen, half = self.velocity, 0.5 * lasting
         mean = Velocity(seen.north + north * half, seen.east + east * half, seen.up + up * half)
         self._check_way(asked, mean, lasting)
-        self._operate(
+        self._operations.run(
             "set_acceleration",
             asked,
             lambda: self._driver.acceleration(Acceleration(north, east, up), yaw_rate, from_seconds(lasting)),
             policy=STREAM,
         )
-        self._note_streamed(Demand(acceleration=(north, east, up), yaw_rate=yaw_rate), lasting)
+        self._operations.note_streamed(Demand(acceleration=(north, east, up), yaw_rate=yaw_rate), lasting)
 
     def set_attitude(
         self,
@@ -258,7 +263,7 @@ class Drone(Vehicle):
         Raises:
             UsageError: a value is out of range or not a number.
         """
-        self._connect(Capability.ATTITUDE)
+        self._connection.require(Capability.ATTITUDE)
         call = f"set_attitude({roll!r}, {pitch!r}, {heading!r}, thrust={thrust!r}, yaw_rate={yaw_rate!r})"
         turn = nan if heading is None else heading
         given = (roll, pitch, thrust, yaw_rate, 0.0 if heading is None else heading)
@@ -271,7 +276,7 @@ class Drone(Vehicle):
         asked = f"fly at a roll of {roll:g} and a pitch of {pitch:g} degrees"
         self._check_flying(asked)
         target = AttitudeTarget(roll, pitch, thrust, turn % 360.0, yaw_rate)
-        self._operate(
+        self._operations.run(
             "set_attitude",
             asked,
             lambda: self._driver.attitude(target, from_seconds(lasting)),
@@ -279,7 +284,7 @@ class Drone(Vehicle):
         )
         turning = yaw_rate if heading is None else nan
         asked_for = Demand(roll=roll, pitch=pitch, heading=target.heading, yaw_rate=turning, thrust=thrust)
-        self._note_streamed(asked_for, lasting)
+        self._operations.note_streamed(asked_for, lasting)
 
     def set_heading(self, degrees: float) -> None:
         """Turn in place.
@@ -287,11 +292,11 @@ class Drone(Vehicle):
         Args:
             degrees: heading, clockwise from north.
         """
-        self._connect(Capability.HEADING)
+        self._connection.require(Capability.HEADING)
         self._check_numbers(f"set_heading({degrees!r})", degrees, example="set_heading(90)")
         asked = f"turn to {degrees:g} degrees"
         self._check_flying(asked)
-        self._operate("set_heading", asked, lambda: self._driver.heading(degrees % 360.0), policy=TURN)
+        self._operations.run("set_heading", asked, lambda: self._driver.heading(degrees % 360.0), policy=TURN)
 
     def hold(self) -> None:
         """Stop and hold the position, also outside the bounds; on the ground nothing is sent.
@@ -316,10 +321,10 @@ class Drone(Vehicle):
 
     def _land(self, operation: str, at: Position | None = None) -> None:
         """Land as *operation*: what a program asked for and its end are recorded under different names."""
-        self._connect(Capability.LAND)
-        here = at or self._driver.telemetry.position
-        within = self._landing_timeout(0.0)
-        self._operate(
+        self._connection.require(Capability.LAND)
+        here = at or self._telemetry.position
+        within = self._bounds.landing_timeout(0.0)
+        self._operations.run(
             operation,
             "land",
             lambda: self._driver.land(within),
@@ -343,14 +348,14 @@ class Drone(Vehicle):
         Raises:
             UsageError: a value is out of range or not a number.
         """
-        self._connect(Capability.MANUAL_CONTROL)
+        self._connection.require(Capability.MANUAL_CONTROL)
         call = f"manual_control({pitch!r}, {roll!r}, {throttle!r}, {yaw!r})"
         self._check_numbers(call, pitch, roll, throttle, yaw, example="manual_control(0, 0, 0.5, 0)")
         control = ManualControl(pitch, roll, throttle, yaw)
         for name, value, low in zip(ManualControl._fields, control, (-1.0, -1.0, 0.0, -1.0), strict=True):
             if not low <= value <= 1.0:
                 raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from {low:g} to 1")
-        self._set_manual_control(control)
+        self._operations.set_manual_control(control)
 
     def stabilize(self) -> None:
         """Enter the mode in which manual control commands attitude and throttle; on the ground also arm.
@@ -358,8 +363,8 @@ class Drone(Vehicle):
         It needs no position and returns when the mode is seen. Raises ``Refused`` unless ``manual_control``
         was called within the last second.
         """
-        self._connect(Capability.STABILIZE)
-        self._enter_manual_mode("stabilize", "fly stabilized", self._driver.stabilize)
+        self._connection.require(Capability.STABILIZE)
+        self._operations.enter_manual_mode("stabilize", "fly stabilized", self._driver.stabilize)
 
     def altitude_hold(self) -> None:
         """Enter the mode in which manual control commands attitude and climb rate; on the ground also arm.
@@ -368,8 +373,8 @@ class Drone(Vehicle):
         position and returns when the mode is seen. Raises ``Refused`` unless ``manual_control`` was called
         within the last second.
         """
-        self._connect(Capability.ALTITUDE_HOLD)
-        self._enter_manual_mode("altitude_hold", "hold the altitude", self._driver.altitude_hold)
+        self._connection.require(Capability.ALTITUDE_HOLD)
+        self._operations.enter_manual_mode("altitude_hold", "hold the altitude", self._driver.altitude_hold)
 
     def hand_over(self) -> None:
         """Stop all set-points and manual control at once, and let the pilot's transmitter fly the drone.
@@ -377,8 +382,10 @@ class Drone(Vehicle):
         The operation of another task is aborted. Where the autopilot follows a computer, it changes to a mode
         that the transmitter commands. Raises ``Refused`` if the autopilot receives no transmitter.
         """
-        self._connect(Capability.MANUAL_CONTROL)
-        self._operate("hand_over", "hand over to the transmitter", self._driver.hand_over, policy=LANDING)
+        self._connection.require(Capability.MANUAL_CONTROL)
+        self._operations.run(
+            "hand_over", "hand over to the transmitter", self._driver.hand_over, policy=LANDING
+        )
 
     # -- end of a program
 
@@ -388,10 +395,10 @@ class Drone(Vehicle):
         A drone that the autopilot is already landing is monitored until it is disarmed. A lost link is given
         half a minute to return; then ``LinkLost`` is raised.
         """
-        telemetry = self._poll()
+        telemetry = self._connection.poll()
         if telemetry.last_message_ns < 0:
             return "never sent a message"
-        self._wait_for_link()
+        self._connection.wait_for_link()
         self._executor.wait_for_interrupted()
         if self._acts_by_itself():
             with self.kernel:
@@ -417,7 +424,7 @@ class Drone(Vehicle):
 
         A landing by this program would overrule it: it would land where it is instead of at home.
         """
-        telemetry = self._driver.telemetry
+        telemetry = self._telemetry
         if (
             not telemetry.flying
             or not telemetry.failsafe
@@ -431,11 +438,13 @@ class Drone(Vehicle):
         )
 
     def _watch_landing(self) -> str:
-        telemetry, mode = self._driver.telemetry, self._driver.telemetry.mode
+        telemetry, mode = self._telemetry, self._telemetry.mode
         landing_modes = self._driver.landing_modes
         if mode in landing_modes:
             home = telemetry.home
-            within = self._landing_timeout(RETURN_CLIMB) + (self._timeout_to(home) if home else 0)
+            within = self._bounds.landing_timeout(RETURN_CLIMB) + (
+                self._bounds.timeout_to(home) if home else 0
+            )
             self._executor.wait(lambda: not telemetry.armed or telemetry.mode not in landing_modes, within)
             if not telemetry.armed:
                 return f"landed by itself in {mode}"
@@ -445,29 +454,23 @@ class Drone(Vehicle):
 
     def _check_flying(self, asked: str) -> None:
         """Raise the bounds error found since the last call, or ``Refused`` on the ground."""
-        if self._bounds_error is not None:
-            self._raise_bounds_error()
-        if not self._driver.telemetry.flying:
+        self._operations.raise_bounds_error()
+        if not self._telemetry.flying:
             raise Refused(self.name, asked, "it is on the ground; takeoff(height) first")
 
     def _check_lasting(self, call: str, lasting: float) -> None:
         if lasting <= 0.0:
             raise UsageError(f"{self.name}: {call}: lasting is in seconds, above 0")
 
-    def _note_streamed(self, demand: Demand, lasting: float) -> None:
-        """Note what is streamed from now on: a drone that does nothing of it does not follow."""
-        with self.kernel.guard:
-            self._flight_monitor.following.ask(demand, from_seconds(lasting))
-
     def _check_way(self, asked: str, velocity: Velocity, lasting: float) -> None:
         """Raise ``OutOfBounds`` if *lasting* seconds at *velocity* lead out of the bounds."""
         try:
-            self._check_path(asked, self.position, self._position_after(velocity, lasting))
+            self._bounds.check_path(asked, self.position, self._position_after(velocity, lasting))
         except OutOfBounds as error:
-            if self._monitor is None:
+            if not self._operations.monitoring:
                 raise
             # the set-point before would go on over the bound
-            raise OutOfBounds(self.name, asked, f"{error.what}; {self._react(error)}") from None
+            raise OutOfBounds(self.name, asked, f"{error.what}; {self._operations.react(error)}") from None
 
     def _position_after(self, velocity: Velocity, seconds: float) -> Position:
         """Return the position after *seconds* at *velocity*; the ground stops a descent."""
@@ -475,5 +478,5 @@ class Drone(Vehicle):
         frame = LocalFrame(here.latitude, here.longitude, here.altitude.metres)
         moved = velocity.east * seconds, velocity.north * seconds, velocity.up * seconds
         latitude, longitude, _ = frame.from_enu(moved)
-        height = self._driver.telemetry.above_home + velocity.up * seconds
+        height = self._telemetry.above_home + velocity.up * seconds
         return Position(latitude, longitude, AboveHome(max(height, self.limits.lowest)))

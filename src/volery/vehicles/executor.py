@@ -1,7 +1,5 @@
 """The executor of steps, one for all drivers: time-outs, refusals, restarts, takeover and link loss.
 
-The policies under which operations are allowed, and the goals that they are measured against, are here, too.
-
 A driver states what to send and how telemetry shows that it is done; everything that can go wrong meanwhile
 is handled here, once. MAVLink does not say who changed a mode. A mode that this program did not command is
 therefore taken as the choice of a pilot, another station or a failsafe, and is never overridden in flight.
@@ -10,19 +8,13 @@ therefore taken as the choice of a pilot, another station or a failsafe, and is 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from math import hypot, nan
-from typing import NamedTuple
 
 from volery.base.errors import Failsafe, LinkLost, NotArrived, Overridden, Refused, VehicleError
-from volery.base.frames import LocalFrame
-from volery.base.position import Position
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.api import Action, Handle, Kernel
 from volery.kernel.waiting import sleep
 from volery.trace.events import Text
 from volery.vehicles.driver import Driver, Step
-from volery.vehicles.limits import FLOOR
 from volery.vehicles.telemetry import REFRESHED_AFTER, STALE_AFTER, Telemetry, describe_state, failsafe_cause
 from volery.vehicles.vehicle_clock import COMPARED_AFTER
 
@@ -49,77 +41,6 @@ Check = Callable[[str, Ns], VehicleError | None]
 
 def _no_check(_operation: str, _now: Ns) -> None:
     """Accept everything."""
-
-
-class Goal(NamedTuple):
-    """Where an operation should end; NaN for a coordinate that does not matter."""
-
-    latitude: float
-    longitude: float
-    amsl: float
-
-
-NO_GOAL = Goal(nan, nan, nan)
-
-
-@dataclass(frozen=True, kw_only=True)
-class OperationPolicy:
-    """When a kind of operation is allowed and what is monitored meanwhile.
-
-    Args:
-        needs_control: refuse the operation while another station has control.
-        recorded: record every one; otherwise only failures (set-points come in loops).
-        bounded: monitor limits and fence.
-        goes_on: keep monitoring after the call has returned, until the next operation.
-        travels: refuse the operation below the battery reserve.
-        manual: keep the age of the last manual control.
-        to_safety: brings the vehicle to safety, so it aborts the operation of another task.
-        on_track: the vehicle must stay near the straight path to its goal.
-        streams: set-points are streamed, which the vehicle must follow.
-        holds_place: the vehicle stays where it is.
-        unmonitored: nothing ends it: it lands, stops the motors or gives the vehicle to a pilot.
-        ignored: bounds that are not monitored.
-    """
-
-    needs_control: bool = True
-    recorded: bool = True
-    bounded: bool = False
-    goes_on: bool = False
-    travels: bool = False
-    manual: bool = False
-    to_safety: bool = False
-    on_track: bool = False
-    streams: bool = False
-    holds_place: bool = False
-    unmonitored: bool = False
-    ignored: frozenset[str] = frozenset()
-
-
-PLAIN = OperationPolicy(manual=True)
-UNGUARDED = OperationPolicy(manual=True, needs_control=False)
-TURN = OperationPolicy(bounded=True)
-TRAVEL = OperationPolicy(bounded=True, travels=True, on_track=True)
-FLY_MISSION = OperationPolicy(bounded=True, travels=True, ignored=frozenset({FLOOR}))
-STREAM = OperationPolicy(bounded=True, travels=True, goes_on=True, streams=True, recorded=False)
-MANUAL = OperationPolicy(bounded=True, goes_on=True, manual=True)
-IN_PLACE = OperationPolicy(holds_place=True)
-"""Of a drone between two calls."""
-TO_SAFETY = OperationPolicy(to_safety=True)
-LANDING = OperationPolicy(to_safety=True, unmonitored=True)
-LAST_RESORT = OperationPolicy(to_safety=True, needs_control=False, unmonitored=True)
-
-
-def distance_to(goal: Goal, position: Position | None) -> tuple[float, float]:
-    """Return horizontal and vertical distance (m) of *position* (AMSL) from *goal*; NaN where unknown."""
-    if position is None:
-        return nan, nan
-    height = position.altitude.metres
-    vertical = abs(height - goal.amsl)
-    if goal.latitude != goal.latitude:
-        return nan, vertical
-    frame = LocalFrame(goal.latitude, goal.longitude, height)
-    east, north, _ = frame.to_enu(position.latitude, position.longitude, height)
-    return hypot(east, north), vertical
 
 
 class StepExecutor:

@@ -3,7 +3,7 @@
 All checks use the local frame about home: metres east and north of home, and metres above home. ``Bounds``
 computes that frame and the areas of the fence once for one home, because every command and every position
 report is checked. A goal is checked along the straight path before anything is sent; while the vehicle
-travels, ``BoundsMonitor`` checks each reported position.
+travels, ``monitors.BoundsMonitor`` checks each reported position.
 """
 
 from __future__ import annotations
@@ -17,11 +17,9 @@ from typing import NamedTuple, TypeGuard
 from shapely import LineString, Point, Polygon, get_parts, make_valid, prepare
 from shapely.geometry.base import BaseGeometry
 
-from volery.base.errors import OutOfBounds, PositionLost, UsageError, VehicleError
+from volery.base.errors import UsageError
 from volery.base.frames import LocalFrame, Vector
 from volery.base.position import AMSL, AboveHome, Altitude, Position
-from volery.base.time import Ns, S, to_seconds
-from volery.vehicles.telemetry import UNFIXED, Telemetry
 
 Corner = tuple[float, float]
 """Latitude and longitude in degrees."""
@@ -36,8 +34,6 @@ DEFAULT_RESERVE = 0.15
 """Battery reserve where none is stated and the battery is measured: PX4's threshold for a low battery."""
 DEFAULT_LANDING_RESERVE = 0.02
 """Share left at touch-down: two steps of a battery that is reported in whole percent."""
-POSITION_LOST_FOR: Ns = 10 * S
-"""Autopilots with a failsafe for it act sooner: PX4 1.14 after 6.5 s, ArduCopter 4.5 after 8 s."""
 FLOOR = "floor"
 """Key of the floor's violation. Operations that end on the ground ignore it."""
 
@@ -388,67 +384,3 @@ def _along(path: Path, share: float) -> Vector:
         return path[int(share)]
     (x0, y0, z0), (x1, y1, z1) = path
     return x0 + share * (x1 - x0), y0 + share * (y1 - y0), z0 + share * (z1 - z0)
-
-
-class BoundsMonitor:
-    """Checks bounds and position during one operation.
-
-    A bound that is violated at the start is ignored until it has been met once, so that a vehicle outside its
-    bounds can come back.
-
-    Args:
-        telemetry: telemetry of the vehicle.
-        bounds: bounds about home, or ``None`` without a home.
-        ignored: names of bounds that are never checked.
-        needs_position: whether a lost position ends the operation.
-    """
-
-    def __init__(
-        self,
-        telemetry: Telemetry,
-        bounds: Bounds | None,
-        ignored: frozenset[str] = frozenset(),
-        *,
-        needs_position: bool = False,
-    ) -> None:
-        self._telemetry = telemetry
-        self._needs_position = needs_position
-        self._bounds = bounds
-        self._ignored = ignored
-        self._checked: Position | None = None
-        here = telemetry.position
-        self._violated_at_start = (
-            set(bounds.violations(here)) if bounds is not None and here is not None else set()
-        )
-
-    def check(self, operation: str, now: Ns) -> VehicleError | None:
-        """Return the error that must end the operation, or ``None``.
-
-        Args:
-            operation: what the vehicle is doing, for the error message.
-            now: the present time, ns.
-        """
-        return self._check_bounds(operation) or self._check_position(operation, now)
-
-    def _check_position(self, operation: str, now: Ns) -> PositionLost | None:
-        seen = self._telemetry
-        if not self._needs_position or not seen.flying or seen.stale:
-            return None
-        lost = seen.position_lost_for(now)
-        if lost < POSITION_LOST_FOR:
-            return None
-        why = f"its GPS reports {seen.fix}" if seen.fix in UNFIXED else "none is reported"
-        why = why if seen.estimate_valid else "its estimator reports none"
-        what = f"it has had no position for {to_seconds(lost):.0f} s ({why}); land() needs none"
-        return PositionLost(seen.name, operation, what)
-
-    def _check_bounds(self, operation: str) -> OutOfBounds | None:
-        here = self._telemetry.position
-        if self._bounds is None or here is None or here is self._checked:
-            return None
-        self._checked = here
-        violations = self._bounds.violations(here)
-        self._violated_at_start.intersection_update(violations)
-        ignored = self._violated_at_start | self._ignored
-        found = [text for name, text in violations.items() if name not in ignored]
-        return OutOfBounds(self._telemetry.name, operation, " and ".join(found)) if found else None

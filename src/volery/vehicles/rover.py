@@ -7,7 +7,8 @@ from math import nan
 from volery.base.errors import UsageError
 from volery.base.position import AboveHome, Position
 from volery.vehicles.driver import Capability, ManualControl
-from volery.vehicles.executor import TO_SAFETY, TRAVEL, Goal
+from volery.vehicles.monitors import Goal
+from volery.vehicles.operations import TO_SAFETY, TRAVEL
 from volery.vehicles.vehicle import Vehicle
 
 
@@ -28,7 +29,7 @@ class Rover(Vehicle):
         An armed rover counts as driving; in a pilot's mode, such as MANUAL, what follows would be refused.
         """
         super().arm()
-        self._executor.set_commanded(self._driver.telemetry.mode)
+        self._executor.set_commanded(self._telemetry.mode)
 
     def drive(self, goal: Position | tuple[float, float], speed: float | None = None) -> None:
         """Wait until ready, arm if disarmed, drive straight to *goal* and stop there.
@@ -41,7 +42,7 @@ class Rover(Vehicle):
             OutOfBounds: limits or fence forbid the goal or the straight path (raised before anything is
                 sent), or were violated on the way.
         """
-        self._connect(Capability.GOTO)
+        self._connection.require(Capability.GOTO)
         try:
             latitude, longitude = (goal.latitude, goal.longitude) if isinstance(goal, Position) else goal
         except (TypeError, ValueError):
@@ -53,13 +54,13 @@ class Rover(Vehicle):
         asked = f"drive to {latitude:.7f}, {longitude:.7f}"
         if speed is not None:
             self._check_speed(asked, speed)
-        if self._driver.telemetry.position is None:
+        if self._telemetry.position is None:
             self.wait_ready()
         here = self.position
         level = Position(here.latitude, here.longitude, self.home.altitude)
-        self._check_path(asked, level, there)
-        within = self._timeout_to(there, speed or 1.0)
-        self._operate(
+        self._bounds.check_path(asked, level, there)
+        within = self._bounds.timeout_to(there, speed or 1.0)
+        self._operations.run(
             "drive",
             asked,
             lambda: self._driver.goto(there, speed, within),
@@ -75,13 +76,13 @@ class Rover(Vehicle):
         Raises:
             OutOfBounds: the straight path violates the fence, unless the rover is out of bounds already.
         """
-        self._connect(Capability.RETURN_HOME)
+        self._connection.require(Capability.RETURN_HOME)
         home, here = self.home, self.position
         level = Position(here.latitude, here.longitude, home.altitude)
-        if not self._is_out_of_bounds():
-            self._check_path("return home", level, home)
-        within = self._timeout_to(home, 1.0)
-        self._operate(
+        if not self._bounds.is_out_of_bounds():
+            self._bounds.check_path("return home", level, home)
+        within = self._bounds.timeout_to(home, 1.0)
+        self._operations.run(
             "return_home",
             "return home",
             lambda: self._driver.return_home(within),
@@ -94,8 +95,8 @@ class Rover(Vehicle):
 
         Raises ``Refused`` unless ``manual_control`` was called within the last second.
         """
-        self._connect(Capability.MANUAL_CONTROL)
-        self._enter_manual_mode("manual", "drive by hand", self._driver.manual)
+        self._connection.require(Capability.MANUAL_CONTROL)
+        self._operations.enter_manual_mode("manual", "drive by hand", self._driver.manual)
 
     def manual_control(self, steering: float, throttle: float) -> None:
         """Set the manual control until the next call.
@@ -107,23 +108,23 @@ class Rover(Vehicle):
         Raises:
             UsageError: a value is out of range or not a number.
         """
-        self._connect(Capability.MANUAL_CONTROL)
+        self._connection.require(Capability.MANUAL_CONTROL)
         call = f"manual_control({steering!r}, {throttle!r})"
         self._check_numbers(call, steering, throttle, example="manual_control(0.0, 0.5)")
         for name, value in (("steering", steering), ("throttle", throttle)):
             if not -1.0 <= value <= 1.0:
                 raise UsageError(f"{self.name}: manual control: {name}={value:g}; it goes from -1 to 1")
-        self._set_manual_control(ManualControl(roll=steering, throttle=throttle))
+        self._operations.set_manual_control(ManualControl(roll=steering, throttle=throttle))
 
     def come_to_rest(self) -> str:
         """Stop and disarm, unless another station has control; return what was done.
 
         A lost link is given half a minute to return; then ``LinkLost`` is raised.
         """
-        telemetry = self._poll()
+        telemetry = self._connection.poll()
         if telemetry.last_message_ns < 0:
             return "never sent a message"
-        self._wait_for_link()
+        self._connection.wait_for_link()
         self._executor.wait_for_interrupted()
         with self.kernel:
             self._driver.stop()

@@ -28,70 +28,44 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from math import isfinite
+from math import isnan
 
-from volery.base.errors import (
-    CapabilityError,
-    ControlLost,
-    LowBattery,
-    ObstacleNear,
-    OffTrack,
-    OutOfBounds,
-    PositionLost,
-    Refused,
-    ThrustSaturated,
-    UsageError,
-    VehicleError,
-    VoleryError,
-)
-from volery.base.position import Position
-from volery.base.time import Ns, S, from_seconds, to_seconds
+from volery.base.errors import CapabilityError, PositionLost, Refused, UsageError, choices, did_you_mean
+from volery.base.position import AMSL, AboveHome, Position
+from volery.base.time import MS, Ns, S, from_seconds
 from volery.kernel.api import Handle, Kernel
-from volery.kernel.task import ExecutionContext, Task
-from volery.trace.events import Operation
-from volery.vehicles.battery_monitor import low_battery
-from volery.vehicles.driver import Capability, Driver, ManualControl, MissionItem, Step
-from volery.vehicles.escalation import Escalation, Reaction, escalate
-from volery.vehicles.executor import (
-    FLY_MISSION,
-    IN_PLACE,
-    LANDING,
-    LAST_RESORT,
-    LINK_TIMEOUT,
-    MANUAL,
-    MONITOR_PERIOD,
-    NO_GOAL,
-    PLAIN,
-    TO_SAFETY,
-    UNGUARDED,
-    Check,
-    Goal,
-    OperationPolicy,
-    distance_to,
-)
-from volery.vehicles.flight_monitor import FlightMonitor
-from volery.vehicles.limits import Fence, Limits
-from volery.vehicles.observed_vehicle import LINK_RETURN_S
-from volery.vehicles.serviced_vehicle import ServicedVehicle
+from volery.kernel.waiting import sleep
+from volery.vehicles.driver import LINK_LOSS_ACTIONS, Capability, Driver, LinkLossAction, MissionItem
+from volery.vehicles.escalation import Escalation
+from volery.vehicles.executor import LINK_TIMEOUT, StepExecutor
+from volery.vehicles.external_pose import ExternalPose
+from volery.vehicles.limits import Fence, Limits, is_number
+from volery.vehicles.onboard_files import OnboardFiles
+from volery.vehicles.onboard_logs import OnboardLogs
+from volery.vehicles.onboard_plan import OnboardPlan
+from volery.vehicles.operations import FLY_MISSION, LAST_RESORT, TO_SAFETY, UNGUARDED, Operations, Truth
+from volery.vehicles.parameters import Parameters
+from volery.vehicles.payload import Payload
+from volery.vehicles.pose_watch import PoseWatch
+from volery.vehicles.rtcm import messages_of
+from volery.vehicles.services import Services
 from volery.vehicles.session import Session
+from volery.vehicles.telemetry import Attitude, Battery, StatusText, Telemetry, Velocity, describe_state
+from volery.vehicles.telemetry_feed import Quantity, TelemetryHistory, read_quantity, subscribe
+from volery.vehicles.vehicle_bounds import VehicleBounds
+from volery.vehicles.vehicle_connection import FIRST_MESSAGE_WITHIN_S, VehicleConnection
 
 READY_WITHIN_S = 120.0
 MISSION_WITHIN_S = 3600.0
-BATTERY_MEASURED_WITHIN_S = 10.0
-RANGES_WITHIN_S = 10.0
-
-MANUAL_CONTROL_FRESH: Ns = S
-"""Manual flight does not begin with an older sample of manual control."""
-
-_MONITORED = (OutOfBounds, OffTrack, ObstacleNear, LowBattery, PositionLost, ThrustSaturated)
-"""Errors of monitors to which the vehicle reacts."""
-
-Truth = Callable[[], Position]
-"""The true position (AMSL) of a simulated vehicle: for recorded errors, never for the operations."""
+REBOOT_WITHIN_S = 60.0
+SILENT_WITHIN: Ns = 5 * S
+"""Time for which the old firmware may still send after it has accepted a restart."""
+KNOWN_WITHIN: Ns = 15 * S
+DOWN_AFTER: Ns = 1500 * MS
+"""Silence that shows the restart: heartbeats arrive each second."""
 
 
-class Vehicle(ServicedVehicle, Session, ABC):
+class Vehicle(Session, ABC):
     """A vehicle behind a driver. Use ``Drone`` or ``Rover``.
 
     Limits and fence are checked before anything is sent and at each position report while the vehicle
@@ -109,6 +83,8 @@ class Vehicle(ServicedVehicle, Session, ABC):
         link_timeout: time without a message after which the link counts as lost, ns.
     """
 
+    kind = ""
+
     def __init__(
         self,
         kernel: Kernel,
@@ -120,18 +96,165 @@ class Vehicle(ServicedVehicle, Session, ABC):
         truth: Truth | None = None,
         link_timeout: Ns = LINK_TIMEOUT,
     ) -> None:
-        super().__init__(kernel, name, driver, link_timeout, limits or Limits(), fence)
-        Session.__init__(self, self.disconnect)
-        self.escalation = Escalation()
-        self._flight_monitor = FlightMonitor(kernel, driver.telemetry)
-        self._truth = truth
-        self._in_progress: tuple[Task | None, str] | None = None
-        self._monitor: Handle | None = None  # monitors what goes on after a call has returned
-        self._looked_at: Ns = -MONITOR_PERIOD  # last check of a stream
-        self._straying: VehicleError | None = None  # the same, while the vehicle is being held for it
-        self._bounds_error: VehicleError | None = None  # found by the monitor; raised by the next call
-        self._manual_control_at: Ns | None = None
+        super().__init__(self.disconnect)
+        self.name = name
+        self.kernel = kernel
+        self._driver = driver
+        self._telemetry = driver.telemetry
+        self._executor = StepExecutor(kernel, driver, link_timeout)
+        self._connection = VehicleConnection(kernel, name, self.kind, driver, self._executor)
+        self._bounds = VehicleBounds(self._connection, driver.telemetry, limits or Limits(), fence)
+        self._operations = Operations(kernel, name, driver, self._executor, self._bounds, truth)
+        self._pose_watch = PoseWatch(driver.telemetry)
         self._mission: Sequence[MissionItem] = ()  # on board, if this program has uploaded it
+
+    def __repr__(self) -> str:
+        seen = self._telemetry
+        if seen.last_message_ns < 0:
+            return f"<{type(self).__name__} {self.name}: no message yet>"
+        height = f", {seen.above_home:.1f} m above home" if seen.position is not None else ""
+        left = "" if isnan(seen.battery.remaining) else f", battery {seen.battery.remaining:.0%}"
+        return f"<{type(self).__name__} {self.name}: {describe_state(seen)}{height}{left}>"
+
+    # -- what it must keep, and how it reacts
+
+    @property
+    def limits(self) -> Limits:
+        """Limits about home; may be replaced."""
+        return self._bounds.limits
+
+    @limits.setter
+    def limits(self, limits: Limits) -> None:
+        self._bounds.limits = limits
+
+    @property
+    def fence(self) -> Fence | None:
+        """Geofence; may be replaced."""
+        return self._bounds.fence
+
+    @fence.setter
+    def fence(self, fence: Fence | None) -> None:
+        self._bounds.fence = fence
+
+    @property
+    def escalation(self) -> Escalation:
+        """Reactions to what a monitor has found; may be replaced."""
+        return self._operations.escalation
+
+    @escalation.setter
+    def escalation(self, escalation: Escalation) -> None:
+        self._operations.escalation = escalation
+
+    # -- state, as last reported by the autopilot
+
+    @property
+    def position(self) -> Position:
+        """Position (AMSL) estimated by the autopilot. Raises ``VehicleError`` before the first estimate."""
+        return self._connection.known("its position", self._connection.poll().position)
+
+    @property
+    def home(self) -> Position:
+        """Home position (AMSL), where it would return to. ArduPilot sets it anew each time it arms."""
+        return self._connection.known("its home", self._connection.poll().home)
+
+    @property
+    def altitude(self) -> AboveHome:
+        """Altitude above home. Raises ``VehicleError`` before the first estimate."""
+        telemetry = self._connection.poll()
+        self._connection.known("its altitude", telemetry.position)
+        return AboveHome(telemetry.above_home)
+
+    @property
+    def velocity(self) -> Velocity:
+        """Velocity over ground: north, east, up in m/s; NaN before the first estimate."""
+        return self._connection.poll().velocity
+
+    @property
+    def attitude(self) -> Attitude:
+        """Roll, pitch and heading in degrees; NaN for values that the autopilot does not send.
+
+        Over MAVROS the first call subscribes to ``imu/data`` and waits for it.
+        """
+        self._connection.poll()
+        self._driver.request_attitude()
+        return self._connection.poll().attitude
+
+    @property
+    def battery(self) -> Battery:
+        """Remaining share 0..1, volts, amperes; NaN for values that are not measured."""
+        return self._connection.poll().battery
+
+    @property
+    def mode(self) -> str:
+        """Flight mode by the autopilot's own name."""
+        return self._connection.poll().mode
+
+    @property
+    def status(self) -> str:
+        """System status in MAVLink's terms: standby, active, critical ..."""
+        return self._connection.poll().status
+
+    @property
+    def armed(self) -> bool:
+        """Whether the motors may turn."""
+        return self._connection.poll().armed
+
+    @property
+    def ready(self) -> bool:
+        """Whether the vehicle could arm now and go to a position."""
+        return self._connection.poll().ready
+
+    @property
+    def stale(self) -> bool:
+        """Whether the state below may be old: position, mode and all else are those before a silence.
+
+        It is True from 2 s after the last message until 2 s after messages have returned, because a link that
+        stalls delivers late what it has held back.
+        """
+        return self._connection.poll().stale
+
+    @property
+    def texts(self) -> list[StatusText]:
+        """Last status texts of the autopilot, oldest first."""
+        return list(self._connection.poll().texts)
+
+    @property
+    def telemetry(self) -> Telemetry:
+        """All telemetry, for code that passes it on."""
+        return self._connection.poll()
+
+    @property
+    def capabilities(self) -> frozenset[Capability]:
+        """Operations that the vehicle supports; empty before the first message."""
+        with self.kernel:
+            return self._driver.capabilities
+
+    @property
+    def on_link_loss(self) -> str:
+        """Reaction to a lost link in one line, from the parameters; empty until these are known."""
+        self._connection.poll()
+        with self.kernel:
+            return self._driver.on_link_loss()
+
+    # -- link
+
+    def wait_connected(self, within: float = FIRST_MESSAGE_WITHIN_S) -> None:
+        """Wait for the first message of the autopilot, *within* s. See ``VehicleConnection``."""
+        self._connection.wait_connected(within)
+
+    def wait_for_version(self) -> None:
+        """Wait until the autopilot has stated its version, for 3 s at most: not all do."""
+        self._connection.wait_for_version()
+
+    def wait_located(self, within: float, tell: Callable[[str], object] | None = None) -> None:
+        """Wait *within* s until the autopilot reports position and home. See ``VehicleConnection``."""
+        self._connection.wait_located(within, tell)
+
+    def disconnect(self) -> None:
+        """Stop all communication. The vehicle goes on with its present operation."""
+        with self.kernel.guard:
+            self._operations.end()
+            self._connection.close()
 
     # -- operations common to all vehicles
 
@@ -141,19 +264,19 @@ class Vehicle(ServicedVehicle, Session, ABC):
         Args:
             within: longest time to wait, s.
         """
-        self._connect()
-        self._operate("wait_ready", "be ready", lambda: self._driver.ready(from_seconds(within)))
-        self._home_bounds()
+        self._connection.require()
+        self._operations.run("wait_ready", "be ready", lambda: self._driver.ready(from_seconds(within)))
+        self._bounds.home_bounds()
 
     def arm(self) -> None:
         """Arm in the present mode. ``Refused`` quotes the arming checks that failed."""
-        self._connect()
-        self._operate("arm", "arm", self._driver.arm)
+        self._connection.require()
+        self._operations.run("arm", "arm", self._driver.arm)
 
     def disarm(self) -> None:
         """Disarm. In the air the autopilot refuses."""
-        self._connect()
-        self._operate("disarm", "disarm", lambda: self._driver.disarm(False), policy=UNGUARDED)
+        self._connection.require()
+        self._operations.run("disarm", "disarm", lambda: self._driver.disarm(False), policy=UNGUARDED)
 
     def kill(self, *, sure: bool) -> None:
         """Stop the motors now; a vehicle in the air falls.
@@ -165,16 +288,16 @@ class Vehicle(ServicedVehicle, Session, ABC):
         """
         if sure is not True:
             raise UsageError(f"{self.name}: kill() stops the motors in the air; if that is meant: sure=True")
-        self._connect()
-        self._operate("kill", "stop the motors", lambda: self._driver.disarm(True), policy=LAST_RESORT)
+        self._connection.require()
+        self._operations.run("kill", "stop the motors", lambda: self._driver.disarm(True), policy=LAST_RESORT)
 
     def hold(self) -> None:
         """Stop and hold the position, also outside the bounds.
 
         The operation of another task is aborted. Raises ``Overridden`` if another station has control.
         """
-        self._connect(Capability.HOLD)
-        self._operate("hold", "hold", self._driver.hold, policy=TO_SAFETY)
+        self._connection.require(Capability.HOLD)
+        self._operations.run("hold", "hold", self._driver.hold, policy=TO_SAFETY)
 
     def resume(self) -> None:
         """Take the vehicle back after a failsafe that an interrupted stream of this program has caused.
@@ -182,8 +305,8 @@ class Vehicle(ServicedVehicle, Session, ABC):
         The vehicle then holds its position. Raises ``Failsafe`` or ``Overridden`` for any other failsafe, or
         if another station has control.
         """
-        self._connect(Capability.HOLD)
-        self._operate("resume", "take the vehicle back", self._driver.hold, policy=TO_SAFETY)
+        self._connection.require(Capability.HOLD)
+        self._operations.run("resume", "take the vehicle back", self._driver.hold, policy=TO_SAFETY)
 
     def upload_mission(self, mission: Sequence[MissionItem]) -> None:
         """Replace the mission on board. Each leg is checked against limits and fence as a straight path.
@@ -195,13 +318,13 @@ class Vehicle(ServicedVehicle, Session, ABC):
             UsageError: it is empty.
             OutOfBounds: a leg leaves limits or fence.
         """
-        self._connect(Capability.MISSION)
+        self._connection.require(Capability.MISSION)
         items = list(mission)
         if not items:
             raise UsageError(f"{self.name}: an empty mission; give at least one item")
-        self._check_mission(items)
+        self._bounds.check_mission(items)
         asked = f"upload a mission of {len(items)} items"
-        self._operate("upload_mission", asked, lambda: self._driver.upload(items), policy=UNGUARDED)
+        self._operations.run("upload_mission", asked, lambda: self._driver.upload(items), policy=UNGUARDED)
         self._mission = tuple(items)
 
     def start_mission(self, within: float = MISSION_WITHIN_S) -> None:
@@ -213,10 +336,10 @@ class Vehicle(ServicedVehicle, Session, ABC):
         Args:
             within: longest duration of the mission, s.
         """
-        self._connect(Capability.MISSION)
-        if self._mission and self._driver.telemetry.position is not None:
-            self._check_mission(self._mission)
-        self._operate(
+        self._connection.require(Capability.MISSION)
+        if self._mission and self._telemetry.position is not None:
+            self._bounds.check_mission(self._mission)
+        self._operations.run(
             "start_mission",
             "carry out the mission on board",
             lambda: self._driver.start_mission(from_seconds(within)),
@@ -229,293 +352,260 @@ class Vehicle(ServicedVehicle, Session, ABC):
 
     def take_over(self) -> None:
         """Take the present mode as commanded by this program: the station that commanded it is gone."""
-        self._executor.set_commanded(self._driver.telemetry.mode)
+        self._executor.set_commanded(self._telemetry.mode)
 
-    def disconnect(self) -> None:
-        """Stop all communication. The vehicle goes on with its present operation."""
-        with self.kernel.guard:
-            for handle in (self._link_loss_query, self._monitor):
-                if handle is not None:
-                    handle.cancel()
-            self._driver.close()
+    def _services(self, what: str) -> Services:
+        """Return the services; raise ``CapabilityError`` where there is no *what*."""
+        self._connection.require()
+        services = self._driver.services
+        if services is None:
+            raise CapabilityError(
+                f"{self.name}: {what}: not with this driver; "
+                "an ArduPilot or PX4 offers it, over MAVLink or MAVROS"
+            )
+        return services
 
-    # -- carrying out an operation
+    # -- nouns
 
-    def _operate(
-        self,
-        operation: str,
-        asked: str,
-        plan: Callable[[], Sequence[Step]],
-        *,
-        policy: OperationPolicy = PLAIN,
-        goal: Callable[[], Goal] = lambda: NO_GOAL,
-        restarts: int = 0,
-    ) -> None:
-        """Carry out an operation under *policy* and record it.
+    @property
+    def parameters(self) -> Parameters:
+        """Parameters of the autopilot: ``get``, ``set``, ``all``, ``load``, ``save``, ``compare``."""
+        services = self._services("parameters")
+        return Parameters(self.name, services, self._telemetry.system)
+
+    @property
+    def plan(self) -> OnboardPlan:
+        """Mission, geofence and rally points on board: ``upload``, ``download``, ``clear``."""
+        return OnboardPlan(self._telemetry, self._services("a plan on board"), self._bounds.check_leg)
+
+    @property
+    def logs(self) -> OnboardLogs:
+        """Logs on board: ``list``, ``download``."""
+        return OnboardLogs(self._telemetry, self._services("logs on board"))
+
+    @property
+    def files(self) -> OnboardFiles:
+        """Files on board: ``list``, ``download``."""
+        files = self._services("files on board").files
+        if files is None:
+            raise CapabilityError(
+                f"{self.name}: files on board: not with this driver; "
+                "an ArduPilot or PX4 offers them over MAVLink"
+            )
+        return OnboardFiles(self.name, files)
+
+    @property
+    def payload(self) -> Payload:
+        """Gimbal, camera, servos and gripper."""
+        return Payload(self.name, self._services("a payload"))
+
+    # -- single requests
+
+    def set_link_loss_action(self, action: LinkLossAction) -> dict[str, tuple[float, float]]:
+        """Let the autopilot return, land or hover by itself when it hears nothing of this program any more.
+
+        Its parameters are set, and read back; they stay so until they are set again.
 
         Args:
-            operation: name of the method.
-            asked: the operation in words, for errors and the record.
-            plan: returns the driver's steps.
-            policy: when it is allowed and what is monitored.
-            goal: where the vehicle should be at the end.
-            restarts: how often to start again after the sequence was undone before lift-off.
+            action: ``return``, ``land`` or ``hover``.
+
+        Returns:
+            The parameters that were changed, with their values before and now.
+
+        Raises:
+            UsageError: there is no such action.
+            CapabilityError: this autopilot cannot be asked for it, or does not listen to this program.
+            Refused: the autopilot keeps another value.
         """
-        with self.kernel.joined():
-            self._operate_as_task(operation, asked, plan, policy, goal, restarts)
+        if action not in LINK_LOSS_ACTIONS:
+            hint = did_you_mean(action, LINK_LOSS_ACTIONS)
+            raise UsageError(f"no action {action!r}{hint}; there is {choices(LINK_LOSS_ACTIONS)}")
+        self._connection.require()
+        self._driver.link_loss_settings(action)  # refuses at once what it cannot
+        # what was requested at the connection is known first: names depend on the version, and a late answer
+        # would be taken for one to a request of here
+        self._executor.wait(lambda: bool(self._driver.on_link_loss()), KNOWN_WITHIN)
+        changed: dict[str, tuple[float, float]] = {}
+        for name, change in self._driver.link_loss_settings(action).items():
+            before = self.parameters.get(name)
+            now = change(before)
+            if now != before:
+                self.parameters.set(name, now)
+                changed[name] = (before, now)
+        return changed
 
-    def _operate_as_task(
-        self,
-        operation: str,
-        asked: str,
-        plan: Callable[[], Sequence[Step]],
-        policy: OperationPolicy,
-        goal: Callable[[], Goal],
-        restarts: int,
-    ) -> None:
-        with self.kernel as kernel:
-            task = kernel.current()
-            if self._in_progress is not None:
-                self._abort_other(*self._in_progress, task, operation, policy)
-            mine = self._in_progress = (task, operation)
-            start = kernel.now()
-        outcome, said = "ok", ""
-        try:
-            if policy.to_safety:
-                self._bounds_error = None
-            if self._bounds_error is not None:
-                self._raise_bounds_error()
-            self._executor.check_link(asked, policy.to_safety)
-            if policy.needs_control and not (policy.to_safety and self._executor.take_back()):
-                self._executor.check_ours(asked)
-            self._check_measured(asked, policy)
-            self._execute(asked, plan, policy, goal, restarts)
-        except BaseException as error:
-            outcome, said = type(error).__name__, str(error)
-            raise
-        finally:
-            with self.kernel.guard:
-                if self._in_progress is mine:
-                    self._in_progress = None
-                if policy.recorded or outcome != "ok":
-                    self._record(start, operation, asked, (outcome, said), goal())
-                if self._monitor is None and not policy.unmonitored and self._straying is None:
-                    self._monitor_in_place(asked)
+    def reboot(self, within: float = REBOOT_WITHIN_S) -> None:
+        """Restart the autopilot and return when it sends again. ``Refused`` while it is armed.
 
-    def _check_reserve(self, asked: str) -> None:
-        """Raise ``LowBattery`` if the battery is below its reserve."""
-        telemetry = self._driver.telemetry
-        if self.limits.battery_reserve and not self._executor.wait(
-            lambda: isfinite(telemetry.battery.remaining), from_seconds(BATTERY_MEASURED_WITHIN_S)
-        ):
-            raise CapabilityError(
-                f"{self.name}: {asked}: its autopilot does not report how full the battery is, so a reserve "
-                f"of {self.limits.reserve:.0%} cannot be kept; set its monitor up, or state no reserve"
-            )
-        battery = self._flight_monitor.battery
-        battery.note(self.kernel.now())
-        shortage = battery.shortage(self.limits)
-        if shortage:
-            raise low_battery(self.name, asked, shortage)
-
-    def _abort_other(
-        self, holder: Task | None, running: str, task: Task | None, operation: str, policy: OperationPolicy
-    ) -> None:
-        """Abort what *holder* has *running*, or raise ``UsageError`` unless *operation* brings to safety."""
-        if self._straying is not None and not policy.to_safety:
-            raise type(self._straying)(self.name, operation, self._straying.what)
-        if holder is not None and (holder.done or holder.scope.cancelled):
-            return
-        if not policy.to_safety:
-            name = holder.name if holder is not None else "a framework callback"
-            raise UsageError(f"{self.name}: {operation}: {name} has {running} under way")
-        by = f" by {task.name}" if task is not None else ""
-        self._executor.abort_for(f"{operation}(){by}")
-
-    def _check_measured(self, asked: str, policy: OperationPolicy) -> None:
-        """Check what must be measured for the operation: the battery, and distances of obstacles."""
-        if policy.travels:
-            self._check_reserve(asked)
-        if policy.bounded and self.limits.clearance:
-            self._check_range_sensors(asked)
-
-    def _check_range_sensors(self, asked: str) -> None:
-        """Raise ``CapabilityError`` if no range sensor reports, so that no clearance can be kept."""
-        seen = self._driver.telemetry
-        if seen.obstacles_ns >= 0:
-            return
-        self._driver.request_obstacles()
-        if not self._executor.wait(lambda: seen.obstacles_ns >= 0, from_seconds(RANGES_WITHIN_S)):
-            raise CapabilityError(
-                f"{self.name}: {asked}: its autopilot reports no distances of obstacles, so a clearance of "
-                f"{self.limits.clearance:g} m cannot be kept; set its range sensors up, or state no clearance"
-            )
-
-    def _execute(
-        self,
-        asked: str,
-        plan: Callable[[], Sequence[Step]],
-        policy: OperationPolicy,
-        goal: Callable[[], Goal],
-        restarts: int,
-    ) -> None:
-        if not policy.manual:
-            self._manual_control_at = None
-        if self._monitor is not None:
-            self._monitor.cancel()
-            self._monitor = None
-        if policy.unmonitored:
-            self._executor.execute(asked, plan, restarts=restarts)
-            return
-        bounds = self._home_bounds() if policy.bounded else self._usable_bounds()
-        check = self._flight_monitor.check_of(policy, self.limits, bounds, goal)
-        upset = None if policy.to_safety else self._flight_monitor.upset.check(asked, self.kernel.now())
-        if upset is not None:
-            raise upset
-        try:
-            if policy.goes_on:
-                self._look(asked, check)
-            self._executor.execute(asked, plan, restarts=restarts, check=check)
-        except _MONITORED as error:
-            raise type(error)(self.name, asked, f"{error.what}; {self._react(error)}") from None
-        if policy.goes_on:
-            self._keep_monitoring(asked, check)
-
-    def _record(self, start: Ns, operation: str, asked: str, end: tuple[str, str], goal: Goal) -> None:
-        estimate = distance_to(goal, self._driver.telemetry.position)
-        truth = distance_to(goal, self._truth() if self._truth is not None else None)
-        self.kernel.record(
-            Operation(start, self.kernel.now(), self.name, operation, asked, *end, *estimate, *truth)
-        )
-
-    def _react(self, error: VehicleError) -> str:
-        """React to what a monitor has found, if no other station has control; return what was done."""
-        telemetry = self._driver.telemetry
-        if not self._executor.is_ours():
-            return f"it is left to the station or pilot who has it in {telemetry.mode}"
-        capabilities = self._driver.capabilities
-        if not telemetry.flying and Capability.LAND in capabilities:
-            try:
-                if telemetry.armed:
-                    self._executor.execute("land", lambda: self._driver.land(from_seconds(LINK_RETURN_S)))
-            except VoleryError as problem:
-                return f"it could not be disarmed: {problem}"
-            return "it is on the ground"
-
-        def perform(reaction: Reaction) -> None:
-            self._executor.execute(reaction.value, lambda: self._reaction_steps(reaction))
-
-        return escalate(self.escalation, error, capabilities, perform)
-
-    def _reaction_steps(self, reaction: Reaction) -> Sequence[Step]:
-        return self.escalation.steps(reaction, self._driver, self._landing_timeout(0.0))
-
-    # -- monitoring after the call has returned: in place, velocities and manual flight
-
-    def _monitor_in_place(self, asked: str) -> None:
-        """Monitor a drone that flies between two calls."""
-        seen = self._driver.telemetry
-        if not (seen.flying and seen.armed) or seen.kind != "drone":
-            return
-        check = self._flight_monitor.check_of(IN_PLACE, self.limits, self._usable_bounds())
-        self._keep_monitoring(f"after {asked}", check)
-
-    def _look(self, asked: str, check: Check) -> None:
-        """Check at a call, if that is due: in a quick loop each call replaces the monitor before it looks."""
-        now = self.kernel.now()
-        if now - self._looked_at < MONITOR_PERIOD:
-            return
-        self._looked_at = now
-        error = check(asked, now)
-        if error is not None:
-            raise error
-
-    def _keep_monitoring(self, asked: str, check: Check) -> None:
-        """Check each ``MONITOR_PERIOD``, unless telemetry arrives in a node's loop that may not run."""
-        if self._driver.cycle is not None:
-            return
-
-        waited = False
-
-        def look() -> None:
-            nonlocal waited
-            if not waited or self._in_progress is not None:  # never twice at one time
-                waited = True
-                return
-            error = check(asked, self.kernel.now())
-            if error is None:
-                return
-            handle.cancel()
-            if not self._executor.is_ours():
-                return
-            if isinstance(error, ControlLost):
-                self._bounds_error = error
-                return
-            first = self.escalation.after(error, self._driver.capabilities)[0]
-            what = f"{error.what}; it was commanded to {first.value}"
-            found = self._bounds_error = type(error)(self.name, asked, what)
-            name = f"safety of {self.name}"
-            self.kernel.spawn(lambda: self._react_in_place(found), name, ExecutionContext(name))
-
+        Args:
+            within: longest time to wait for it, s.
+        """
+        services = self._services("a restart")
+        seen = self._telemetry
+        if seen.armed:
+            raise Refused(self.name, "restart", "it is armed; land and disarm first")
+        services.command("restart", "MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN", 1)
+        accepted = self.kernel.now()
         with self.kernel.guard:
-            self._monitor = handle = self.kernel.every(MONITOR_PERIOD, look)
+            seen.forget()
+        with self.kernel.joined():
+            while self.kernel.now() - max(seen.last_message_ns, accepted) < DOWN_AFTER:
+                if self.kernel.now() - accepted > SILENT_WITHIN:
+                    return  # it restarts faster than its heartbeats show
+                self._driver.poll()
+                sleep(self.kernel, 100 * MS)
+            silent = seen.last_message_ns
+            back = self._executor.wait(lambda: seen.last_message_ns > silent, from_seconds(within))
+        if not back:
+            raise Refused(self.name, "restart", f"it has not sent anything for {within:g} s since")
 
-    def _react_in_place(self, error: VehicleError) -> None:
-        self._straying = error
+    def send_corrections(self, data: bytes) -> None:
+        """Pass RTCM corrections of an RTK base or an NTRIP caster to the GPS receiver. It never waits.
 
-        def perform(reaction: Reaction) -> None:
-            self._operate(
-                reaction.name.lower(),
-                f"{reaction.value}: it has strayed" if reaction is Reaction.HOLD else reaction.value,
-                lambda: self._reaction_steps(reaction),
-                policy=TO_SAFETY if reaction is Reaction.HOLD else LANDING,
-            )
-            if isinstance(error, PositionLost) and reaction is Reaction.HOLD:
-                raise error  # it drifts all the same
+        Args:
+            data: one or more whole RTCM 3 messages, as they arrive.
 
-        unread = self._bounds_error is not None  # else a call has raised it meanwhile
-        try:
-            escalate(self.escalation, error, self._driver.capabilities, perform)  # each is recorded
-        finally:
-            self._straying = None
-            if unread:
-                self._bounds_error = error
-            self._monitor_in_place("a reaction")
+        Raises:
+            UsageError: this is no RTCM 3, or a message is longer than a receiver takes.
+        """
+        services = self._services("RTK corrections")
+        for message in messages_of(data):
+            services.send_corrections(message)
 
-    def _raise_bounds_error(self) -> None:
-        error, self._bounds_error = self._bounds_error, None
-        if error is not None:
-            raise error
+    def send_landing_target(self, forward: float, right: float, down: float) -> None:
+        """Send where the autopilot is to land (MAVLink's LANDING_TARGET), for each picture of a landing.
 
-    # -- manual control
+        An ArduPilot with PLND_ENABLED 1 and PLND_TYPE 1 lands on it in ``land`` and ``return_home``, which
+        another task calls meanwhile; from 2 s without a target on it descends where it is. Others take none.
+        The first call reads the two parameters and waits for them.
 
-    def _set_manual_control(self, control: ManualControl) -> None:
-        with self.kernel as kernel:
-            self._raise_bounds_error()
-            self._executor.check_ours("manual control")
-            self._manual_control_at = kernel.now()
-            self._driver.manual_control(control)
+        Args:
+            forward: distance of the target along the body's forward axis, m; the axes tilt with the body.
+            right: distance along its right axis, m.
+            down: distance along its down axis, m, above 0.
 
-    def _enter_manual_mode(
-        self, operation: str, asked: str, change_mode: Callable[[], Sequence[Step]]
-    ) -> None:
-        """Change to a mode that is flown by manual control; on the ground also arm."""
-        at = self._manual_control_at
-        if at is None or self.kernel.now() - at > MANUAL_CONTROL_FRESH:
-            age = f"the last is {to_seconds(self.kernel.now() - at):.1f} s old" if at is not None else ""
-            raise Refused(
-                self.name,
-                asked,
-                f"no manual control is newer than 1 s ({age or 'there is none'}); call manual_control(...) "
-                f"just before, and again whenever the operator moves the sticks",
-            )
+        Raises:
+            UsageError: a value is not a number, or the target is not below.
+            CapabilityError: the autopilot takes no landing target.
+            Refused: its parameters have it ignored.
+        """
+        call = f"send_landing_target({forward!r}, {right!r}, {down!r})"
+        self._check_numbers(call, forward, right, down, example="send_landing_target(0.4, -0.2, 5.0)")
+        if down <= 0.0:
+            raise UsageError(f"{self.name}: {call}: the target is not below; give metres downwards, above 0")
+        self._services("a landing target").send_landing_target((forward, right, down))
 
-        def plan() -> Sequence[Step]:
-            steps = tuple(change_mode())
-            if self._driver.telemetry.flying:
-                return steps
-            mode = next((step.enters for step in reversed(steps) if step.enters), "")
-            advice = "an autopilot arms with the throttle down: manual_control() with a lower one first"
-            return (*steps, *(replace(step, mode=mode, advice=advice) for step in self._driver.arm()))
+    # -- flight without satellites
 
-        self._operate(operation, asked, plan, policy=MANUAL)
+    def send_external_pose(self, pose: ExternalPose) -> None:
+        """Tell the autopilot where the vehicle is, as by scan matching or motion capture. It never waits.
+
+        The autopilot fuses it if its parameters say so (ArduPilot: VISO_TYPE, EK3_SRC1_POSXY; PX4:
+        EKF2_EV_CTRL), weighs it by its covariance, and says when it misses it. Send it 10 to 30 times a
+        second, and nothing while the place is not known.
+
+        Args:
+            pose: about the origin of the estimator: ``set_origin`` sets it where there are no satellites.
+
+        Raises:
+            UsageError: a value is missing, is not a number or has another unit.
+            CapabilityError: this autopilot takes none.
+            PositionLost: in flight the poses do not move as the vehicle's own velocity says: they have
+                frozen, jumped without ``resets``, or run away. This one is not sent; without poses the
+                autopilot does what it does when it has lost its position.
+        """
+        services = self._services("an external position estimate")
+        if not isinstance(pose, ExternalPose):
+            raise UsageError(f"{self.name}: send_external_pose({pose!r}): give an ExternalPose(...)")
+        pose.check(self.name)
+        problem = self._pose_watch.problem(pose, self.kernel.now())
+        if problem:
+            raise PositionLost(self.name, "external poses", f"{problem}; they are not sent")
+        services.send_external_pose(pose)
+        self._telemetry.external_pose_ns = self.kernel.now()
+
+    def set_origin(self, place: Position) -> None:
+        """Set the origin of the estimator's local frame, and return when the autopilot states it.
+
+        With it a vehicle without satellites has positions in degrees, and home. It need not be the true
+        place. An origin that satellites have set stays.
+
+        Args:
+            place: the origin, with an altitude AMSL: that of the ground where the autopilot was started.
+
+        Raises:
+            NotArrived: the autopilot states no origin, or another one.
+        """
+        services = self._services("set the origin of its estimator")
+        if not isinstance(place, Position) or not isinstance(place.altitude, AMSL):
+            raise UsageError(f"{self.name}: set_origin({place}): give a Position with an altitude AMSL(...)")
+        services.set_origin(place)
+
+    # -- telemetry in time
+
+    def subscribe(
+        self, quantity: Quantity, callback: Callable[[object], object], period: float = 0.1
+    ) -> Handle:
+        """Call *callback* with a quantity each time it has changed, until the handle is cancelled.
+
+        The callback runs beside the program and must not block: it sets a flag or appends to a list; it does
+        not command the vehicle.
+
+        Args:
+            quantity: ``position``, ``altitude``, ``velocity``, ``attitude``, ``battery``, ``mode``,
+                ``armed``, ``home``, ``satellites``, ``fix`` or ``text``.
+            callback: takes the new value.
+            period: shortest time between two calls, s.
+        """
+        self._connection.require()
+        if quantity == "attitude":
+            self._driver.request_attitude()
+        return subscribe(self.kernel, self._telemetry, quantity, callback, _period(period))
+
+    def record_telemetry(
+        self, *quantities: Quantity, period: float = 0.1, keep: float = 600.0
+    ) -> TelemetryHistory:
+        """Keep quantities over time from now on, and return the growing history.
+
+        Args:
+            quantities: as in ``subscribe``; ``text`` is not recorded.
+            period: time between two samples, s.
+            keep: age up to which samples are kept, s.
+        """
+        self._connection.require()
+        telemetry = self._telemetry
+        if not quantities:
+            raise UsageError(f"{self.name}: record_telemetry(): state a quantity, such as 'position'")
+        for quantity in quantities:
+            read_quantity(telemetry, quantity)
+            if quantity == "attitude":
+                self._driver.request_attitude()
+        return TelemetryHistory(self.kernel, telemetry, quantities, _period(period), _period(keep))
+
+    # -- arguments: programs and consoles have no type checker
+
+    def _check_numbers(self, call: str, *numbers: object, example: str) -> None:
+        """Raise ``UsageError`` unless all are finite numbers.
+
+        Args:
+            call: the call as it was written.
+            numbers: the arguments that are numbers.
+            example: a valid call.
+        """
+        for number in numbers:
+            if not is_number(number):
+                raise UsageError(
+                    f"{self.name}: {call}: {number!r} is not a finite number; write it as in {example}"
+                )
+
+    def _check_speed(self, asked: str, speed: float) -> None:
+        self._connection.require(Capability.SPEED)
+        self._check_numbers(f"{asked}: speed={speed!r}", speed, example="speed=5.0, in m/s")
+        if speed <= 0:
+            raise UsageError(f"{self.name}: {asked}: a speed of {speed:g} m/s; give one above 0")
+
+
+def _period(seconds: float) -> Ns:
+    if not seconds > 0:
+        raise UsageError(f"{seconds!r} s; give seconds above 0")
+    return from_seconds(seconds)

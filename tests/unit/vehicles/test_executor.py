@@ -3,40 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import FrozenInstanceError, dataclass, field, fields
+from dataclasses import dataclass, field
 from itertools import pairwise
-from math import isnan, nan
 from typing import Any
 
 import pytest
 
 from volery.base.errors import Failsafe, LinkLost, NotArrived, Overridden, Refused, VehicleError
-from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.trace.events import Event, Text
 from volery.vehicles.driver import Repeat, Step
-from volery.vehicles.executor import (
-    FLY_MISSION,
-    IN_PLACE,
-    LANDING,
-    LAST_RESORT,
-    MANUAL,
-    MONITOR_PERIOD,
-    NO_GOAL,
-    PLAIN,
-    STREAM,
-    TO_SAFETY,
-    TRAVEL,
-    TURN,
-    UNGUARDED,
-    Goal,
-    OperationPolicy,
-    StepExecutor,
-    distance_to,
-)
-from volery.vehicles.limits import FLOOR
+from volery.vehicles.executor import MONITOR_PERIOD, StepExecutor
 from volery.vehicles.telemetry import Answer, StatusText, Telemetry
 
 
@@ -546,40 +525,6 @@ def test_a_wait_ends_with_its_condition_or_its_time(rig: Rig, spun: bool) -> Non
     assert found == [True, False]
 
 
-# -- policies
-
-POLICIES = {
-    "plain": (PLAIN, {"needs_control", "recorded", "manual"}),
-    "unguarded": (UNGUARDED, {"recorded", "manual"}),
-    "turn": (TURN, {"needs_control", "recorded", "bounded"}),
-    "travel": (TRAVEL, {"needs_control", "recorded", "bounded", "travels", "on_track"}),
-    "fly a mission": (FLY_MISSION, {"needs_control", "recorded", "bounded", "travels", "ignored"}),
-    "set-points": (STREAM, {"needs_control", "bounded", "travels", "goes_on", "streams"}),
-    "sticks": (MANUAL, {"needs_control", "recorded", "bounded", "goes_on", "manual"}),
-    "between two calls": (IN_PLACE, {"needs_control", "recorded", "holds_place"}),
-    "to safety": (TO_SAFETY, {"needs_control", "recorded", "to_safety"}),
-    "landing": (LANDING, {"needs_control", "recorded", "to_safety", "unmonitored"}),
-    "last resort": (LAST_RESORT, {"recorded", "to_safety", "unmonitored"}),
-}
-"""What holds of each kind of operation: by these words a vehicle is refused, aborted or left alone."""
-
-
-@pytest.mark.parametrize("kind", POLICIES)
-def test_what_holds_of_a_kind_of_operation(kind: str) -> None:
-    policy, holds = POLICIES[kind]
-    assert {one.name for one in fields(policy) if getattr(policy, one.name)} == holds
-
-
-def test_a_mission_lands_so_only_the_floor_is_left_out() -> None:
-    assert frozenset({FLOOR}) == FLY_MISSION.ignored
-
-
-def test_policies_do_not_change() -> None:
-    with pytest.raises(FrozenInstanceError):
-        TRAVEL.bounded = False  # type: ignore[misc]
-    assert OperationPolicy() == OperationPolicy(needs_control=True, recorded=True)
-
-
 # -- what is said
 
 
@@ -601,18 +546,6 @@ def test_another_clock_is_reported_once(rig: Rig) -> None:
         "its clock runs 2.0 times as fast as this com"
     ]
     assert [event.severity for event in rig.events if isinstance(event, Text)] == [5]  # a notice
-
-
-def test_distances_to_a_goal(rig: Rig) -> None:
-    goal = Goal(46.0, -103.0, 900.0)
-    east, up = distance_to(goal, Position(46.0, -103.001, AMSL(890.0)))
-    assert east == pytest.approx(77.5, abs=0.3)
-    assert up == 10.0
-    assert all(isnan(one) for one in distance_to(goal, None))
-    along, up = distance_to(Goal(nan, nan, 900.0), Position(46.0, -103.0, AMSL(905.0)))
-    assert isnan(along)
-    assert up == 5.0
-    assert all(isnan(one) for one in distance_to(NO_GOAL, Position(46.0, -103.0, AMSL(1.0))))
 
 
 def test_a_refusal_without_a_text_is_the_error_half_a_second_later(rig: Rig) -> None:

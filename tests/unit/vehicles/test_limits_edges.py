@@ -18,7 +18,6 @@ from volery.vehicles.limits import (
     DEFAULT_LANDING_RESERVE,
     DEFAULT_RESERVE,
     Bounds,
-    BoundsMonitor,
     Fence,
     Limits,
     Zone,
@@ -26,6 +25,7 @@ from volery.vehicles.limits import (
     is_number,
     states_amsl,
 )
+from volery.vehicles.monitors import BoundsMonitor
 from volery.vehicles.telemetry import Telemetry
 
 HOME = Position(46.0825, -103.8995, AMSL(900.0))

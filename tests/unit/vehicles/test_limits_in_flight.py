@@ -12,7 +12,8 @@ from volery.base.frames import LocalFrame, Vector
 from volery.base.position import AMSL, AboveHome, Position
 from volery.kernel.virtual import VirtualKernel
 from volery.vehicles import Fence, Limits, Zone
-from volery.vehicles.limits import FLOOR, Bounds, BoundsMonitor
+from volery.vehicles.limits import FLOOR, Bounds
+from volery.vehicles.monitors import BoundsMonitor
 from volery.vehicles.telemetry import Telemetry
 
 HOME = Position(46.0825, -103.8995, AMSL(900.0))

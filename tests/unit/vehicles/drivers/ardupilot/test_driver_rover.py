@@ -113,7 +113,7 @@ def test_bounds_on_the_ground(bench: Make) -> None:
 
 def test_a_rover_is_no_drone(bench: Make) -> None:
     at = bench(Rover)
-    at.vehicle.__class__ = Drone
+    at.vehicle.__class__, at.vehicle._connection.kind = Drone, Drone.kind
     with pytest.raises(CapabilityError, match="craft_1 is a rover, not a drone"):
         at.fly(lambda drone: drone.takeoff(10))
 

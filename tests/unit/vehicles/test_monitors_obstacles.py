@@ -17,7 +17,7 @@ from volery.kernel.waiting import sleep
 from volery.trace.events import Operation
 from volery.vehicles import Limits
 from volery.vehicles.drivers.mavlink.obstacle_decoder import ObstacleDecoder
-from volery.vehicles.obstacle_monitor import ObstacleMonitor
+from volery.vehicles.monitors import ObstacleMonitor
 from volery.vehicles.telemetry import Attitude, Telemetry, Velocity
 
 Make = Callable[..., Any]

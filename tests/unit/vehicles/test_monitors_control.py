@@ -15,8 +15,8 @@ from volery.testing.stage import SimulatedStage
 from volery.trace.events import Operation, Text
 from volery.vehicles import Drone, Limits, Velocity
 from volery.vehicles.address import parse
-from volery.vehicles.control_monitors import Demand, FollowMonitor, ThrustMonitor, TrackMonitor
 from volery.vehicles.limits import Bounds
+from volery.vehicles.monitors import Demand, FollowMonitor, ThrustMonitor, TrackMonitor
 from volery.vehicles.telemetry import Attitude, Telemetry
 
 HOME = Position(46.0825, -103.8995, AMSL(900.0))
@@ -191,7 +191,7 @@ def test_a_drone_that_loses_its_position_between_two_calls_is_landed(autopilot: 
         stage.drone.takeoff(10)
         stage.flight.block_gps()
         stage.sleep(60.0)
-        raised.append(stage.drone._bounds_error)
+        raised.append(stage.drone._operations.bounds_error)
 
     stage.perform(flight)
     assert isinstance(raised[0], PositionLost), raised

@@ -1,30 +1,17 @@
-"""A vehicle as its autopilot reports it: state, and the link by which it is received.
-
-``BoundedVehicle`` adds the checks before an operation, ``ServicedVehicle`` what is offered beside flying, and
-``Vehicle`` the operations.
-"""
+"""The connection of a vehicle: its state as the autopilot reports it, what it supports, and its link."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isnan
 
 from volery.base.errors import CapabilityError, LinkLost, LinkSilent, NotArrived, VehicleError
-from volery.base.position import AboveHome, Position
+from volery.base.position import Position
 from volery.base.time import MINUTE, MS, Ns, S, from_seconds, to_seconds
 from volery.kernel.api import Handle, Kernel
 from volery.trace.events import Text
 from volery.vehicles.driver import Capability, Driver
 from volery.vehicles.executor import StepExecutor
-from volery.vehicles.telemetry import (
-    REFRESHED_AFTER,
-    Attitude,
-    Battery,
-    StatusText,
-    Telemetry,
-    Velocity,
-    describe_state,
-)
+from volery.vehicles.telemetry import REFRESHED_AFTER, Telemetry, describe_state
 
 FIRST_MESSAGE_WITHIN_S = 10.0
 LINK_RETURN_S = 30.0
@@ -42,142 +29,43 @@ ON_LINK_LOSS = "if this program stops sending"
 """Beginning of the recorded line that states the vehicle's reaction to a lost link."""
 
 
-class ObservedVehicle:
-    """State and link of a vehicle behind a driver.
+class VehicleConnection:
+    """What is known of a vehicle behind a driver, and whether it is there.
 
     Args:
         kernel: clock and tasks.
         name: name of the vehicle in messages and in the trace.
+        kind: kind of vehicle that is expected: ``drone`` or ``rover``.
         driver: driver of its autopilot.
-        link_timeout: time without a message after which the link counts as lost, ns.
+        executor: knows when the link is lost.
     """
 
-    kind = ""
-
-    def __init__(self, kernel: Kernel, name: str, driver: Driver, link_timeout: Ns) -> None:
+    def __init__(self, kernel: Kernel, name: str, kind: str, driver: Driver, executor: StepExecutor) -> None:
         self.name = name
-        self.kernel = kernel
+        self.kind = kind
+        self._kernel = kernel
         self._driver = driver
         driver.telemetry.detects_silence = driver.cycle is None
-        self._executor = StepExecutor(kernel, driver, link_timeout)
+        self._executor = executor
         self._supported: frozenset[Capability] = frozenset()  # as known once the vehicle was connected
         self._link_loss_query: Handle | None = None
 
-    def __repr__(self) -> str:
-        seen = self._driver.telemetry
-        if seen.last_message_ns < 0:
-            return f"<{type(self).__name__} {self.name}: no message yet>"
-        height = f", {seen.above_home:.1f} m above home" if seen.position is not None else ""
-        left = "" if isnan(seen.battery.remaining) else f", battery {seen.battery.remaining:.0%}"
-        return f"<{type(self).__name__} {self.name}: {describe_state(seen)}{height}{left}>"
-
-    # -- state, as last reported by the autopilot
-
-    @property
-    def position(self) -> Position:
-        """Position (AMSL) estimated by the autopilot. Raises ``VehicleError`` before the first estimate."""
-        return self._known("its position", self._poll().position)
-
-    @property
-    def home(self) -> Position:
-        """Home position (AMSL), where it would return to. ArduPilot sets it anew each time it arms."""
-        return self._known("its home", self._poll().home)
-
-    @property
-    def altitude(self) -> AboveHome:
-        """Altitude above home. Raises ``VehicleError`` before the first estimate."""
-        telemetry = self._poll()
-        self._known("its altitude", telemetry.position)
-        return AboveHome(telemetry.above_home)
-
-    @property
-    def velocity(self) -> Velocity:
-        """Velocity over ground: north, east, up in m/s; NaN before the first estimate."""
-        return self._poll().velocity
-
-    @property
-    def attitude(self) -> Attitude:
-        """Roll, pitch and heading in degrees; NaN for values that the autopilot does not send.
-
-        Over MAVROS the first call subscribes to ``imu/data`` and waits for it.
-        """
-        self._poll()
-        self._driver.request_attitude()
-        return self._poll().attitude
-
-    @property
-    def battery(self) -> Battery:
-        """Remaining share 0..1, volts, amperes; NaN for values that are not measured."""
-        return self._poll().battery
-
-    @property
-    def mode(self) -> str:
-        """Flight mode by the autopilot's own name."""
-        return self._poll().mode
-
-    @property
-    def status(self) -> str:
-        """System status in MAVLink's terms: standby, active, critical ..."""
-        return self._poll().status
-
-    @property
-    def armed(self) -> bool:
-        """Whether the motors may turn."""
-        return self._poll().armed
-
-    @property
-    def ready(self) -> bool:
-        """Whether the vehicle could arm now and go to a position."""
-        return self._poll().ready
-
-    @property
-    def stale(self) -> bool:
-        """Whether the state below may be old: position, mode and all else are those before a silence.
-
-        It is True from 2 s after the last message until 2 s after messages have returned, because a link that
-        stalls delivers late what it has held back.
-        """
-        return self._poll().stale
-
-    @property
-    def texts(self) -> list[StatusText]:
-        """Last status texts of the autopilot, oldest first."""
-        return list(self._poll().texts)
-
-    @property
-    def telemetry(self) -> Telemetry:
-        """All telemetry, for code that passes it on."""
-        return self._poll()
-
-    @property
-    def capabilities(self) -> frozenset[Capability]:
-        """Operations that the vehicle supports; empty before the first message."""
-        with self.kernel:
-            return self._driver.capabilities
-
-    @property
-    def on_link_loss(self) -> str:
-        """Reaction to a lost link in one line, from the parameters; empty until these are known."""
-        self._poll()
-        with self.kernel:
-            return self._driver.on_link_loss()
-
-    def _poll(self) -> Telemetry:
+    def poll(self) -> Telemetry:
         """Process received messages and return the telemetry."""
         if self._driver.cycle is not None:
             self._driver.poll()
-        with self.kernel:
+        with self._kernel:
             return self._driver.telemetry
 
-    def _known(self, what: str, value: Position | None) -> Position:
+    def known(self, what: str, value: Position | None) -> Position:
+        """Return *value*; raise the error that *what* is not known yet where it is None."""
         if value is None:
-            raise self._unknown(what)
+            raise self.unknown(what)
         return value
 
-    def _unknown(self, what: str) -> VehicleError:
+    def unknown(self, what: str) -> VehicleError:
+        """Return the error for something that the autopilot has not reported yet."""
         return VehicleError(self.name, what, "the autopilot does not know it yet; wait_ready() first")
-
-    # -- link
 
     def wait_connected(self, within: float = FIRST_MESSAGE_WITHIN_S) -> None:
         """Wait for the first message of the autopilot.
@@ -195,25 +83,25 @@ class ObservedVehicle:
         def connected() -> bool:
             return telemetry.last_message_ns >= 0 and self._driver.problem() is None
 
-        with self.kernel.joined():
+        with self._kernel.joined():
             is_connected = self._executor.wait(connected, from_seconds(within))
         if not is_connected:
-            with self.kernel:
+            with self._kernel:
                 problem = self._driver.problem()
             if problem is not None:
                 raise type(problem)(f"{self.name}: {problem}")
             raise LinkSilent(f"{self.name}: no message was received within {within:g} s")
         if not telemetry.kind:
             telemetry.kind = self.kind  # MAVROS does not report the kind of vehicle
-            self._poll()  # the kind changes how messages are decoded
+            self.poll()  # the kind changes how messages are decoded
         if telemetry.kind != self.kind:
             raise CapabilityError(f"{self.name} is a {telemetry.kind}, not a {self.kind}")
         self._record_link_loss_reaction()
 
     def wait_for_version(self) -> None:
         """Wait until the autopilot has stated its version, for 3 s at most: not all do."""
-        seen = self._poll()
-        with self.kernel.joined():
+        seen = self.poll()
+        with self._kernel.joined():
             self._executor.wait(lambda: seen.version is not None, VERSION_WITHIN)
 
     def wait_located(self, within: float, tell: Callable[[str], object] | None = None) -> None:
@@ -228,22 +116,22 @@ class ObservedVehicle:
         """
         if within == 0.0 or not self._missing_place():
             return
-        began = self.kernel.now()
+        began = self._kernel.now()
         until, say_after = began + from_seconds(within), SAID_AFTER
-        with self.kernel.joined():
+        with self._kernel.joined():
             while self._missing_place():
-                now = self.kernel.now()
+                now = self._kernel.now()
                 if now >= until:
                     what = f"{self._missing_place()} within {within:g} s; a wait of 0 s does not need it"
                     raise NotArrived(self.name, "connect", what)
                 self._executor.wait(lambda: not self._missing_place(), min(until - now, say_after))
                 missing, say_after = self._missing_place(), SAID_AGAIN_AFTER
                 if missing and tell is not None:
-                    tell(f"{self.name}: {missing} after {to_seconds(self.kernel.now() - began):.0f} s")
+                    tell(f"{self.name}: {missing} after {to_seconds(self._kernel.now() - began):.0f} s")
 
     def _missing_place(self) -> str:
         """Return what of position and home the autopilot does not report, in words; empty for nothing."""
-        seen = self._poll()
+        seen = self.poll()
         missing = [
             name for name, known in (("position", seen.position), ("home", seen.home)) if known is None
         ]
@@ -256,25 +144,25 @@ class ObservedVehicle:
         """Record the reaction to a lost link as soon as it is known, without blocking."""
         if self._link_loss_query is not None:
             return
-        until = self.kernel.now() + ASK_FOR
+        until = self._kernel.now() + ASK_FOR
 
         def ask() -> None:
             line = self._driver.on_link_loss()
             if line:
-                self.kernel.record(Text(self.kernel.now(), self.name, 6, f"{ON_LINK_LOSS}: {line}"))
-            if line or self.kernel.now() >= until:
+                self._kernel.record(Text(self._kernel.now(), self.name, 6, f"{ON_LINK_LOSS}: {line}"))
+            if line or self._kernel.now() >= until:
                 query.cancel()
 
-        with self.kernel.guard:
-            self._link_loss_query = query = self.kernel.every(ASK_PERIOD, ask)
+        with self._kernel.guard:
+            self._link_loss_query = query = self._kernel.every(ASK_PERIOD, ask)
 
-    def _connect(self, capability: Capability | None = None) -> None:
+    def require(self, capability: Capability | None = None) -> None:
         """Process received messages; wait for the first one if there was none.
 
         Args:
             capability: what the vehicle must be able to do; ``CapabilityError`` if it cannot.
         """
-        telemetry = self._poll()
+        telemetry = self.poll()
         if telemetry.last_message_ns < 0 or telemetry.kind != self.kind:
             self.wait_connected()
         if capability is None:
@@ -289,7 +177,7 @@ class ObservedVehicle:
                 raise CapabilityError(f"{self.name} cannot {capability.value}; it can {can}")
             self._supported |= capabilities
 
-    def _wait_for_link(self) -> None:
+    def wait_for_link(self) -> None:
         """If the link is or was lost, give it time to return and telemetry time to become fresh."""
         telemetry = self._driver.telemetry
         if not telemetry.stale and not self._executor.link_lost():
@@ -306,3 +194,9 @@ class ObservedVehicle:
 
     def _reaction(self) -> str:
         return self._driver.on_link_loss() or "its reaction to a lost link is not known"
+
+    def close(self) -> None:
+        """Stop all communication, with the kernel's guard held."""
+        if self._link_loss_query is not None:
+            self._link_loss_query.cancel()
+        self._driver.close()

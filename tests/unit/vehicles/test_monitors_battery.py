@@ -12,7 +12,7 @@ from volery.kernel.virtual import VirtualKernel
 from volery.testing.stage import SimulatedStage
 from volery.vehicles import Battery, Drone, Limits
 from volery.vehicles.address import parse
-from volery.vehicles.battery_monitor import (
+from volery.vehicles.monitors import (
     ASSUMED_ENDURANCE_S,
     BatteryMonitor,
     count_cells,
