@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from math import degrees, hypot, pi, radians, remainder, sqrt
 
 from volery.base.elementary import atan2, cos, sine_cosine
+from volery.base.position import AMSL, Altitude, Position
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -305,3 +306,43 @@ class LocalFrame:
     def from_ned(self, ned: Vector) -> Vector:
         """Convert north, east, down metres to latitude, longitude (degrees) and metres AMSL."""
         return self.from_enu(ned_to_enu(ned))
+
+
+class HomeFrame:
+    """The frame in which a vehicle is commanded and judged: metres east and north of home, metres above home.
+
+    Args:
+        home: Home position with an AMSL altitude.
+    """
+
+    def __init__(self, home: Position) -> None:
+        self.home = home
+        self._amsl = home.altitude.metres
+        self._plane = LocalFrame(home.latitude, home.longitude, self._amsl)
+        nowhere: tuple[Position | None, Vector] = None, (0.0, 0.0, 0.0)
+        self._converted = nowhere, nowhere  # the last two: where a vehicle is, and where it goes
+
+    def local(self, position: Position) -> Vector:
+        """Return metres east and north of home and metres above home.
+
+        The third value is the difference of altitudes, not the coordinate in the tangent plane. An altitude
+        of another kind (above ground) is taken as above home: the best estimate without a terrain model.
+        """
+        last, before = self._converted
+        if position is last[0]:
+            return last[1]
+        if position is before[0]:
+            return before[1]
+        height = self.above_home(position.altitude)
+        east, north, _ = self._plane.to_enu(position.latitude, position.longitude, self._amsl + height)
+        self._converted = (position, (east, north, height)), last
+        return east, north, height
+
+    def above_home(self, altitude: Altitude) -> float:
+        """Return an altitude as metres above home."""
+        return altitude.metres - self._amsl if isinstance(altitude, AMSL) else altitude.metres
+
+    def distance(self, here: Position, there: Position) -> float:
+        """Return the horizontal distance of two positions, m."""
+        one, other = self.local(here), self.local(there)
+        return hypot(one[0] - other[0], one[1] - other[1])

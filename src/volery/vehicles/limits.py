@@ -1,9 +1,9 @@
 """Where a vehicle may go: limits about home, a fence, and the checks of both before and during an operation.
 
-All checks use the local frame about home: metres east and north of home, and metres above home. ``Bounds``
-computes that frame and the areas of the fence once for one home, because every command and every position
-report is checked. A goal is checked along the straight path before anything is sent; while the vehicle
-travels, ``monitors.BoundsMonitor`` checks each reported position.
+All checks use the local frame about home (``HomeFrame``). ``Bounds`` computes the areas of the fence in it
+once for one home, because every command and every position report is checked. A goal is checked along the
+straight path before anything is sent; while the vehicle travels, ``monitors.BoundsMonitor`` checks each
+reported position.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from shapely import LineString, Point, Polygon, get_parts, make_valid, prepare
 from shapely.geometry.base import BaseGeometry
 
 from volery.base.errors import UsageError
-from volery.base.frames import LocalFrame, Vector
+from volery.base.frames import HomeFrame, Vector
 from volery.base.position import AMSL, AboveHome, Altitude, Position
 
 Corner = tuple[float, float]
@@ -174,52 +174,30 @@ class Bounds:
     """Limits and fence about one home, prepared for repeated checks.
 
     Args:
-        home: home position with an AMSL altitude.
+        frame: local frame about home.
         limits: limits about home.
         fence: geofence, or ``None``.
     """
 
-    def __init__(self, home: Position, limits: Limits, fence: Fence | None) -> None:
-        self.home, self.limits, self.fence = home, limits, fence
+    def __init__(self, frame: HomeFrame, limits: Limits, fence: Fence | None) -> None:
+        self.frame, self.limits, self.fence = frame, limits, fence
         self._stated = stated = fence or NO_FENCE
-        self._amsl = home.altitude.metres
-        self._frame = LocalFrame(home.latitude, home.longitude, self._amsl)
-        self._converted: tuple[Position | None, Vector] = None, (0.0, 0.0, 0.0)  # the last one
         self._polygon = self._area(stated.polygon) if stated.polygon else None
         self._low, self._high = self._band(stated)
         self._zones = tuple(map(self._zone_area, stated.no_fly))
         self.home_violation = self._find_home_violation()
         """Why no flight can start at home within the fence; empty if one can."""
 
-    # -- the local frame
-
-    def local(self, position: Position) -> Vector:
-        """Return metres east and north of home and metres above home.
-
-        The third value is the difference of altitudes, not the coordinate in the tangent plane. An altitude
-        of another kind (above ground) is taken as above home: the best estimate without a terrain model.
-        The same report of a position is converted once, although path and monitor both check it.
-        """
-        converted, local = self._converted
-        if position is converted:
-            return local
-        height = self._above(position.altitude)
-        east, north, _ = self._frame.to_enu(position.latitude, position.longitude, self._amsl + height)
-        self._converted = position, (east, north, height)
-        return east, north, height
-
-    def _above(self, altitude: Altitude) -> float:
-        """Return metres above home."""
-        return altitude.metres - self._amsl if isinstance(altitude, AMSL) else altitude.metres
-
     def _band(self, area: Fence | Zone) -> tuple[float, float]:
         """Return floor and ceiling in metres above home; infinite where not stated."""
-        low = -inf if area.floor is None else self._above(area.floor)
-        return low, inf if area.ceiling is None else self._above(area.ceiling)
+        low = -inf if area.floor is None else self.frame.above_home(area.floor)
+        return low, inf if area.ceiling is None else self.frame.above_home(area.ceiling)
 
     def _area(self, corners: Sequence[Corner]) -> BaseGeometry:
         """Return the enclosed area in metres; both halves of an outline that crosses itself."""
-        outline = Polygon([self.local(Position(*corner, AMSL(self._amsl)))[:2] for corner in corners])
+        outline = Polygon(
+            [self.frame.local(Position(*corner, self.frame.home.altitude))[:2] for corner in corners]
+        )
         area = make_valid(outline, method="structure", keep_collapsed=False)
         prepare(area)
         return area
@@ -236,12 +214,12 @@ class Bounds:
     def _find_home_violation(self) -> str:
         """Return why no flight can start at home; the floor is crossed on the way and not checked."""
         if self._polygon is not None and not self._polygon.covers(Point(0.0, 0.0)):
-            return f"home ({self.home}) is outside the fence's polygon{self._hint_if_swapped()}"
+            return f"home ({self.frame.home}) is outside the fence's polygon{self._hint_if_swapped()}"
         if self._high <= 0.0:
-            return f"home ({self.home}) is not below the fence's ceiling of {self._stated.ceiling}"
+            return f"home ({self.frame.home}) is not below the fence's ceiling of {self._stated.ceiling}"
         for zone in self._zones:
             if zone.low <= 0.0 <= zone.high and zone.area.contains(Point(0.0, 0.0)):
-                return f"home ({self.home}) is in the no-fly zone {zone.name!r}"
+                return f"home ({self.frame.home}) is in the no-fly zone {zone.name!r}"
         return ""
 
     def _hint_if_swapped(self) -> str:
@@ -257,13 +235,13 @@ class Bounds:
 
     def path(self, start: Position, goal: Position) -> Path:
         """Return the straight path from *start* to *goal* in the local frame about home."""
-        end = self.local(goal)
-        return self.local(start), end
+        end = self.frame.local(goal)
+        return self.frame.local(start), end
 
     def path_violation(self, path: Path, goal: Position) -> str:
         """Return why the vehicle must not go along *path*, which ends at *goal*; empty if it may."""
         east, north, up = path[1]
-        limits, home = self.limits, self.home
+        limits, home = self.limits, self.frame.home
         distance = hypot(east, north)
         if distance > limits.farthest:
             return (
@@ -307,7 +285,7 @@ class Bounds:
 
     def violations(self, position: Position) -> Mapping[str, str]:
         """Return the bounds that *position* (AMSL) violates as {name: message}."""
-        east, north, up = self.local(position)
+        east, north, up = self.frame.local(position)
         limits, found, distance = self.limits, dict[str, str](), hypot(east, north)
         if distance > limits.farthest + TOLERANCE_M:
             found["farthest"] = (

@@ -345,7 +345,7 @@ class TrackMonitor:
         seen = self._telemetry
         here = None
         if bounds is not None and seen.located and seen.position is not None:
-            here = bounds.local(seen.position)
+            here = bounds.frame.local(seen.position)
         self.follow((here, here) if here is not None else None)
         self._at_place = here is not None
 
@@ -379,7 +379,7 @@ class TrackMonitor:
 
     def _note_position(self, bounds: Bounds, position: Position) -> Vector:
         """Return the position in the local frame; note a jump since the last one."""
-        here, before, telemetry = bounds.local(position), self._seen, self._telemetry
+        here, before, telemetry = bounds.frame.local(position), self._seen, self._telemetry
         if before is not None and before[0] is position:
             return before[1]
         self._seen = position, here, telemetry.moment()
@@ -399,7 +399,7 @@ class TrackMonitor:
         target = self._telemetry.target
         if not self._at_place or self._path is None or target is None:
             return False
-        east, north, _ = bounds.local(target)
+        east, north, _ = bounds.frame.local(target)
         away = hypot(east - self._path[0][0], north - self._path[0][1])
         if away > bounds.limits.off_track / 2.0:
             self.follow(None)

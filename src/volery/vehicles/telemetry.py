@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from math import hypot, inf, isfinite, isnan, nan
 from typing import NamedTuple
 
-from volery.base.frames import LocalFrame, Vector
+from volery.base.frames import HomeFrame, LocalFrame, Vector
 from volery.base.position import Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
@@ -163,6 +163,7 @@ class Telemetry:
         rc_ns: time of their last report; -1 before the first.
         obstacles: what range sensors measure, by message and sector; only where a clearance is stated.
         obstacles_ns: time of their last measurement, also of one that sees nothing; -1 before the first.
+        home_frame: local frame about home, in which goals are checked and reached; None without a home.
         home_ns: time since which home is reported where it is now, within ``SAME_HOME_M``; -1 without one.
         detects_silence: whether a silence is one of the link, not of a node that does not run its loop.
         external_pose_ns: when this program has last sent an external position estimate; -1: never.
@@ -202,6 +203,7 @@ class Telemetry:
         self.amsl_remedy = ""
         self._clock = VehicleClock()
         self._home: Position | None = None
+        self.home_frame: HomeFrame | None = None
         self._home_at_first: Position | None = None  # as it was at ``home_ns``
         self.home_ns: Ns = -1
         self.velocity = Velocity(nan, nan, nan)
@@ -210,8 +212,7 @@ class Telemetry:
         self.battery = Battery(nan, nan, nan)
         self.thrust = nan
         self.satellites = 0
-        self.mission_item = -1
-        self.mission_reached = -1
+        self.mission_item = self.mission_reached = -1
         self.mission_ended = False
         self.texts: deque[StatusText] = deque(maxlen=KEPT_TEXTS)
         self.answers: dict[str, Answer] = {}
@@ -328,8 +329,15 @@ class Telemetry:
         if home == self._home:
             return
         self._home = home
+        self.home_frame = None if home is None else HomeFrame(home)
         if home is None or not _same_home(home, self._home_at_first):
             self._home_at_first, self.home_ns = home, self._kernel.now()
+
+    def distance(self, here: Position | None, there: Position | None) -> float:
+        """Return the horizontal distance of two positions, m; infinite if one of them or home is unknown."""
+        if here is None or there is None or self.home_frame is None:
+            return inf
+        return self.home_frame.distance(here, there)
 
     @property
     def fix(self) -> str:

@@ -74,17 +74,17 @@ class VehicleBounds:
         Raises:
             UsageError: the fence excludes home.
         """
-        home = self._telemetry.home
-        if home is None:
+        frame = self._telemetry.home_frame
+        if frame is None:
             return None
         bounds = self._bounds
         if (
             bounds is None
             or bounds.limits is not self.limits
             or bounds.fence is not self.fence
-            or bounds.home != home
+            or bounds.frame is not frame
         ):
-            bounds = self._bounds = Bounds(home, self.limits, self.fence)
+            bounds = self._bounds = Bounds(frame, self.limits, self.fence)
         seen = self._telemetry
         if not seen.amsl_known and self.fence is not None and states_amsl(self.fence):
             raise UsageError(f"{self._connection.name}: the fence states altitudes AMSL: {seen.amsl_remedy}")

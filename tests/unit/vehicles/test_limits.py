@@ -7,7 +7,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from volery.base.errors import UsageError
-from volery.base.frames import LocalFrame
+from volery.base.frames import HomeFrame, LocalFrame
 from volery.base.position import AMSL, AboveGround, AboveHome, Ellipsoidal, Position
 from volery.vehicles.limits import Bounds, Fence, Limits, Zone, height_violation
 
@@ -28,7 +28,7 @@ SQUARE = corners((-50, 20), (50, 20), (50, 120), (-50, 120))
 
 
 def check(start: Position, goal: Position, fence: Fence | None = None, limits: Limits | None = None) -> str:
-    bounds = Bounds(HOME, limits or Limits(), fence)
+    bounds = Bounds(HomeFrame(HOME), limits or Limits(), fence)
     return bounds.path_violation(bounds.path(start, goal), goal)
 
 
@@ -138,7 +138,7 @@ def test_against_a_path_taken_in_small_steps(x0: float, y0: float, x1: float, y1
 
 @given(metres, metres)
 def test_home_is_where_the_local_frame_begins(east: float, north: float) -> None:
-    local = Bounds(HOME, Limits(), None).local(at(east, north, 25.0))
+    local = HomeFrame(HOME).local(at(east, north, 25.0))
     assert local[0] == pytest.approx(east, abs=0.01)
     assert local[1] == pytest.approx(north, abs=0.01)
     assert local[2] == pytest.approx(25.0)
@@ -151,12 +151,12 @@ def test_a_fence_with_longitude_before_latitude_is_named_only_if_that_is_the_mis
     elsewhere = tuple((latitude + 1.0, longitude) for latitude, longitude in around)
     hints = {}
     for name, polygon in (("swapped", swapped), ("elsewhere", elsewhere)):
-        said = Bounds(home, Limits(), Fence(polygon)).home_violation
+        said = Bounds(HomeFrame(home), Limits(), Fence(polygon)).home_violation
         assert "outside the fence's polygon" in said
         hints[name] = "are they swapped?" in said
     assert hints == {"swapped": True, "elsewhere": False}
     beyond = tuple((latitude, longitude + 82.5) for latitude, longitude in around)  # no latitude if swapped
-    assert "are they swapped?" not in Bounds(home, Limits(), Fence(beyond)).home_violation
+    assert "are they swapped?" not in Bounds(HomeFrame(home), Limits(), Fence(beyond)).home_violation
 
 
 def test_limits_and_fences_do_not_change() -> None:
@@ -187,7 +187,7 @@ def test_bounds_in_flight_have_three_metres_of_tolerance(
     area = corners((-50, -20), (50, -20), (50, 120), (-50, 120))
     masts = Zone("masts", corners((-20, 90), (20, 90), (20, 110), (-20, 110)), ceiling=AboveHome(20))
     fence = Fence(polygon=area, floor=AboveHome(5), ceiling=AboveHome(30), no_fly=(masts,))
-    assert list(Bounds(HOME, Limits(), fence).violations(at(*where))) == ([bound] if bound else [])
+    assert list(Bounds(HomeFrame(HOME), Limits(), fence).violations(at(*where))) == ([bound] if bound else [])
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ def test_limits_in_flight_have_three_metres_of_tolerance(
     where: tuple[float, float, float], bound: str
 ) -> None:
     limits = Limits(farthest=200.0, highest=50.0, lowest=-10.0)
-    assert list(Bounds(HOME, limits, None).violations(at(*where))) == ([bound] if bound else [])
+    assert list(Bounds(HomeFrame(HOME), limits, None).violations(at(*where))) == ([bound] if bound else [])
 
 
 def test_home_is_below_the_ceiling_and_outside_the_zones_or_no_flight_starts() -> None:
@@ -217,7 +217,7 @@ def test_home_is_below_the_ceiling_and_outside_the_zones_or_no_flight_starts() -
         (AMSL(901.0), -9, 0, "is in the no-fly zone 'here'"),
     ):
         zone = Zone("here", around, floor=AMSL(900.0 + low), ceiling=AMSL(900.0 + high))
-        bounds = Bounds(HOME, Limits(), Fence(ceiling=ceiling, no_fly=(zone,)))
+        bounds = Bounds(HomeFrame(HOME), Limits(), Fence(ceiling=ceiling, no_fly=(zone,)))
         assert said in bounds.home_violation
         assert bool(said) == bool(bounds.home_violation)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from volery.base.errors import OutOfBounds, PositionLost, UsageError
-from volery.base.frames import LocalFrame
+from volery.base.frames import HomeFrame, LocalFrame
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.base.time import S
 from volery.kernel.virtual import VirtualKernel
@@ -49,7 +49,7 @@ def above(up: float) -> Position:
 
 
 def goal(where: Position, fence: Fence | None = None, **limits: float) -> str:
-    bounds = Bounds(HOME, Limits(**limits), fence)
+    bounds = Bounds(HomeFrame(HOME), Limits(**limits), fence)
     return bounds.path_violation(bounds.path(AT_HOME, where), where)
 
 
@@ -189,7 +189,7 @@ def test_a_goal_with_a_height_above_ground_counts_from_home() -> None:
 
 def test_a_level_path_at_the_edges_of_a_zone() -> None:
     fence = Fence(no_fly=(Zone("mast", square(10.0, 30.0), AboveHome(20.0), AboveHome(40.0)),))
-    bounds = Bounds(HOME, Limits(), fence)
+    bounds = Bounds(HomeFrame(HOME), Limits(), fence)
 
     def through(up: float) -> bool:
         start, end = place(0, 0, AMSL(900.0 + up)), place(60, 0, AMSL(900.0 + up))
@@ -200,7 +200,7 @@ def test_a_level_path_at_the_edges_of_a_zone() -> None:
 
 def test_a_rising_path_meets_a_zone_where_both_heights_agree() -> None:
     fence = Fence(no_fly=(Zone("mast", square(10.0, 30.0), AboveHome(20.0), AboveHome(40.0)),))
-    bounds = Bounds(HOME, Limits(), fence)
+    bounds = Bounds(HomeFrame(HOME), Limits(), fence)
 
     def through(start_up: float, end_up: float) -> bool:
         start, end = place(0, 0, AMSL(900.0 + start_up)), place(60, 0, AMSL(900.0 + end_up))
@@ -218,7 +218,7 @@ def test_a_rising_path_meets_a_zone_where_both_heights_agree() -> None:
 
 @pytest.mark.parametrize(("up", "excludes"), [(0.1, False), (0.0, True)])
 def test_a_ceiling_at_the_height_of_home_excludes_it(up: float, excludes: bool) -> None:
-    assert bool(Bounds(HOME, Limits(), Fence(ceiling=AboveHome(up))).home_violation) is excludes
+    assert bool(Bounds(HomeFrame(HOME), Limits(), Fence(ceiling=AboveHome(up))).home_violation) is excludes
 
 
 @pytest.mark.parametrize(
@@ -227,7 +227,7 @@ def test_a_ceiling_at_the_height_of_home_excludes_it(up: float, excludes: bool) 
 )
 def test_a_zone_at_home_excludes_it_at_its_height(low: float, high: float, excludes: bool) -> None:
     zone = Zone("z", square(20.0), AboveHome(low), AboveHome(high))
-    assert bool(Bounds(HOME, Limits(), Fence(no_fly=(zone,))).home_violation) is excludes
+    assert bool(Bounds(HomeFrame(HOME), Limits(), Fence(no_fly=(zone,))).home_violation) is excludes
 
 
 # -- in flight
@@ -236,12 +236,12 @@ def test_a_zone_at_home_excludes_it_at_its_height(low: float, high: float, exclu
 @pytest.mark.parametrize(("up", "keys"), [(9.9, []), (10.0, ["zone z"]), (30.0, ["zone z"]), (30.1, [])])
 def test_a_zone_in_flight_at_its_heights(up: float, keys: list[str]) -> None:
     fence = Fence(no_fly=(Zone("z", square(20.0), AboveHome(10.0), AboveHome(30.0)),))
-    assert list(Bounds(HOME, Limits(), fence).violations(above(up))) == keys
+    assert list(Bounds(HomeFrame(HOME), Limits(), fence).violations(above(up))) == keys
 
 
 def test_what_is_said_in_flight_has_the_distances() -> None:
     fence = Fence(square(50.0), AboveHome(5.0), AboveHome(40.0))
-    bounds = Bounds(HOME, Limits(farthest=200.0, highest=60.0, lowest=-1.0), fence)
+    bounds = Bounds(HomeFrame(HOME), Limits(farthest=200.0, highest=60.0, lowest=-1.0), fence)
     high = bounds.violations(above(70.0))
     assert "70.0 m above home, beyond 60 m" in high["highest"]
     assert "30.0 m above the fence's ceiling of 40 m above home" in high["ceiling"]
@@ -264,7 +264,9 @@ class Flown:
         self.seen.flying = True
         self.seen.note_message(0)
         self.seen.update_position(AT_HOME)
-        self.monitor = BoundsMonitor(self.seen, Bounds(HOME, Limits(), None), needs_position=needed)
+        self.monitor = BoundsMonitor(
+            self.seen, Bounds(HomeFrame(HOME), Limits(), None), needs_position=needed
+        )
 
     def after(self, seconds: float) -> PositionLost | None:
         error = self.monitor.check("goto", round(seconds * S))
@@ -321,7 +323,7 @@ def outline(*points: tuple[float, float]) -> tuple[tuple[float, float], ...]:
 
 
 def home_violation(*zones: Zone, **fence: Any) -> str:
-    return Bounds(HOME, Limits(), Fence(no_fly=zones, **fence)).home_violation
+    return Bounds(HomeFrame(HOME), Limits(), Fence(no_fly=zones, **fence)).home_violation
 
 
 def test_home_is_checked_to_a_fraction_of_a_metre() -> None:
@@ -344,7 +346,7 @@ def test_home_is_checked_to_a_fraction_of_a_metre() -> None:
 
 
 def test_a_small_zone_has_a_tolerance_of_a_quarter_of_its_width() -> None:
-    bounds = Bounds(HOME, Limits(), Fence(no_fly=(Zone("z", square(2.0, east=20.0)),)))
+    bounds = Bounds(HomeFrame(HOME), Limits(), Fence(no_fly=(Zone("z", square(2.0, east=20.0)),)))
     assert bounds.violations(place(18.9, 0.0, AMSL(910.0))) == {}
     assert list(bounds.violations(place(19.2, 0.0, AMSL(910.0)))) == ["zone z"]
 
@@ -352,7 +354,7 @@ def test_a_small_zone_has_a_tolerance_of_a_quarter_of_its_width() -> None:
 def test_a_zone_that_is_left_may_not_be_grazed_by_half_a_metre() -> None:
     hook = outline((-5, -5), (5, -5), (5, 5), (20, 5), (20, -0.1), (20.5, -0.1), (20.5, 10), (-5, 10))
     fence = Fence(no_fly=(Zone("hook", hook),))
-    bounds = Bounds(HOME, Limits(), fence)
+    bounds = Bounds(HomeFrame(HOME), Limits(), fence)
     out, beyond = place(12.0, 0.0, AMSL(910.0)), place(30.0, 0.0, AMSL(910.0))
     assert bounds.path_violation(bounds.path(AT_HOME, out), out) == ""
     assert "no-fly zone 'hook'" in bounds.path_violation(bounds.path(AT_HOME, beyond), beyond)
@@ -360,7 +362,7 @@ def test_a_zone_that_is_left_may_not_be_grazed_by_half_a_metre() -> None:
 
 def test_what_is_violated_at_the_start_counts_once_it_has_been_met() -> None:
     telemetry = Telemetry(VirtualKernel(), "craft")
-    bounds = Bounds(HOME, Limits(highest=50.0), None)
+    bounds = Bounds(HomeFrame(HOME), Limits(highest=50.0), None)
     telemetry.position = above(60.0)
     monitor = BoundsMonitor(telemetry, bounds)
     seen = []

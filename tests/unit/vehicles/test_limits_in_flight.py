@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from volery.base.errors import OutOfBounds, UsageError
-from volery.base.frames import LocalFrame, Vector
+from volery.base.frames import HomeFrame, LocalFrame, Vector
 from volery.base.position import AMSL, AboveHome, Position
 from volery.kernel.virtual import VirtualKernel
 from volery.vehicles import Fence, Limits, Zone
@@ -51,12 +51,12 @@ FENCED = Fence(square(50.0), AboveHome(5.0), AboveHome(40.0), (Zone("mast", squa
     ],
 )
 def test_what_it_is_out_of(where: Position, keys: list[str]) -> None:
-    assert list(Bounds(HOME, Limits(farthest=200.0), FENCED).violations(where)) == keys
+    assert list(Bounds(HomeFrame(HOME), Limits(farthest=200.0), FENCED).violations(where)) == keys
 
 
 def test_a_small_zone_is_not_overlooked() -> None:
     fence = Fence(no_fly=(Zone("post", square(1.0)),))
-    assert list(Bounds(HOME, Limits(), fence).violations(place(0, 0))) == ["zone post"]
+    assert list(Bounds(HomeFrame(HOME), Limits(), fence).violations(place(0, 0))) == ["zone post"]
 
 
 def telemetry(where: Position) -> Telemetry:
@@ -67,7 +67,7 @@ def telemetry(where: Position) -> Telemetry:
 
 def test_who_is_outside_may_come_back_but_not_leave_again() -> None:
     seen = telemetry(place(0, 80))
-    watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED))
+    watch = BoundsMonitor(seen, Bounds(HomeFrame(HOME), Limits(), FENCED))
     for north in (70, 60, 10):
         seen.update_position(place(0, north))
         assert watch.check("go", 0) is None
@@ -80,7 +80,7 @@ def test_who_is_outside_may_come_back_but_not_leave_again() -> None:
 def test_the_floor_is_crossed_on_the_way_up_and_may_be_excused() -> None:
     for excused, expected in ((frozenset[str](), True), (frozenset({FLOOR}), False)):
         seen = telemetry(place(0, 0, 0))
-        watch = BoundsMonitor(seen, Bounds(HOME, Limits(), FENCED), excused)
+        watch = BoundsMonitor(seen, Bounds(HomeFrame(HOME), Limits(), FENCED), excused)
         for up in (0.5, 20.0):
             seen.update_position(place(0, 0, up))
             assert watch.check("up", 0) is None
@@ -99,14 +99,14 @@ def test_the_floor_is_crossed_on_the_way_up_and_may_be_excused() -> None:
     ],
 )
 def test_a_fence_that_excludes_home(fence: Fence, says: str) -> None:
-    found = Bounds(HOME, Limits(), fence).home_violation
+    found = Bounds(HomeFrame(HOME), Limits(), fence).home_violation
     assert (says in found) if says else found == ""
 
 
 def test_swapped_corners_are_recognised() -> None:
     home = Position(46.0, 7.0, AMSL(900.0))
     turned = ((6.9, 45.9), (7.1, 45.9), (7.1, 46.1), (6.9, 46.1))
-    assert "are they swapped?" in Bounds(home, Limits(), Fence(turned)).home_violation
+    assert "are they swapped?" in Bounds(HomeFrame(home), Limits(), Fence(turned)).home_violation
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_one_report_of_a_position_is_converted_once(monkeypatch: pytest.MonkeyPa
         converted.append(latitude)
         return to_enu(frame, latitude, longitude, amsl)
 
-    bounds, here, goal = Bounds(HOME, Limits(farthest=50.0), None), place(0, 60), place(0, 40)
+    bounds, here, goal = Bounds(HomeFrame(HOME), Limits(farthest=50.0), None), place(0, 60), place(0, 40)
     monkeypatch.setattr(LocalFrame, "to_enu", counted)
     start, end = bounds.path(here, goal)
     assert list(bounds.violations(here)) == ["farthest"]
@@ -145,10 +145,10 @@ def test_one_report_of_a_position_is_converted_once(monkeypatch: pytest.MonkeyPa
 
 def test_what_is_exactly_at_a_limit_is_within_it() -> None:
     goal = place(30, 40)
-    east, north, up = Bounds(HOME, Limits(), None).local(goal)
+    east, north, up = HomeFrame(HOME).local(goal)
     distance = hypot(east, north)
-    bounds = Bounds(HOME, Limits(farthest=distance, highest=up), None)
+    bounds = Bounds(HomeFrame(HOME), Limits(farthest=distance, highest=up), None)
     assert bounds.path_violation(((0.0, 0.0, 1.0), (east, north, up)), goal) == ""
     assert "0.9 km from home, but the limit is 0.8 km" in Bounds(
-        HOME, Limits(farthest=800.0), None
+        HomeFrame(HOME), Limits(farthest=800.0), None
     ).path_violation(((0.0, 0.0, 1.0), (900.0, 0.0, 1.0)), goal)

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from volery.base.errors import PositionLost, ThrustSaturated, VehicleError
-from volery.base.frames import LocalFrame
+from volery.base.frames import HomeFrame, LocalFrame
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, S
 from volery.kernel.virtual import VirtualKernel
@@ -21,7 +21,7 @@ from volery.vehicles.telemetry import Attitude, Telemetry
 
 HOME = Position(46.0825, -103.8995, AMSL(900.0))
 FRAME = LocalFrame(HOME.latitude, HOME.longitude, 900.0)
-BOUNDS = Bounds(HOME, Limits(), None)
+BOUNDS = Bounds(HomeFrame(HOME), Limits(), None)
 HOVERS_ONLY = 0.37
 """Share of the thrust of each motor that just carries the simulated airframe."""
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from volery.base.errors import CapabilityError, UsageError, VoleryError, choices
+from volery.base.frames import HomeFrame
 from volery.base.installed import require_extra
 from volery.base.position import Position
 from volery.kernel.api import Action, Kernel
@@ -122,7 +123,7 @@ def _open_simulated(
 
 def _check_home(wanted: SimulatedVehicle, fence: Fence | None) -> None:
     home = wanted.home
-    found = Bounds(home, Limits(), fence).home_violation
+    found = Bounds(HomeFrame(home), Limits(), fence).home_violation
     if found:
         raise UsageError(f"{wanted.vehicle.name}: the fence excludes home: {found}")
 

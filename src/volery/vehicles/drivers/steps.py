@@ -14,12 +14,11 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from math import hypot, inf, isnan
+from math import hypot, isnan
 
 from mypy_extensions import mypyc_attr
 
 from volery.base.errors import Refused, UsageError
-from volery.base.frames import LocalFrame
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MINUTE, MS, Ns, S
 from volery.kernel.api import Action, Handle, Kernel
@@ -171,15 +170,15 @@ def at_rest(seen: Telemetry) -> bool:
 
 def arrived_at(goal: Position, rover: bool) -> Callable[[Telemetry], bool]:
     """Return a condition: near *goal* and at rest."""
-    frame = LocalFrame(goal.latitude, goal.longitude, 0.0)
     near = ROVER_NEAR_M if rover else NEAR_M
 
     def arrived(seen: Telemetry) -> bool:
         here = seen.position
         if here is None or not seen.located or not at_rest(seen):
             return False
-        east, north, _ = frame.to_enu(here.latitude, here.longitude, 0.0)
-        return hypot(east, north) <= near and (rover or _vertical_distance(seen, here, goal) <= NEAR_UP_M)
+        return seen.distance(here, goal) <= near and (
+            rover or _vertical_distance(seen, here, goal) <= NEAR_UP_M
+        )
 
     return arrived
 
@@ -191,15 +190,6 @@ def _vertical_distance(seen: Telemetry, here: Position, goal: Position) -> float
     if isinstance(goal.altitude, AboveHome):
         return abs(seen.above_home - goal.altitude.metres)
     return abs(here.altitude.metres - goal.altitude.metres)
-
-
-def horizontal_distance(here: Position | None, there: Position) -> float:
-    """Return the horizontal distance, m; infinite if *here* is unknown."""
-    if here is None:
-        return inf
-    frame = LocalFrame(there.latitude, there.longitude, 0.0)
-    east, north, _ = frame.to_enu(here.latitude, here.longitude, 0.0)
-    return hypot(east, north)
 
 
 # -- takeover by another station
@@ -292,7 +282,7 @@ class TargetMonitor:
                 return ""
             return (
                 f"the autopilot does not take up the target: it stands still "
-                f"{horizontal_distance(seen.position, goal):.0f} m from it; its own fence may exclude it"
+                f"{seen.distance(seen.position, goal):.0f} m from it; its own fence may exclude it"
             )
 
         def send_unless_confirmed() -> None:
@@ -343,7 +333,7 @@ class TargetMonitor:
         return self._compared[2]
 
     def _same(self, target: Position, goal: Position) -> bool:
-        if horizontal_distance(target, goal) > SAME_TARGET_M:
+        if self._telemetry.distance(target, goal) > SAME_TARGET_M:
             return False
         level = isinstance(goal.altitude, AMSL) and self._telemetry.kind == DRONE_KIND
         return not level or abs(target.altitude.metres - goal.altitude.metres) <= SAME_TARGET_M

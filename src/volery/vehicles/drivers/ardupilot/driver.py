@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite, isnan, nan
+from math import hypot, isfinite, isnan, nan
 
 from volery.base.errors import Refused
-from volery.base.position import AMSL, AboveHome, Position
+from volery.base.position import AboveGround, AboveHome, Position
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.vehicles.driver import (
@@ -53,7 +53,6 @@ from volery.vehicles.drivers.steps import (
     climbed_to,
     disarmed_step,
     heading_reached,
-    horizontal_distance,
     immediate_step,
     mode_step,
     send_nothing,
@@ -177,15 +176,13 @@ class ArduPilot(MavlinkDriver):
 
     def _check_own_fence(self, goal: Position) -> None:
         """Refuse a goal outside the aircraft's own fence: ArduPilot ignores such a target without a word."""
-        parameters, home = self._backend.parameters, self.telemetry.home
-        if parameters is None or home is None:
+        parameters, frame = self._backend.parameters, self.telemetry.home_frame
+        if parameters is None or frame is None:
             return
-        height = nan
-        if isinstance(goal.altitude, AboveHome):
-            height = goal.altitude.metres
-        elif isinstance(goal.altitude, AMSL) and isinstance(home.altitude, AMSL):
-            height = goal.altitude.metres - home.altitude.metres
-        beyond = beyond_own_fence(parameters, horizontal_distance(home, goal), height)
+        east, north, height = frame.local(goal)
+        if isinstance(goal.altitude, AboveGround):
+            height = nan
+        beyond = beyond_own_fence(parameters, hypot(east, north), height)
         if beyond:
             raise Refused(self.name, f"go to {goal}", f"{beyond}; choose a goal inside or change the fence")
 

@@ -29,7 +29,6 @@ from volery.vehicles.drivers.steps import (
     ROVER_NEAR_M,
     Takeover,
     at_rest,
-    horizontal_distance,
     ready_step,
     send_nothing,
 )
@@ -264,7 +263,7 @@ class MavlinkDriver:
             return (
                 seen.home is not None
                 and seen.located
-                and horizontal_distance(seen.position, seen.home) <= ROVER_NEAR_M + 1.0
+                and seen.distance(seen.position, seen.home) <= ROVER_NEAR_M + 1.0
                 and at_rest(seen)
             )
 

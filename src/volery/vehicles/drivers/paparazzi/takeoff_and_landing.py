@@ -32,7 +32,6 @@ from volery.vehicles.drivers.steps import (
     AT_REST_M_S,
     NEAR_UP_M,
     disarmed_step,
-    horizontal_distance,
     immediate_step,
 )
 from volery.vehicles.telemetry import Telemetry
@@ -92,7 +91,7 @@ class TakeoffAndLanding:
         telemetry, farthest = self._telemetry, self._backend.aircraft.farthest
         if farthest is None or telemetry.home is None or telemetry.position is None:
             return True
-        return horizontal_distance(telemetry.position, telemetry.home) <= WELL_INSIDE * farthest
+        return telemetry.distance(telemetry.position, telemetry.home) <= WELL_INSIDE * farthest
 
     # -- motors on the ground
 

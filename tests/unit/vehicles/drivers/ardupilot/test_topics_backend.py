@@ -11,7 +11,6 @@ from volery.base.errors import CapabilityError
 from volery.base.position import AMSL, Position
 from volery.base.time import MS
 from volery.vehicles.drivers.ardupilot import open_topics
-from volery.vehicles.drivers.steps import horizontal_distance
 
 WARM = "sim:ardupilot?start=warm"
 
@@ -22,7 +21,7 @@ def test_the_five_lines_of_the_readme() -> None:
         home = drone.home
         goal = Position(home.latitude + 0.0002, home.longitude + 0.0002, AMSL(home.altitude.metres + 15.0))
         drone.goto(goal)
-        miss = horizontal_distance(drone.position, goal)
+        miss = drone.telemetry.distance(drone.position, goal)
         up = drone.position.altitude.metres - home.altitude.metres
         drone.land()
         return miss, up, drone.armed
@@ -40,7 +39,7 @@ def test_a_velocity_is_flown_and_a_speed_or_a_turn_is_refused_by_name() -> None:
         for _ in range(40):
             drone.set_velocity(east=2.0)
             pause(100 * MS)
-        gone = horizontal_distance(start, drone.position)
+        gone = drone.telemetry.distance(start, drone.position)
         for refused in (lambda: drone.set_heading(90), lambda: drone.goto(start, speed=3.0)):
             with pytest.raises(CapabilityError, match="does not pass ArduPilot's topics"):
                 refused()

@@ -16,7 +16,6 @@ from volery.ros.graph import EmbeddedGraph
 from volery.vehicles import Drone
 from volery.vehicles.driver import Land
 from volery.vehicles.drivers.px4 import open_topics
-from volery.vehicles.drivers.steps import horizontal_distance
 
 WARM = "sim:px4?start=warm"
 
@@ -27,7 +26,7 @@ def test_the_five_lines_of_the_readme() -> None:
         home = drone.home
         goal = Position(home.latitude + 0.0002, home.longitude + 0.0002, AMSL(home.altitude.metres + 15.0))
         drone.goto(goal)
-        miss = horizontal_distance(drone.position, goal)
+        miss = drone.telemetry.distance(drone.position, goal)
         up = drone.position.altitude.metres - home.altitude.metres
         drone.land()
         return miss, up, drone.armed
@@ -47,7 +46,7 @@ def test_a_velocity_is_repeated_by_the_caller_and_a_turn_is_held() -> None:
             pause(100 * MS)
         mode = drone.telemetry.mode
         drone.set_heading(90)
-        return mode, horizontal_distance(start, drone.position), drone.telemetry.attitude.heading
+        return mode, drone.telemetry.distance(start, drone.position), drone.telemetry.attitude.heading
 
     mode, gone, heading = flown_over_own_topics(WARM, "px4", open_topics, mission)
     assert mode == "OFFBOARD"
