@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
+from pathlib import PurePath
 from typing import Any
 
 from volery.model.components import Component
@@ -138,7 +139,10 @@ def _compare(noun: str, name: str, path: tuple[str, ...], old: Any, new: Any) ->
 
 
 def _tree(thing: Any) -> Any:
-    """Return *thing* as mappings by name; a place as its point, ways as the places that they join."""
+    """Return *thing* as mappings by name; a place as its point, ways as the places that they join.
+
+    A file is its name: two models are compared that may stand in two folders.
+    """
     made: Any = thing
     if isinstance(thing, Place):
         role = f", {thing.role}" if thing.role else ""
@@ -150,6 +154,8 @@ def _tree(thing: Any) -> Any:
         made = {str(key): _tree(value) for key, value in thing.items()}
     elif isinstance(thing, Enum):
         made = thing.value
+    elif isinstance(thing, PurePath):
+        made = thing.name
     elif is_dataclass(thing) and not isinstance(thing, type):
         made = {
             one.name: _part(thing, one.name) for one in fields(thing) if one.compare and one.name != "name"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -65,3 +66,18 @@ def test_one_change(delivery, override, expected):
 def test_what_follows_from_a_component_is_one_difference(delivery):
     found = changed(delivery, "components.PrecisionLanding.parameters.gain=0.5")
     assert found == ["component PrecisionLanding: parameters.gain 0.7 → 0.5"]
+
+
+def test_files_are_compared_by_their_names(tmp_path):
+    override = "environment.vehicles.drone_1.body={fmu: one.fmu}"
+    systems = []
+    for name in ("here", "there"):
+        folder = tmp_path / name
+        shutil.copytree(DELIVERY.with_name("starter"), folder)
+        (folder / "one.fmu").touch()
+        (folder / "two.fmu").touch()
+        systems.append(load(folder, vocabulary(), overrides=(override,)))
+    assert differences(*systems) == ()
+    other = load(folder, vocabulary(), overrides=(override, "environment.vehicles.drone_1.body.fmu=two.fmu"))
+    found = [str(one) for one in differences(systems[0], other)]
+    assert found == ["environment: vehicles.drone_1.body.file one.fmu → two.fmu"]

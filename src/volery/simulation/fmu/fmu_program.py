@@ -7,11 +7,14 @@ FMI ``version`` (2 or 3), the ``step`` in seconds, ``parameters`` as [type, valu
 
 A request is the inputs, as doubles. The answer is an int32: 0, and the outputs as doubles follow, or the
 length of the text of an error, which follows; the program then ends. The first request initialises the FMU,
-each further one makes a step. The end of the connection ends the simulation and frees the FMU.
+each further one makes a step. The end of the connection ends the simulation and frees the FMU; the folder is
+removed, also if the program or its parent is killed.
 """
 
 import contextlib
 import json
+import os
+import shutil
 import signal
 import socket
 import struct
@@ -101,6 +104,18 @@ def _serve(link: socket.socket, fmu: _Fmi2 | _Fmi3, asked: dict[str, Any], first
         link.sendall(answer.pack(0, *fmu.get()))
 
 
+def _remove_at_end(folder: str) -> None:
+    """Let another process remove *folder* when this one is gone, however it ends."""
+    reading, writing = os.pipe()
+    if os.fork():
+        os.close(reading)
+        return
+    os.close(writing)
+    os.read(reading, 1)  # returns once the other end is closed, by the end of this process
+    shutil.rmtree(folder, ignore_errors=True)
+    os._exit(0)
+
+
 def _what(error: Exception) -> str:
     if isinstance(error, FMICallException):
         status = {2: "discard", 3: "error", 4: "fatal"}.get(error.status, str(error.status))
@@ -110,8 +125,10 @@ def _what(error: Exception) -> str:
 
 def main() -> None:
     """Step the FMU until the connection ends."""
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the end of the connection ends it, in order
+    for ending in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(ending, signal.SIG_IGN)  # the end of the connection ends it, in order
     asked = json.loads(sys.argv[2])
+    _remove_at_end(asked["folder"])  # before there is a connection, which must end with this process
     with socket.create_connection(("127.0.0.1", int(sys.argv[1]))) as link:
         link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         fmu = None

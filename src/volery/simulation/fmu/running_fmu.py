@@ -80,7 +80,14 @@ class RunningFmu:
         Raises:
             FirmwareError: It has ended, does not answer, or answers that it cannot.
         """
-        peer = self._connected() if self._peer is None else self._peer
+        if self._peer is None:
+            self._peer = self._connection()
+            outputs = self._ask(self._peer, inputs)
+            _limit(self._peer, _ANSWER_LIMIT_S)
+            return outputs
+        return self._ask(self._peer, inputs)
+
+    def _ask(self, peer: socket.socket, inputs: Sequence[float]) -> tuple[float, ...]:
         try:
             peer.sendall(self._inputs.pack(*inputs))
             octets = peer.recv(self._outputs.size, socket.MSG_WAITALL)
@@ -103,20 +110,19 @@ class RunningFmu:
             f"{f'; its last words: {words}' if words else ''}"
         )
 
-    def _connected(self) -> socket.socket:
+    def _connection(self) -> socket.socket:
         listener = self.process.sockets[0]
         listener.settimeout(1.0)
         for _ in range(_START_LIMIT_S):
             try:
-                self._peer, _ = listener.accept()
+                peer, _ = listener.accept()
             except TimeoutError:
                 if self.process.ending():
                     break
             else:
-                self._peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                limit = struct.pack("ll", _ANSWER_LIMIT_S, 0)
-                self._peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, limit)
-                return self._peer
+                peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                _limit(peer, _START_LIMIT_S)
+                return peer
         raise self.process.error("is not loaded within a minute")
 
     def close(self) -> None:
@@ -127,3 +133,8 @@ class RunningFmu:
             self._peer.close()
         self.process.end()
         self._remove()
+
+
+def _limit(peer: socket.socket, seconds: int) -> None:
+    """Let each wait for an answer end after *seconds*; in the kernel, which saves calls at each step."""
+    peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", seconds, 0))

@@ -21,6 +21,7 @@ from volery.simulation.fmu.running_fmu import RunningFmu
 from volery.simulation.real_firmware.firmware_process import FirmwareError
 from volery.simulation.world.body_specs import Multirotor
 from volery.simulation.world.environment_models import Wind
+from volery.simulation.world.scene import Scene, Solid
 from volery.simulation.world.world import STEP
 
 HERE = LocalFrame(47.4, 8.5, 400.0)
@@ -30,7 +31,7 @@ SPEC = Multirotor(at=(30.0, -20.0, 0.0), heading_deg=120.0)
 class FmuFlight:
     """A flight whose body is moved by an FMU, or by the world without one."""
 
-    def __init__(self, folder, fmu=None, wind=None):
+    def __init__(self, folder, fmu=None, wind=None, scene=None):
         self.now = 0
         self.moved = None
         spec = SPEC
@@ -42,7 +43,9 @@ class FmuFlight:
                 running.close()
                 raise
             spec = self.moved.spec
-        self.world, (self.flight,) = make_world(lambda: self.now, [spec], seed=3, frame=HERE, wind=wind)
+        self.world, (self.flight,) = make_world(
+            lambda: self.now, [spec], seed=3, frame=HERE, wind=wind, scene=scene
+        )
         if self.moved is not None:
             self.moved.begin(self.flight.row)
             self.flight.move_by(self.moved)
@@ -152,6 +155,17 @@ def test_a_weak_motor_gets_the_command_of_its_share_of_the_thrust(flown, tmp_pat
     assert rotors[2] == pytest.approx(0.5 * rotors[0], rel=1e-6)
 
 
+def test_one_that_flies_into_a_solid_loses_its_blades_and_is_not_held_off(flown, tmp_path):
+    square = ((20.0, -30.0), (40.0, -30.0), (40.0, -10.0), (20.0, -10.0))
+    ceiling = Scene([Solid("ceiling", square, 3.0, 4.0)])
+    flight = flown(Fmu(make_fmu(tmp_path / "quad.fmu")), scene=ceiling)
+    flight.flight.drive_motors([0.8, 0.8, 0.8, 0.8])
+    truths = flight.wait(2)
+    assert flight.flight.last_collision().solid == "ceiling"
+    assert max(truth.position[2] for truth in truths) > 3.0
+    assert truths[-1].rotors[0] < 0.01 * max(truth.rotors[0] for truth in truths)
+
+
 @pytest.mark.parametrize(
     ("failure", "says"),
     [
@@ -214,7 +228,7 @@ sys.stdin.read()
 """
 
 
-def test_it_dies_with_the_program_that_started_it(tmp_path):
+def test_it_dies_with_the_program_that_started_it_and_leaves_no_files(tmp_path):
     file = make_fmu(tmp_path / "quad.fmu")
     command = [sys.executable, "-c", KILLED, str(file), str(tmp_path)]
     with Popen(command, stdin=PIPE, stdout=PIPE, text=True) as program:
@@ -224,6 +238,11 @@ def test_it_dies_with_the_program_that_started_it(tmp_path):
         assert select.select([watched], [], [], 60.0)[0]
     finally:
         os.close(watched)
+    for _ in range(6000):
+        if not (tmp_path / "extracted").exists():
+            return
+        select.select([], [], [], 0.01)
+    pytest.fail("the extracted files are still there")
 
 
 def test_the_steps_are_those_of_the_world():
