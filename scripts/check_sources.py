@@ -1,4 +1,4 @@
-"""Check circles, upward includes, names, words, the tests' folders, what is compiled, and mathematics.
+"""Check circles, upward includes, names, words, the tests' folders, and mathematics.
 
     python scripts/check_sources.py
 
@@ -159,87 +159,6 @@ def mirror() -> Iterator[str]:
                 yield f"{path.relative_to(ROOT)}: src/volery/{folder} has no module that it is named after"
 
 
-CALLABLE_ALIAS = re.compile(r"^(\w+) = Callable\[", re.MULTILINE)
-"""The name of a type of functions."""
-
-
-def uncompilable(source: str, callables: frozenset[str] = frozenset()) -> Iterator[tuple[int, str]]:
-    """Yield line and reason of each construct that mypyc compiles to something else, without an error.
-
-    Args:
-        source: Text of a module that is compiled.
-        callables: Names of types of functions.
-    """
-    tree = ast.parse(source)
-    for line in (line for node in tree.body if isinstance(node, ast.ClassDef) for line in _overridable(node)):
-        yield line, "what a subclass in plain Python sets instead is not read; do not compile it"
-    for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef):
-            found = node.lineno, _miscompiled_function(node, tree, callables)
-        elif isinstance(node, ast.Call):
-            found = node.lineno, _miscompiled_call(node)
-        else:
-            continue
-        if found[1]:
-            yield found
-
-
-def _miscompiled_function(node: ast.FunctionDef, tree: ast.Module, callables: frozenset[str]) -> str:
-    marks = {ast.unparse(one) for one in node.decorator_list}
-    returned = ast.unparse(node.returns) if node.returns else ""
-    if marks & {"cached_property", "functools.cached_property"}:
-        return "a cached_property is computed at every access; compute it in __init__"
-    if "property" in marks and (returned.startswith("Callable[") or returned in callables):
-        return "a call of what the property returns does nothing; make it a method"
-    if _calls_itself(node, tree):
-        return "compiled recursion has no limit and ends the process; use a loop"
-    return ""
-
-
-def _miscompiled_call(node: ast.Call) -> str:
-    called = ast.unparse(node.func)
-    if called in ("eval", "exec") and len(node.args) < 2:
-        return f"{called} without names has no frame to take them from; give it some"
-    if called == "sys._getframe" and node.args:
-        return "compiled functions have no frame, so their number differs; walk them"
-    slots = (one for one in node.keywords if one.arg == "slots" and ast.unparse(one.value) == "True")
-    if called.endswith("dataclass") and any(slots):
-        return "slots=True makes a second, uncompiled class; leave it out"
-    return ""
-
-
-def _calls_itself(function: ast.FunctionDef, module: ast.Module) -> bool:
-    """Return whether a function calls itself, by its name if it is of the module, else as a method."""
-    itself = function.name if function in module.body else f"self.{function.name}"
-    calls = (node for node in ast.walk(function) if isinstance(node, ast.Call))
-    return any(ast.unparse(node.func) == itself for node in calls)
-
-
-def _overridable(node: ast.ClassDef) -> Iterator[int]:
-    """Yield the lines of attributes that a subclass in plain Python may set, of a class that permits some."""
-    marks = " ".join(ast.unparse(mark) for mark in node.decorator_list)
-    if "allow_interpreted_subclasses" not in marks or "dataclass" in marks:
-        return
-    for line in node.body:
-        if isinstance(line, ast.Assign | ast.AnnAssign) and line.value is not None:
-            named = ast.unparse(line)
-            if "ClassVar" not in named and not named.startswith("__slots__"):
-                yield line.lineno
-
-
-def compiled_modules() -> Iterator[str]:
-    """Yield what mypyc would break in the modules that it compiles."""
-    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    texts = [path.read_text() for path in tracked("src/volery") if path.suffix == ".py"]
-    callables = frozenset(name for text in texts for name in CALLABLE_ALIAS.findall(text))
-    for name in settings["tool"]["volery-wheel"]["compiled"]:
-        if not (PACKAGE / name).is_file():
-            yield f"pyproject.toml: there is no src/volery/{name} to compile"
-            continue
-        for line, reason in uncompilable((PACKAGE / name).read_text(), callables):
-            yield f"src/volery/{name}:{line}: mypyc: {reason}"
-
-
 C_LIBRARY = re.compile(r"a?(sin|cos|tan)h?|atan2|cbrt|pow|exp\w*|log\w*")
 """Functions of ``math`` whose last bit depends on the processor."""
 UNTRACED = (
@@ -283,7 +202,7 @@ def main() -> int:
     return 1 if offenders else 0
 
 
-CHECKS = (circles, upward_includes, file_names, words, mirror, compiled_modules, processor_independence)
+CHECKS = (circles, upward_includes, file_names, words, mirror, processor_independence)
 
 if __name__ == "__main__":
     sys.exit(main())

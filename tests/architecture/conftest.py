@@ -23,8 +23,3 @@ def _loaded(name: str) -> ModuleType:
 @pytest.fixture(scope="module")
 def script() -> ModuleType:
     return _loaded("check_sources")
-
-
-@pytest.fixture(scope="module")
-def compiler() -> ModuleType:
-    return _loaded("compile_modules")

@@ -8,7 +8,6 @@ write the same bytes.
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +15,6 @@ from pathlib import Path
 import pytest
 
 import rigs.flown_digests
-from rigs.requirements import lacking
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(1200)]
 
@@ -49,19 +47,3 @@ def test_a_trace_does_not_depend_on_the_processor() -> None:
     here = _output(FLOWN, "numba", PYTHONHASHSEED="0")
     assert here.count("\n") == 5
     assert _output(FLOWN, PYTHONHASHSEED="1", **OLD_PROCESSOR) == here
-
-
-def test_c_code_of_a_wheel_fuses_nothing_on_aarch64(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    clang = shutil.which("clang-19") or lacking("clang-19 is not installed")
-    monkeypatch.syspath_prepend(str(ROOT / "scripts"))
-    from compile_modules import FLAGS
-
-    source = tmp_path / "sum.c"
-    source.write_text("double f(double a, double b, double c) { return a * b + c; }")
-
-    def assembly(*flags: str) -> str:
-        options = ["--target=aarch64-linux-gnu", "-O2", "-S", "-o", "-", *flags, str(source)]
-        return subprocess.run([clang, *options], capture_output=True, text=True, check=True).stdout
-
-    assert "fmadd" in assembly()
-    assert "fmadd" not in assembly(*FLAGS.split())

@@ -7,8 +7,8 @@ square roots alone, which IEEE 754 rounds correctly, and no compiler flag permit
 They are accurate to about two units in the last place. Powers of whole exponents are written as products,
 since ``**`` calls the C library, too; ``math.hypot`` is Python's own.
 
-The functions are plain Python for their callers, part of machine code where that calls them
-(``base.numeric_code``), and compiled by mypyc in a wheel.
+The functions are plain Python for their callers, and part of machine code where that calls them
+(``base.numeric_code``).
 """
 
 from __future__ import annotations

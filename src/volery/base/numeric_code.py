@@ -13,12 +13,10 @@ import ctypes
 import hashlib
 import platform
 import struct
-import sys
 from collections.abc import Callable, Iterable, Sequence
-from functools import cache, cached_property
+from functools import cached_property
 from logging import getLogger
 from pathlib import Path
-from runpy import run_path
 from types import FunctionType
 from typing import Any, TypeVar, cast
 
@@ -43,19 +41,11 @@ def numeric(function: F) -> F:
     return function
 
 
-@cache
-def _source_of(module: str) -> dict[str, Any]:
-    """Return the names of a module that mypyc has compiled, from its source."""
-    library = Path(sys.modules[module].__file__ or "")
-    return run_path(str(library.with_name(module.rpartition(".")[2] + ".py")), run_name=module)
-
-
-def _as_python(value: Any) -> FunctionType | None:
-    """Return a numeric function in Python, also where a compiled one was imported; None for other values."""
-    name = (getattr(value, "__module__", ""), getattr(value, "__name__", ""))
-    if not callable(value) or name not in _numeric:
-        return None
-    return value if isinstance(value, FunctionType) else _source_of(name[0])[name[1]]
+def _numeric_function(value: Any) -> FunctionType | None:
+    """Return a function that is marked as numeric; None for other values."""
+    if isinstance(value, FunctionType) and (value.__module__, value.__name__) in _numeric:
+        return value
+    return None
 
 
 def digest_of(files: Iterable[Path]) -> str:
@@ -160,7 +150,7 @@ def _linked(function: Callable[..., Any], known: dict[Any, Any], njit: Callable[
     source = cast("FunctionType", function)
     scope = dict(source.__globals__)
     for name in source.__code__.co_names:
-        value = _as_python(scope.get(name))
+        value = _numeric_function(scope.get(name))
         if value is not None:
             if value not in known:
                 known[value] = njit(_linked(value, known, njit), error_model="numpy")

@@ -1,8 +1,6 @@
 """Counters inside expressions, where nothing can be assigned: functions without arguments that return None.
 
-They are read whenever code that is counted may block, hundreds of times in a simulated second, so ``ticks.c``
-is this module in C, with the same names and the same counts. ``make wheel`` compiles it; where it stands
-beside this file, Python imports it instead.
+They are read whenever code that is counted may block, hundreds of times in a simulated second.
 """
 
 from __future__ import annotations

@@ -10,8 +10,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.time import Ns
 from volery.trace.events import NONE, Activation
 
@@ -38,7 +36,6 @@ class ComputeResource(Protocol):
         """Execute `amount` ns in the background threads of a process. Never blocks the caller."""
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 @dataclass(frozen=True, eq=False)
 class ExecutionContext:
     """Where execution time is spent: for which component, on which processor, at what priority.

@@ -1,8 +1,5 @@
 """The chunk of a trace that is being filled: message records in the order of the events, and their index.
 
-Every event of a run passes here, so ``chunk.c`` is this module in C, with the same names and the same bytes.
-``make wheel`` compiles it; where it stands beside this file, Python imports it instead.
-
 Format: https://mcap.dev/spec, message and message index records.
 """
 

@@ -1,8 +1,5 @@
 """The lines of a timeline: spans of tasks on cores, other spans, and marks.
 
-A run has a line for every few events, so ``spans.c`` is this module in C, with the same names and the same
-bytes. ``make wheel`` compiles it; where it stands beside this file, Python imports it instead.
-
 Format: *Trace Event Format*, Google, 2016.
 """
 

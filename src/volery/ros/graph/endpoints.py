@@ -10,8 +10,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.errors import UsageError, VoleryError, choices, did_you_mean
 from volery.base.time import Ns, to_seconds
 from volery.kernel.waiting import Signal
@@ -386,7 +384,6 @@ class CallFailedError(Exception):
     """Raised by a handler to fail the call, as a handler of roscpp that returns false; nothing else fails."""
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class ServiceError(VoleryError):
     """A service call failed: there is no server, its handler raised, or no answer came in time.
 

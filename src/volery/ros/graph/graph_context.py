@@ -13,8 +13,6 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, Protocol
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.errors import UsageError, did_you_mean
 from volery.base.time import MS, US, Ns, S
 from volery.kernel.api import Action, Kernel
@@ -222,7 +220,6 @@ _KINDS = {call: f"ros:{call}" for call in ("publish", "sleep", "spin_once")}
 """Texts of the most frequent charges, made once."""
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class NodeContext:
     """A node as its publishers, subscriptions and services use it: their owner, which is charged."""
 

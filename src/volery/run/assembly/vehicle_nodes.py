@@ -23,8 +23,6 @@ from functools import partial
 from random import Random
 from typing import TYPE_CHECKING, NamedTuple
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.elementary import exp, log
 from volery.base.errors import CapabilityError, ModelError, choices
 from volery.base.frames import LocalFrame
@@ -51,7 +49,6 @@ NO_FAULTS = WireFaults()
 """A link without faults."""
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class GraphWire:
     """Route of messages between two nodes. Faults are drawn from *random* in the order of sending."""
 

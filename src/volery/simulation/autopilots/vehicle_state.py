@@ -13,8 +13,6 @@ from dataclasses import dataclass, field
 from math import hypot
 from typing import Any, NamedTuple
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.errors import UsageError
 from volery.base.frames import Vector
 from volery.base.time import Ns, S, from_seconds
@@ -42,7 +40,6 @@ from volery.simulation.autopilots.state_groups import (
 )
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class Manoeuvre:
     """One way of flying or driving.
 

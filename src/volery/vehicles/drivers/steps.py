@@ -16,8 +16,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from math import hypot, isnan
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.errors import Refused, UsageError
 from volery.base.position import AMSL, AboveHome, Position
 from volery.base.time import MINUTE, MS, Ns, S
@@ -339,7 +337,6 @@ class TargetMonitor:
         return not level or abs(target.altitude.metres - goal.altitude.metres) <= SAME_TARGET_M
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class SetpointRepeater(ABC):
     """Repeats one set-point while the vehicle is in *mode*, and manual control while the mode is ours.
 

@@ -7,7 +7,7 @@ angles are radians. ``Flight.to_ned`` and ``Flight.from_ned`` convert from and t
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from math import isfinite, nan
 from typing import Any, cast
 
@@ -86,20 +86,20 @@ TURNINGS = {
 """How the heading is commanded, by whether there are a yaw and a yaw rate."""
 
 
-@dataclass
+@dataclass(slots=True)
 class Setpoint:
     """Set-point of the inner loops, in force until the next one.
 
     Fields that the control does not use are ignored. It is never changed: ``dataclasses.replace`` returns
-    another one. The constructor is written out because mypyc does not compile that of a dataclass.
+    another one.
 
     Args:
         control: The quantities to control.
         position: North, east, down about the estimator's origin [m].
         velocity: North, east, down [m/s]; rover DRIVE: the first is the forward speed.
         roll: Roll angle [rad]; likewise ``pitch``.
-        yaw: Yaw angle, clockwise from north [rad], or
-        yaw_rate: yaw rate [rad/s]; neither: hold the heading (rover DRIVE: drive straight on).
+        yaw: Yaw angle, clockwise from north [rad]; None for none.
+        yaw_rate: Yaw rate [rad/s]; None for none. With neither it holds the heading (rover: straight on).
         throttle: Collective 0..1; rover -1..1.
         steering: Rover: -1..1, right positive.
         climb: Climb rate [m/s].
@@ -117,73 +117,27 @@ class Setpoint:
     """
 
     control: Control
-    position: Vector
-    velocity: Vector
-    roll: float
-    pitch: float
-    yaw: float | None
-    yaw_rate: float | None
-    throttle: float
-    steering: float
-    climb: float
-    speed: float
-    speed_up: float
-    speed_down: float
-    accel: float
-    accel_z: float
-    tilt: float
-    jerk: float
-    straight: bool
-    motor: int
-    roll_rate: float
-    pitch_rate: float
-
-    def __init__(  # noqa: PLR0913  # a field for each kind of control
-        self,
-        control: Control,
-        *,
-        position: Vector = (0.0, 0.0, 0.0),
-        velocity: Vector = (0.0, 0.0, 0.0),
-        roll: float = 0.0,
-        pitch: float = 0.0,
-        yaw: float | None = None,
-        yaw_rate: float | None = None,
-        throttle: float = 0.0,
-        steering: float = 0.0,
-        climb: float = 0.0,
-        speed: float = 10.0,
-        speed_up: float = 2.5,
-        speed_down: float = 1.5,
-        accel: float = 2.5,
-        accel_z: float = 1.0,
-        tilt: float = 0.5235987755982988,
-        jerk: float = 5.0,
-        straight: bool = False,
-        motor: int = 0,
-        roll_rate: float = 0.0,
-        pitch_rate: float = 0.0,
-    ) -> None:
-        self.control = control
-        self.position = position
-        self.velocity = velocity
-        self.roll = roll
-        self.pitch = pitch
-        self.yaw = yaw
-        self.yaw_rate = yaw_rate
-        self.throttle = throttle
-        self.steering = steering
-        self.climb = climb
-        self.speed = speed
-        self.speed_up = speed_up
-        self.speed_down = speed_down
-        self.accel = accel
-        self.accel_z = accel_z
-        self.tilt = tilt
-        self.jerk = jerk
-        self.straight = straight
-        self.motor = motor
-        self.roll_rate = roll_rate
-        self.pitch_rate = pitch_rate
+    _: KW_ONLY
+    position: Vector = (0.0, 0.0, 0.0)
+    velocity: Vector = (0.0, 0.0, 0.0)
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float | None = None
+    yaw_rate: float | None = None
+    throttle: float = 0.0
+    steering: float = 0.0
+    climb: float = 0.0
+    speed: float = 10.0
+    speed_up: float = 2.5
+    speed_down: float = 1.5
+    accel: float = 2.5
+    accel_z: float = 1.0
+    tilt: float = 0.5235987755982988
+    jerk: float = 5.0
+    straight: bool = False
+    motor: int = 0
+    roll_rate: float = 0.0
+    pitch_rate: float = 0.0
 
     def row(self) -> tuple[float, ...]:
         """Return the values in the order of the command columns, from ``C_CONTROL`` on."""

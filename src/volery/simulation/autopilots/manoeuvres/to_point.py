@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from math import dist, hypot, sqrt
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.elementary import atan2, cbrt
 from volery.base.frames import Vector
 from volery.base.time import Ns
@@ -92,7 +90,6 @@ def bearing(start: Vector, end: Vector) -> float:
     return atan2(end[1] - start[1], end[0] - start[0])
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class ToPoint(Manoeuvre):
     """Go to a point with limited speed and hold it.
 
@@ -164,7 +161,6 @@ class ToPoint(Manoeuvre):
         return near and (passing or dist(estimate.target, self.point) < CLOSE)
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class TakeOff(ToPoint):
     """Climb straight up.
 
@@ -193,7 +189,6 @@ class TakeOff(ToPoint):
         return self.vehicle.height > self.height - CLOSE
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class Land(Manoeuvre):
     """Descend straight down: fast while high, slowly near the ground. Without a position it descends level.
 
@@ -247,7 +242,6 @@ class Land(Manoeuvre):
         )
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class Return(Manoeuvre):
     """Climb, fly home, wait, land: each stage is a manoeuvre of its own."""
 
@@ -309,7 +303,6 @@ class Return(Manoeuvre):
             self._begin("land", Land(self.vehicle, (north, east, down)))
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class Brake(Manoeuvre):
     """Stop, and hold the position that is reached.
 

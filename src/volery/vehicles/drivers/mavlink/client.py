@@ -10,8 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from typing import Any, ClassVar, NamedTuple
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.errors import CapabilityError, LinkError, LinkGarbled, LinkSilent
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
@@ -241,7 +239,6 @@ def stream_periods(firmware: Firmware, options: Mapping[str, str]) -> dict[str, 
     return periods
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class MavlinkClient:
     """Client of the first autopilot of its firmware that sends a heartbeat on the link.
 

@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping
 from math import degrees, nan
 from typing import Any, ClassVar
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.errors import UsageError
 from volery.base.position import AMSL, Position
 from volery.base.time import MS, Ns
@@ -47,7 +45,6 @@ RC_CHANNELS = 18
 """Channels in RC_CHANNELS."""
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class TelemetryDecoder(ABC):
     """Decodes MAVLink messages into telemetry.
 

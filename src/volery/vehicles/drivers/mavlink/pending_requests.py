@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from mypy_extensions import mypyc_attr
-
 from volery.base.errors import CapabilityError, NotArrived, Refused
 from volery.base.time import MS, Ns, S
 from volery.kernel.api import Action, Kernel
@@ -26,7 +24,6 @@ STALLED: Ns = S
 T = TypeVar("T")
 
 
-@mypyc_attr(allow_interpreted_subclasses=True)
 class PendingRequests:
     """The requests to one autopilot that are in progress.
 
