@@ -63,6 +63,16 @@ def heading_to_yaw(heading: float) -> float:
 yaw_to_heading = heading_to_yaw
 
 
+def turn_clockwise(vector: tuple[float, float], angle: float) -> tuple[float, float]:
+    """Turn a horizontal vector (north, east) clockwise by *angle* [rad].
+
+    Ahead and right of a body become north and east when they are turned by its heading; its negative does the
+    opposite.
+    """
+    sine, cosine = sine_cosine(angle)
+    return vector[0] * cosine - vector[1] * sine, vector[0] * sine + vector[1] * cosine
+
+
 def map_to_north_east(point: tuple[float, float], x_heading: float) -> tuple[float, float]:
     """Convert a point of a plane map, or a vector, to north and east. Its own inverse.
 

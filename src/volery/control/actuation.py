@@ -15,6 +15,7 @@ from typing import NamedTuple, Protocol
 
 from volery.base.elementary import atan, cos, exp, log, sin
 from volery.base.errors import UsageError
+from volery.base.frames import turn_clockwise
 from volery.control.laws import PidGains, PidLaw
 from volery.control.link_failsafes import BY_STICKS
 from volery.control.turn_prediction import TurnModel, TurnPrediction
@@ -250,8 +251,7 @@ class _TiltLoop:
             return
         roll, pitch, heading = map(radians, attitude)
         ahead, right = -GRAVITY * sin(pitch) / cos(pitch), GRAVITY * sin(roll) / cos(roll)
-        c, s = cos(heading), sin(heading)
-        for law, acceleration in zip(self._laws, (ahead * c - right * s, ahead * s + right * c), strict=True):
+        for law, acceleration in zip(self._laws, turn_clockwise((ahead, right), heading), strict=True):
             law.begin_at(acceleration)
 
     def tilt(self, command: Command, measured: Measured, sample_s: float, most: float) -> tuple[float, float]:
@@ -264,9 +264,8 @@ class _TiltLoop:
             float(law(aim, seen, sample_s).output)
             for law, aim, seen in zip(self._laws, wanted, have, strict=True)
         )
-        c, s = cos(radians(measured.heading)), sin(radians(measured.heading))
-        ahead, right = north * c + east * s, east * c - north * s
-        angles = (degrees(atan(acceleration / GRAVITY)) for acceleration in (ahead, right))
+        ahead_right = turn_clockwise((north, east), -radians(measured.heading))
+        angles = (degrees(atan(acceleration / GRAVITY)) for acceleration in ahead_right)
         forward, sideways = (min(most, max(-most, angle)) for angle in angles)
         return forward, sideways
 

@@ -20,6 +20,7 @@ from volery.base.frames import (
     multiply,
     ned_to_enu,
     quaternion_to_euler,
+    turn_clockwise,
     wrap,
     yaw_to_heading,
 )
@@ -144,3 +145,8 @@ def test_a_frame_given_in_integers_is_that_of_floats() -> None:
     frame = LocalFrame(46, -104, 900)
     assert repr(frame) == "LocalFrame(latitude=46.0, longitude=-104.0, amsl=900.0)"
     assert frame == LocalFrame(46.0, -104.0, 900.0)
+
+
+def test_ahead_and_right_turned_by_the_heading_are_north_and_east_and_back() -> None:
+    assert turn_clockwise((2.0, 1.0), radians(90.0)) == pytest.approx((-1.0, 2.0))
+    assert turn_clockwise(turn_clockwise((2.0, 1.0), 0.3), -0.3) == pytest.approx((2.0, 1.0))

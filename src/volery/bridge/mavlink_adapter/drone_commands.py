@@ -8,8 +8,8 @@ from functools import partial
 from math import degrees, isfinite, radians
 from typing import Any, ClassVar, NamedTuple
 
-from volery.base.elementary import cos, sin
 from volery.base.errors import CapabilityError, Refused, UsageError, choices
+from volery.base.frames import turn_clockwise
 from volery.base.position import AMSL, AboveGround, AboveHome, Altitude, Position
 from volery.bridge.autopilot_link import DJI_ID, PAPARAZZI_ID, AutopilotType, mode_name
 from volery.bridge.mavlink_adapter.command_handler import DroneOperation, Target
@@ -139,7 +139,7 @@ def _north_east(fields: Fields, x: str, y: str, seen: Telemetry) -> tuple[float,
     if fields["coordinate_frame"] not in BODY_FRAMES:
         return first, second
     heading = radians(seen.attitude.heading)
-    return first * cos(heading) - second * sin(heading), first * sin(heading) + second * cos(heading)
+    return turn_clockwise((first, second), heading)
 
 
 def _heading(fields: Fields, seen: Telemetry) -> float | None:

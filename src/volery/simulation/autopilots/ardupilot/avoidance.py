@@ -15,7 +15,7 @@ from math import hypot, inf, pi, radians, sqrt
 from typing import NamedTuple
 
 from volery.base.elementary import atan2, cos, sin
-from volery.base.frames import Vector
+from volery.base.frames import Vector, turn_clockwise
 from volery.base.time import MS, Ns, to_seconds
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, build_of
 from volery.simulation.autopilots.ardupilot.fence import CEILING, CIRCLE, POLYGON, fence_of
@@ -257,26 +257,20 @@ def _is_low(vehicle: Vehicle) -> bool:
     return height is not None and height < parameters["AVOID_ALT_MIN"]
 
 
-def _turned(vector: Level, angle: float) -> Level:
-    """Rotate a vector clockwise by an angle [rad]."""
-    c, s = cos(angle), sin(angle)
-    return vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c
-
-
 def _limited_level(vehicle: Vehicle, velocity: Level, law: Law) -> tuple[Level, Level]:
     """Return a horizontal velocity within the limits, and the velocity of backing away [m/s]."""
     parameters, away = vehicle.parameters, _Retreat()
     if _uses_proximity(vehicle) and not _is_low(vehicle):
         heading, margin = vehicle.estimate.attitude[2], max(0.0, parameters["AVOID_MARGIN"])
         boundary = edges(vehicle)
-        ahead, back = _turned(velocity, -heading), _Retreat()
+        ahead, back = turn_clockwise(velocity, -heading), _Retreat()
         for start, end in boundary:
             towards = _towards_edge((0.0, 0.0), start, end)
             breach = margin - hypot(*towards)
             if breach > max(0.0, parameters["AVOID_BACKUP_DZ"]):
                 back.add(towards, law.speed(breach, BACK_SHARE))
-        velocity = _turned(_within_edges(ahead, (0.0, 0.0), boundary, margin, law), heading)
-        retreat = _turned(back.total(), heading)
+        velocity = turn_clockwise(_within_edges(ahead, (0.0, 0.0), boundary, margin, law), heading)
+        retreat = turn_clockwise(back.total(), heading)
         away.add((-retreat[0], -retreat[1]), hypot(*retreat))
     if _uses_fence(vehicle):
         north, east, _ = vehicle.estimate.position
@@ -407,7 +401,7 @@ def limit_rover(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:
     drives = setpoint.control is Control.DRIVE
     speed = setpoint.velocity[0] if drives else setpoint.speed
     heading = vehicle.estimate.attitude[2]
-    wanted = _turned((speed, 0.0), heading)
+    wanted = turn_clockwise((speed, 0.0), heading)
     law = Law(0.0, min(BRAKE, 0.5 * vehicle.tuning.accel), vehicle.parameters["AVOID_BEHAVE"] == 1.0)
     level, retreat = _limited_level(vehicle, wanted, law)
     level = _backed(level, retreat)

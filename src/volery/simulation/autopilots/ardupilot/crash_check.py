@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import degrees, hypot, radians
 
 from volery.base.elementary import acos, cos, sin
-from volery.base.frames import Vector
+from volery.base.frames import Vector, turn_clockwise
 from volery.base.time import Ns, S
 from volery.simulation.autopilots.ardupilot.failsafes import conditions_of
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, build_of
@@ -36,7 +36,7 @@ crash_of = Kept(CrashState)
 def _down_axis(roll: float, pitch: float, yaw: float) -> Vector:
     """Return the direction of the body's down axis, north, east, down."""
     along, aside = cos(roll) * sin(pitch), -sin(roll)
-    return along * cos(yaw) - aside * sin(yaw), along * sin(yaw) + aside * cos(yaw), cos(roll) * cos(pitch)
+    return *turn_clockwise((along, aside), yaw), cos(roll) * cos(pitch)
 
 
 def _angle(a: Vector, b: Vector) -> float:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from math import hypot, radians
 from typing import Any
 
-from volery.base.elementary import atan2, cos, sin
-from volery.base.frames import Vector, quaternion_to_euler
+from volery.base.elementary import atan2
+from volery.base.frames import Vector, quaternion_to_euler, turn_clockwise
 from volery.base.time import Ns, S, to_seconds
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
 from volery.simulation.autopilots.ardupilot.modes import AUTO_BITS, INFO, LEVEL_AND_HEIGHT, WARNING, enter
@@ -101,8 +101,7 @@ def on_target(vehicle: Vehicle, fields: dict[str, Any], sender: int) -> None:
 
 def _turned(vector: Vector, angle: float) -> Vector:
     """Turn a vector clockwise about the down axis by *angle* [rad]."""
-    c, s = cos(angle), sin(angle)
-    return vector[0] * c - vector[1] * s, vector[1] * c + vector[0] * s, vector[2]
+    return *turn_clockwise(vector[:2], angle), vector[2]
 
 
 class Follow(Manoeuvre):

@@ -9,8 +9,8 @@ from __future__ import annotations
 from math import hypot, isfinite, radians
 from typing import Any, NamedTuple
 
-from volery.base.elementary import atan2, cos, sin
-from volery.base.frames import Vector
+from volery.base.elementary import atan2
+from volery.base.frames import Vector, turn_clockwise
 from volery.simulation.autopilots.ardupilot.commands import FARTHEST_POINT, SLEW_YAW
 from volery.simulation.autopilots.ardupilot.fence import fence_admits
 from volery.simulation.autopilots.manoeuvres.guided_flight import Guided, Turn
@@ -68,8 +68,7 @@ def _given(mask: int, group: int) -> bool:
 def _turned(vehicle: Vehicle, vector: Vector) -> Vector:
     """Rotate forward-right-down to north-east-down by the heading alone."""
     heading = vehicle.estimate.attitude[2]
-    c, s = cos(heading), sin(heading)
-    return vector[0] * c - vector[1] * s, vector[0] * s + vector[1] * c, vector[2]
+    return *turn_clockwise(vector[:2], heading), vector[2]
 
 
 def _turn(vehicle: Vehicle, fields: dict[str, Any], body: bool) -> Turn:

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from math import hypot, radians, sqrt
 from typing import Any
 
-from volery.base.elementary import cos, sin, tan
-from volery.base.frames import Vector, world_to_body
+from volery.base.elementary import tan
+from volery.base.frames import Vector, turn_clockwise, world_to_body
 from volery.base.time import MS, Ns, to_seconds
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, LogForm
 from volery.simulation.autopilots.ardupilot.modes import CRITICAL, INFO
@@ -106,8 +106,8 @@ def _measure(vehicle: Vehicle, sight: Vector, distance: float) -> None:
             return
         scale = height / sight[2]
     turn = radians(vehicle.parameters["PLND_YAW_ALIGN"] * 0.01)
-    forward = (sight[0] * cos(turn) - sight[1] * sin(turn)) * scale
-    right = (sight[0] * sin(turn) + sight[1] * cos(turn)) * scale
+    ahead, aside = turn_clockwise((sight[0], sight[1]), turn)
+    forward, right = ahead * scale, aside * scale
     w, x, y, z = estimate.quaternion
     north, east, down = world_to_body((w, -x, -y, -z), (forward, right, sight[2] * scale))
     here = estimate.position
@@ -172,8 +172,8 @@ def target_place(vehicle: Vehicle) -> Vector:
     p, heading = vehicle.parameters, vehicle.estimate.attitude[2]
     ahead, right = p["PLND_LAND_OFS_X"] / 100.0, p["PLND_LAND_OFS_Y"] / 100.0
     north, east = precision_of(vehicle).place
-    c, s = cos(heading), sin(heading)
-    return north + ahead * c - right * s, east + ahead * s + right * c, 0.0
+    off_north, off_east = turn_clockwise((ahead, right), heading)
+    return north + off_north, east + off_east, 0.0
 
 
 def aim(vehicle: Vehicle, setpoint: Setpoint) -> Setpoint:

@@ -9,8 +9,7 @@ from __future__ import annotations
 from math import hypot, isfinite, pi
 from typing import TYPE_CHECKING, Any
 
-from volery.base.elementary import cos, sin
-from volery.base.frames import Vector
+from volery.base.frames import Vector, turn_clockwise
 from volery.ros.messages.dji_constants import HORIZONTAL, MISSION_SPEEDS, SETPOINT_HEIGHTS, VERTICAL, Flag
 from volery.simulation.autopilots.dji.parameters import SDK_CLIMB, SDK_SPEED, SDK_TILT
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
@@ -128,8 +127,7 @@ class SdkControl(Manoeuvre):
         if not command.flag & Flag.BODY:
             return command.y, command.x
         heading = self.vehicle.estimate.attitude[2]
-        c, s = cos(heading), sin(heading)
-        return command.x * c + command.y * s, command.x * s - command.y * c
+        return turn_clockwise((command.x, -command.y), heading)
 
     def _down(self, command: SdkCommand) -> float:
         home = self.vehicle.home

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import hypot, radians
 
 from volery.base.elementary import atan2, cos, sin, tan
-from volery.base.frames import Vector
+from volery.base.frames import Vector, turn_clockwise
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Circle
@@ -197,12 +197,12 @@ class Loiter(ClimbByThrottle):
         forward = -GRAVITY * tan(pilot.pitch * tuning.loiter_tilt)
         right = GRAVITY * tan(pilot.roll * tuning.loiter_tilt)
         heading = self.vehicle.estimate.attitude[2]
-        c, s = cos(heading), sin(heading)
+        northward, eastward = turn_clockwise((forward, right), heading)
         drag = self._drag()
         kept = 1.0 / (1.0 + drag * passed)  # the drag at the end of the step: it cannot overshoot
         north, east = self._velocity
-        north += (forward * c - right * s) * passed
-        east += (forward * s + right * c) * passed
+        north += northward * passed
+        east += eastward * passed
         self._velocity = (north * kept, east * kept)
 
     def _let_go(self, now: Ns, passed: float) -> None:
@@ -289,8 +289,7 @@ class Drift(Stabilize):
             return
         north, east, _ = vehicle.estimate.velocity
         heading = vehicle.estimate.attitude[2]
-        ahead = north * cos(heading) + east * sin(heading)
-        right = east * cos(heading) - north * sin(heading)
+        ahead, right = turn_clockwise((north, east), -heading)
         pitch = pilot.pitch * tuning.tilt if pilot.pitch else DRIFT_DAMPING * ahead
         most = tuning.tilt
         vehicle.drive(

@@ -8,8 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import isfinite
 
-from volery.base.elementary import cos, sin
-from volery.base.frames import Vector, enu_to_ned, wrap
+from volery.base.frames import Vector, enu_to_ned, turn_clockwise, wrap
 from volery.base.time import MS, Ns, from_seconds, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.flight_stack.guidance import approach
@@ -352,7 +351,7 @@ class Guided(Guidance):
         now = self._setpoint
         if flags & BODY:
             heading = self.vehicle.estimate.attitude[2]
-            x, y = x * cos(heading) - y * sin(heading), x * sin(heading) + y * cos(heading)
+            x, y = turn_clockwise((x, y), heading)
         if flags & VELOCITY_PLANE:
             return replace(now, north=x, east=y, plane_is_velocity=True)
         if flags & (OFFSET_PLANE | BODY):

@@ -10,7 +10,7 @@ from itertools import pairwise
 from math import dist, hypot, inf, pi
 
 from volery.base.elementary import atan2, cos, sin
-from volery.base.frames import Vector
+from volery.base.frames import Vector, turn_clockwise
 from volery.base.time import Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import AltitudeHold, ManualFlight
@@ -234,11 +234,7 @@ class Orbit(Manoeuvre):
         pull = size - hypot(north - self.centre[0], east - self.centre[1])
         along = self.speed * (1.0 if self.radius > 0.0 else -1.0) * max(0.0, 1.0 - abs(pull) / size)
         inward = min(2.5, max(-2.5, pull))
-        velocity = (
-            inward * cos(angle) - along * sin(angle),
-            inward * sin(angle) + along * cos(angle),
-            0.0,
-        )
+        velocity = (*turn_clockwise((inward, along), angle), 0.0)
         vehicle.drive(
             Setpoint(
                 Control.VELOCITY_HEIGHT,
@@ -418,14 +414,14 @@ class PositionControl(ManualFlight):
     def _move(self, forward: float, right: float, passed: float) -> None:
         p = self.vehicle.parameters
         heading = self.vehicle.estimate.attitude[2]
-        c, s = cos(heading), sin(heading)
         north, east = self._velocity
         push, top = p["MPC_ACC_HOR"], STICK_SPEED_SHARE * p["MPC_VEL_MANUAL"]
         if forward or right:
             self._held = None
             kept = 1.0 / (1.0 + push / top * passed)
-            north = (north + push * (forward * c - right * s) * passed) * kept
-            east = (east + push * (forward * s + right * c) * passed) * kept
+            northward, eastward = turn_clockwise((forward, right), heading)
+            north = (north + push * northward * passed) * kept
+            east = (east + push * eastward * passed) * kept
             self._velocity = (north, east)
             return
         speed = hypot(north, east)

@@ -14,8 +14,7 @@ from collections.abc import Mapping
 from math import hypot, isfinite, nan
 from typing import Any, NamedTuple
 
-from volery.base.elementary import cos, sin
-from volery.base.frames import Quaternion, Vector, quaternion_to_euler
+from volery.base.frames import Quaternion, Vector, quaternion_to_euler, turn_clockwise
 from volery.base.time import MS, Ns, to_seconds
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.mavlink.messages import FARTHEST, all_within
@@ -197,8 +196,7 @@ def _turned(vehicle: Vehicle, vector: Vector) -> Vector:
         return nan, nan, vector[2]
     x, y = (value if isfinite(value) else 0.0 for value in vector[:2])
     heading = vehicle.estimate.attitude[2]
-    c, s = cos(heading), sin(heading)
-    return x * c - y * s, x * s + y * c, vector[2]
+    return *turn_clockwise((x, y), heading), vector[2]
 
 
 def _target(fields: dict[str, Any], position: Vector) -> OffboardTarget | None:
