@@ -199,8 +199,101 @@ Settings = Mapping[str, Callable[[float], float]]
 """New values of parameters from the present ones, by name; a function raises if this value rules it out."""
 
 
-class Driver(Protocol):
+def _absent(name: str, capability: Capability) -> CapabilityError:
+    return CapabilityError(f"{name} cannot {capability.value}: its driver has no steps for it")
+
+
+class SetpointDriver(Protocol):
+    """The part of a driver that streams set-points and manual control.
+
+    Each is called with its capability only; a driver without it inherits what stands here.
+    """
+
+    name: str
+
+    def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
+        """Follow a velocity and *yaw_rate* (degrees/s, clockwise) for *lasting* or until another step."""
+        raise _absent(self.name, Capability.VELOCITY)
+
+    def acceleration(self, acceleration: Acceleration, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
+        """Follow an acceleration and *yaw_rate*, as ``velocity``."""
+        raise _absent(self.name, Capability.ACCELERATION)
+
+    def attitude(self, target: AttitudeTarget, lasting: Ns) -> Sequence[Step]:
+        """Follow an attitude and thrust for *lasting* or until another step, then stop."""
+        raise _absent(self.name, Capability.ATTITUDE)
+
+    def heading(self, degrees: float) -> Sequence[Step]:
+        """Turn to *degrees* clockwise from north."""
+        raise _absent(self.name, Capability.HEADING)
+
+    def stabilize(self) -> Sequence[Step]:
+        """Enter the mode in which manual control commands attitude and throttle."""
+        raise _absent(self.name, Capability.STABILIZE)
+
+    def altitude_hold(self) -> Sequence[Step]:
+        """Enter the mode in which manual control commands attitude and climb rate."""
+        raise _absent(self.name, Capability.ALTITUDE_HOLD)
+
+    def manual(self) -> Sequence[Step]:
+        """Enter the mode in which manual control commands the wheels of a rover."""
+        raise _absent(self.name, Capability.MANUAL_CONTROL)
+
+    def hand_over(self) -> Sequence[Step]:
+        """Stop all set-points and manual control, so that the pilot's transmitter flies the vehicle."""
+        raise _absent(self.name, Capability.MANUAL_CONTROL)
+
+    def manual_control(self, control: ManualControl | None) -> None:
+        """Repeat *control* until the next call; ``None`` ends the repetition."""
+        if control is not None:
+            raise _absent(self.name, Capability.MANUAL_CONTROL)
+
+
+class ServicesDriver(Protocol):
+    """The part of a driver beside flying: what is on board, what is asked for, a lost link.
+
+    A driver without one of these inherits what stands here.
+    """
+
+    name: str
+
+    @property
+    def services(self) -> Services | None:
+        """Services beside flying; ``None`` if the protocol or the link carries none."""
+        return None
+
+    def request_attitude(self) -> None:
+        """Receive roll and pitch from now on, where these are not received anyway; it may wait for them."""
+        return
+
+    def request_obstacles(self) -> None:
+        """Receive what range sensors measure from now on, where the protocol carries it."""
+        return
+
+    def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
+        """Replace the mission on board."""
+        raise _absent(self.name, Capability.MISSION)
+
+    def start_mission(self, within: Ns) -> Sequence[Step]:
+        """Arm, start the uploaded mission; done when its last item has finished."""
+        raise _absent(self.name, Capability.MISSION)
+
+    def on_link_loss(self) -> str:
+        """Return the reaction to a lost link in one line; empty until the parameters are known."""
+        return "its driver does not know"
+
+    def link_loss_settings(self, action: LinkLossAction) -> Settings:
+        """Return the parameters with which the autopilot does *action* when the link is lost.
+
+        None where it does so anyway. Raises ``CapabilityError`` where it cannot be asked for that.
+        """
+        raise CapabilityError(f"{self.name}: its driver cannot make it {action} when the link is lost")
+
+
+class Driver(SetpointDriver, ServicesDriver, Protocol):
     """Commands one autopilot. Each operation returns the steps to execute, in order.
+
+    What has no body here every driver has: ``examples/driver`` is one of no more than that.
 
     Attributes:
         name: name of the vehicle.
@@ -208,9 +301,8 @@ class Driver(Protocol):
         landing_modes: modes in which a drone is landing or returning by itself.
     """
 
-    name: str
     telemetry: Telemetry
-    landing_modes: frozenset[str]
+    landing_modes: frozenset[str] = frozenset()
 
     @property
     def offboard_mode(self) -> str:
@@ -227,19 +319,11 @@ class Driver(Protocol):
         A round processes received messages and sleeps for the period of the loop. A task that waits runs the
         rounds itself, so that their execution time is charged to it.
         """
-
-    @property
-    def services(self) -> Services | None:
-        """Services beside flying; ``None`` if the protocol or the link carries none."""
+        return None
 
     def poll(self) -> None:
         """Process received messages without waiting."""
-
-    def request_attitude(self) -> None:
-        """Receive roll and pitch from now on, where these are not received anyway; it may wait for them."""
-
-    def request_obstacles(self) -> None:
-        """Receive what range sensors measure from now on, where the protocol carries it."""
+        return
 
     def ready(self, within: Ns) -> Sequence[Step]:
         """Wait until the vehicle could arm and go to a position."""
@@ -259,56 +343,14 @@ class Driver(Protocol):
     def hold(self) -> Sequence[Step]:
         """Stop and hold the position."""
 
-    def velocity(self, velocity: Velocity, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
-        """Follow a velocity and *yaw_rate* (degrees/s, clockwise) for *lasting* or until another step."""
-
-    def acceleration(self, acceleration: Acceleration, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
-        """Follow an acceleration and *yaw_rate*, as ``velocity``."""
-
-    def attitude(self, target: AttitudeTarget, lasting: Ns) -> Sequence[Step]:
-        """Follow an attitude and thrust for *lasting* or until another step, then stop."""
-
-    def heading(self, degrees: float) -> Sequence[Step]:
-        """Turn to *degrees* clockwise from north."""
-
     def return_home(self, within: Ns) -> Sequence[Step]:
         """Return home; a drone lands there, a rover stops there."""
 
     def land(self, within: Ns) -> Sequence[Step]:
         """Land in place; done when disarmed."""
 
-    def stabilize(self) -> Sequence[Step]:
-        """Enter the mode in which manual control commands attitude and throttle."""
-
-    def altitude_hold(self) -> Sequence[Step]:
-        """Enter the mode in which manual control commands attitude and climb rate."""
-
-    def hand_over(self) -> Sequence[Step]:
-        """Stop all set-points and manual control, so that the pilot's transmitter flies the vehicle."""
-
-    def manual(self) -> Sequence[Step]:
-        """Enter the mode in which manual control commands the wheels of a rover."""
-
-    def manual_control(self, control: ManualControl | None) -> None:
-        """Repeat *control* until the next call; ``None`` ends the repetition."""
-
-    def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
-        """Replace the mission on board."""
-
-    def start_mission(self, within: Ns) -> Sequence[Step]:
-        """Arm, start the uploaded mission; done when its last item has finished."""
-
     def stop(self) -> None:
         """Stop repeating manual control and set-points."""
-
-    def on_link_loss(self) -> str:
-        """Return the reaction to a lost link in one line; empty until the parameters are known."""
-
-    def link_loss_settings(self, action: LinkLossAction) -> Settings:
-        """Return the parameters with which the autopilot does *action* when the link is lost.
-
-        None where it does so anyway. Raises ``CapabilityError`` where it cannot be asked for that.
-        """
 
     def problem(self) -> LinkError | CapabilityError | None:
         """Return what is wrong with the link, or why the vehicle is not supported, as an error to raise."""

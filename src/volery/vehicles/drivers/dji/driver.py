@@ -17,11 +17,11 @@ from volery.base.time import Ns, to_seconds
 from volery.kernel.api import Action, Kernel
 from volery.ros.messages.dji_constants import GUIDES, HEADERS, HEALTHY_GPS, DisplayMode, Source
 from volery.vehicles.driver import (
-    Acceleration,
     AttitudeTarget,
     Capability,
     LinkLossAction,
     ManualControl,
+    SetpointDriver,
     Settings,
     Step,
 )
@@ -61,7 +61,7 @@ CAPABILITIES = frozenset(Capability) - {Capability.TERRAIN, Capability.ACCELERAT
 _NONE: frozenset[Capability] = frozenset()
 
 
-class Dji:
+class Dji(SetpointDriver):
     """Driver of a DJI aircraft. See ``vehicles.driver.Driver`` for the operations."""
 
     landing_modes = LANDING_MODES
@@ -180,10 +180,6 @@ class Dji:
         follow = immediate_step("fly on", lambda: self._steps.follow(Tilted(target, until)), enters=SDK)
         return (*self._steps.leave_descent("follow an attitude"), self._steps.authority(), follow)
 
-    def acceleration(self, acceleration: Acceleration, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
-        """Raise ``CapabilityError``: the SDK takes positions, velocities and attitudes."""
-        raise CapabilityError(f"{self.name}: a DJI follows positions, velocities and attitudes only")
-
     def heading(self, degrees: float) -> Sequence[Step]:
         """Turn in place."""
         if self.telemetry.flying and not isfinite(self.telemetry.above_home):
@@ -227,10 +223,6 @@ class Dji:
             leads_to=STARTS,
         )
         return (self._steps.activated(), *self._steps.leave_descent(ask), self._steps.authority(), step)
-
-    def manual(self) -> Sequence[Step]:
-        """Raise ``CapabilityError``: this is for rovers."""
-        raise CapabilityError(f"{self.name} is a drone; manual control of wheels is for rovers")
 
     def manual_control(self, control: ManualControl | None) -> None:
         """Send *control* while it is flown manually; ``None`` ends that."""

@@ -21,11 +21,11 @@ from volery.base.position import AboveHome, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Action, Kernel
 from volery.vehicles.driver import (
-    Acceleration,
-    AttitudeTarget,
     Capability,
     LinkLossAction,
-    MissionItem,
+    ManualControl,
+    ServicesDriver,
+    SetpointDriver,
     Settings,
     Step,
 )
@@ -67,7 +67,7 @@ climb by throttle: version 6.2 does not follow it in ATTITUDE_RC_CLIMB.
 _NONE: frozenset[Capability] = frozenset()
 
 
-class Paparazzi:
+class Paparazzi(SetpointDriver, ServicesDriver):
     """Driver of a Paparazzi rotorcraft. See ``vehicles.driver.Driver`` for the operations.
 
     Raises ``UsageError`` if the aircraft's flight plan does not have *blocks*.
@@ -80,11 +80,11 @@ class Paparazzi:
         self.name = backend.telemetry.name
         self.telemetry = backend.telemetry
         self._backend = backend
-        self.services = PaparazziServices(kernel, backend)
+        self._services = PaparazziServices(kernel, backend)
         self._steps = PaparazziSteps(kernel, backend)
         self._setpoints = self._steps.setpoints
         self.problem = backend.problem
-        self.manual_control, self.stop = self._setpoints.set_control, self._setpoints.end
+        self.stop = self._setpoints.end
         self._takeoff_and_landing = TakeoffAndLanding(self._steps, blocks)
         self._takeover = Takeover(kernel, backend.telemetry, GUIDED)
 
@@ -100,6 +100,11 @@ class Paparazzi:
 
     def poll(self) -> None:
         """Do nothing: messages are processed as they arrive."""
+
+    @property
+    def services(self) -> PaparazziServices:
+        """Parameters and payload, as far as it has them."""
+        return self._services
 
     def on_link_loss(self) -> str:
         """Return the reaction to a lost link, as far as the flight plan states it."""
@@ -128,12 +133,6 @@ class Paparazzi:
         self._backend.close()
 
     # -- on the ground
-
-    def request_attitude(self) -> None:
-        """Do nothing: the attitude arrives without a request."""
-
-    def request_obstacles(self) -> None:
-        """Do nothing: pprzlink carries no distances of obstacles."""
 
     def ready(self, within: Ns) -> Sequence[Step]:
         """Wait for a fix, an origin, an aligned attitude, and checked settings."""
@@ -187,14 +186,6 @@ class Paparazzi:
             "fly on", lambda: self._setpoints.follow_velocity(velocity, yaw_rate, lasting)
         )
         return (*self._steps.guided(), follow)
-
-    def acceleration(self, acceleration: Acceleration, yaw_rate: float, lasting: Ns) -> Sequence[Step]:
-        """Raise ``CapabilityError``: GUIDED takes positions and velocities only."""
-        raise CapabilityError(f"{self.name}: a Paparazzi in GUIDED follows positions and velocities only")
-
-    def attitude(self, target: AttitudeTarget, lasting: Ns) -> Sequence[Step]:
-        """Raise ``CapabilityError``: GUIDED takes positions and velocities only."""
-        raise CapabilityError(f"{self.name}: a Paparazzi in GUIDED follows positions and velocities only")
 
     def heading(self, degrees: float) -> Sequence[Step]:
         """Turn in place in GUIDED."""
@@ -260,16 +251,6 @@ class Paparazzi:
             self._steps.change_mode(HEIGHT_MODE),
         )
 
-    def manual(self) -> Sequence[Step]:
-        """Raise ``CapabilityError``: this is for rovers."""
-        raise CapabilityError(f"{self.name}: a rotorcraft has no wheels to steer by hand")
-
-    # -- missions
-
-    def upload(self, mission: Sequence[MissionItem]) -> Sequence[Step]:
-        """Raise ``CapabilityError``: a flight plan is built into the aircraft."""
-        raise CapabilityError(f"{self.name}: {len(mission)} items: a Paparazzi's plan is built into it")
-
-    def start_mission(self, within: Ns) -> Sequence[Step]:
-        """Raise ``CapabilityError``: a flight plan is built into the aircraft."""
-        raise CapabilityError(f"{self.name}: a Paparazzi's flight plan is built into it")
+    def manual_control(self, control: ManualControl | None) -> None:
+        """Repeat *control*; ``None`` ends the repetition."""
+        self._setpoints.set_control(control)

@@ -688,5 +688,5 @@ def test_numbers_beyond_any_meaning_upset_nothing(bench: Make) -> None:
 
 def test_what_a_drone_is_not(bench: Make) -> None:
     made = bench()
-    with pytest.raises(CapabilityError, match="rovers"):
+    with pytest.raises(CapabilityError, match="no steps"):
         made.driver.manual()
