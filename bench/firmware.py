@@ -88,7 +88,8 @@ def _same_samples(project: str, instance: Instance, flight: Flight, seconds: flo
     period, clock = exchange.period, 0
     while clock < BOOT:  # the start script of PX4 answers nothing
         clock += period
-        exchange.send(clock, row, 0.0)
+        exchange.prepare(clock, row, 0.0)
+        exchange.send()
         exchange.receive()
     answer = _datagrams(exchange, row) if project == "ardupilot" else _frames(exchange, row)
     readings = READ_EVERY // period
@@ -106,7 +107,8 @@ def _datagrams(exchange: Any, row: list[float]) -> Callable[[int], None]:
     """Return what answers an ArduPilot: the text is made once."""
     port, sent = exchange._socket, []
     exchange._socket = SimpleNamespace(sendto=lambda octets, _: sent.append(octets))
-    exchange.send(0, row, 0.0)
+    exchange.prepare(0, row, 0.0)
+    exchange.send()
     exchange._socket = port
     head, tail = sent[0].split(b"0.000000000000", 1)
 
@@ -210,6 +212,7 @@ def flown(chosen: list[Program], seconds: float, *, measured: bool = False) -> F
             shares.measure(world, "_advance", "world")
             for autopilot in autopilots:
                 shares.measure(autopilot._exchange, "receive", "firmware")
+                shares.measure(autopilot._exchange, "prepare", "exchange")
                 shares.measure(autopilot._exchange, "send", "exchange")
                 shares.measure(autopilot._ground, "read", "telemetry")
             begun = perf_counter()

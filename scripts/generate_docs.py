@@ -579,8 +579,7 @@ def firmware_faults() -> str:
         "the air, a link or a computer beside has it; the firmware itself has none. Parameters are set at",
         "the time of the fault and get their values back at its end; of two names the firmware has one. A",
         "fault that a program cannot be given is refused by name before the run, or, if it boots in the",
-        "run, as soon as it has answered. A barometer or compass that is stuck repeats its value on",
-        "ArduPilot, and is silent on PX4.\n",
+        "run, as soon as it has answered.\n",
         "## What they do\n",
         "`bench/firmware_faults.py` lets each fault strike in each phase of a flight, for good, and",
         "watches for 45 s what the vehicle does: the real program, and the simulated autopilot of the",
@@ -613,8 +612,9 @@ def firmware_faults() -> str:
 
 def _way(way: Way | LinkFrom | ByParameters | None) -> str:
     if isinstance(way, ByParameters):
+        values = " times its angle in eighths of a turn" if way.unit else ""
         groups = (" or ".join(f"`{name}` {value:g}" for name, value in group) for group in way.settings)
-        return ", ".join(groups)
+        return ", ".join(groups) + values
     if isinstance(way, LinkFrom):
         return f"{Way.LINK.value}, from {way.major}.{way.minor} on"
     return way.value if way is not None else "refused"

@@ -6,21 +6,18 @@ file plays the firmware: it ends with an error at the first frames whose answers
     python tests/rigs/recorded_firmware.py record PROGRAM FILE     with a real firmware
     python tests/rigs/recorded_firmware.py FILE MODE [OPTIONS]     in the place of a firmware
 
-*MODE* is ``play``, or what happens at frame 400: ``die``, ``hang``, ``repeat`` (each question thrice),
-``foreign`` (a packet of another kind).
+*MODE* is ``play``, ``absent`` (it lacks a parameter), or what happens at frame 400: ``die``, ``hang``,
+``repeat`` (each question thrice), ``foreign`` (a packet of another kind).
 """
 
 from __future__ import annotations
 
-import fcntl
 import gzip
 import json
-import os
 import socket
 import stat
 import struct
 import sys
-import termios
 import threading
 from hashlib import blake2b
 from itertools import groupby
@@ -32,6 +29,7 @@ QUESTION = struct.Struct("<HHI16H")
 DIGEST_EVERY = 100
 FAULT_AT = 400
 LIMIT_S = 20.0
+ABSENT = "NO_SUCH_PARAM"
 
 
 def stand_in(folder: Path, recording: Path, mode: str = "play") -> Path:
@@ -53,12 +51,6 @@ def _digests(answers: list[bytes]) -> list[str]:
     return [blake2b(b"".join(group), digest_size=6).hexdigest() for group in groups]
 
 
-def _wait_until_arrived(stream: socket.socket) -> None:
-    """Wait until the other end could read all: what comes after the next question is read later."""
-    while any(fcntl.ioctl(stream, termios.TIOCOUTQ, bytes(4))):  # octets that are not acknowledged
-        os.sched_yield()
-
-
 def play(recording: Path, mode: str, options: list[str]) -> int:
     """Answer as the recorded firmware did; return the exit code."""
     with gzip.open(recording, "rt", encoding="ascii") as file:
@@ -67,16 +59,18 @@ def play(recording: Path, mode: str, options: list[str]) -> int:
     said = {int(frame): bytes.fromhex(text) for frame, text in recorded["said"].items()}
     (serial,) = [option for option in options if option.startswith("--serial0=")]
     instance = next(int(option[2:]) for option in options if option.startswith("-I"))
-    ground = socket.create_connection(("127.0.0.1", int(serial.rpartition(":")[2])))
+    ground = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    ground.connect(("127.0.0.1", int(serial.rpartition(":")[2])))
     world = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     world.settimeout(LIMIT_S)
     to = "127.0.0.1", 9002 + 10 * instance
     _say("a recorded firmware")
+    if mode == "absent":
+        _say(f"Ignored unknown param {ABSENT} in defaults file parameters.parm")
     answers: list[bytes] = []
     for frame, group in enumerate(pulses):
         if frame in said:
-            ground.sendall(said[frame])
-            _wait_until_arrived(ground)
+            ground.send(said[frame])
         question = QUESTION.pack(18_458, 1200, frame, *group)
         if frame == FAULT_AT and mode == "die":
             _say("it has run out of frames")

@@ -106,6 +106,7 @@ LENGTH = Kind("length", "m", "0.3 m, 30 cm or 1.2 km")
 SPEED = Kind("speed", "m/s", "3 m/s or 18 km/h")
 ANGLE = Kind("angle", "deg", "30 deg or 0.5 rad")
 TURN_RATE = Kind("turn rate", "deg/s", "2 deg/min or 0.1 rad/s")
+ACCELERATION = Kind("acceleration", "m/s^2", "0.3 m/s^2")
 ENERGY = Kind("energy", "J", "3 mJ or 0.2 Wh")
 CHARGE = Kind("battery capacity", "C", "5 Ah or 5200 mAh")
 POWER = Kind("power", "W", "2.7 W or 300 mW")
@@ -118,8 +119,8 @@ AREA = Kind("area", "m^2", "0.05 m^2")
 RESISTANCE = Kind("resistance", "Ohm", "12 mOhm")
 RATIO = Kind("ratio", "1", "0.5 % or 0.005")
 KINDS = (
-    TIME, FREQUENCY, LENGTH, SPEED, ANGLE, TURN_RATE, ENERGY, POWER, CHARGE, VOLTAGE, BANDWIDTH, DATA_SIZE,
-    MASS, FORCE, AREA, RESISTANCE, RATIO,
+    TIME, FREQUENCY, LENGTH, SPEED, ANGLE, TURN_RATE, ACCELERATION, ENERGY, POWER, CHARGE, VOLTAGE, BANDWIDTH,
+    DATA_SIZE, MASS, FORCE, AREA, RESISTANCE, RATIO,
 )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from volery.model import rules
 from volery.model.added_sensors import ADDED_SENSORS, AddedSensor, Camera, RangingSensor
 from volery.model.airframes import FRAMES
 from volery.model.fields import (
+    ACCELERATION,
     HEADING,
     NETWORK,
     PROCESSOR,
@@ -28,7 +29,9 @@ from volery.model.fields import (
     SPEED,
     TEXT,
     TIME,
+    TURN_RATE,
     VEHICLE,
+    Angle,
     Duration,
     Record,
     Reference,
@@ -37,6 +40,7 @@ from volery.model.fields import (
     Whole,
     WrongValueError,
     expected,
+    shown,
 )
 from volery.model.reading import Reading
 from volery.model.text import Node, Path
@@ -211,6 +215,59 @@ class BarometerStuck(VehicleFault):
 @dataclass(frozen=True, kw_only=True)
 class CompassStuck(VehicleFault):
     """The compass repeats its last value."""
+
+
+class _EighthTurns(Angle):
+    """An angle by which a sensor can be mounted wrongly about the vertical: eighths of a turn."""
+
+    def read(self, node: Node, path: Path, reading: Reading) -> float:
+        """See ``Syntax``."""
+        angle = super().read(node, path, reading)
+        if angle % 45.0 or not angle:
+            raise WrongValueError(f"{shown(node)}: give a multiple of 45 deg, such as 90 deg")
+        return angle
+
+    def schema(self, definitions: Schema) -> Schema:
+        """See ``Syntax``."""
+        return super().schema(definitions) | {"x-quantity": "degrees, a multiple of 45"}
+
+
+@fault("compass-turned")
+@dataclass(frozen=True, kw_only=True)
+class CompassTurned(VehicleFault):
+    """The compass is turned on its mount, or its orientation is stated wrongly."""
+
+    turn_deg: Annotated[
+        float,
+        _EighthTurns(360.0, turn=True),
+        "Angle of the turn, clockwise from above: a multiple of 45 deg.",
+    ] = 90.0
+
+
+@fault("imu-biased")
+@dataclass(frozen=True, kw_only=True)
+class ImuBiased(VehicleFault):
+    """Gyroscope and accelerometer are off by constant values, the same on each of their three axes."""
+
+    gyro_deg_s: Annotated[float, TURN_RATE, "Error of the gyroscope."] = 3.0
+    accel_m_s2: Annotated[float, ACCELERATION, "Error of the accelerometer."] = 0.5
+
+
+@fault("imu-noisy")
+@dataclass(frozen=True, kw_only=True)
+class ImuNoisy(VehicleFault):
+    """Gyroscope and accelerometer have more white noise, as on a mount that passes vibration on."""
+
+    gyro_deg_s: Annotated[float, TURN_RATE, "Standard deviation that is added to the gyroscope's."] = 10.0
+    accel_m_s2: Annotated[float, ACCELERATION, "Standard deviation that is added to the accelerometer's."] = (
+        5.0
+    )
+
+
+@fault("rc-lost")
+@dataclass(frozen=True, kw_only=True)
+class RcLost(VehicleFault):
+    """The receiver of the pilot's transmitter hears nothing."""
 
 
 # -- sensors that a model adds

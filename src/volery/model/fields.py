@@ -35,7 +35,7 @@ SHORT = "x-short"
 _LONGEST_SHOWN = 200
 """Characters of a value in a message."""
 NAME = r"^[A-Za-z_][A-Za-z0-9_-]*$"
-_UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s|m2|m|deg|coulomb|kg|ohm|v|w|j|b)$")
+_UNIT_SUFFIX = re.compile(r"_(ns|hz|bit_s|m_s2|m_s|m2|m|deg_s|deg|coulomb|kg|ohm|v|w|j|b)$")
 
 
 class WrongValueError(ValueError):
@@ -646,6 +646,8 @@ DATA_SIZE = Quantity(units.DATA_SIZE, least=0)
 LENGTH = Quantity(units.LENGTH)
 DISTANCE = Quantity(units.LENGTH, least=0)
 SPEED = Quantity(units.SPEED, least=0)
+TURN_RATE = Quantity(units.TURN_RATE, least=0)
+ACCELERATION = Quantity(units.ACCELERATION, least=0)
 CHARGE = Quantity(units.CHARGE, above=0)
 VOLTAGE = Quantity(units.VOLTAGE, above=0)
 LOSS = Quantity(units.RATIO, least=0, most=0.99)

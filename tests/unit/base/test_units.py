@@ -72,7 +72,7 @@ def test_times_are_exact_nanoseconds(written, ns):
         (float("inf"), ["inf is not finite"]),
         ("1e999 s", ["is not a unit"]),
         ("3 Ms", ["there is no unit 'Ms'"]),
-        ("3 m/s^2", ["is in s^-2 m"]),
+        ("3 m/s^3", ["is in s^-3 m"]),
     ],
 )
 def test_what_is_refused(written, pieces):

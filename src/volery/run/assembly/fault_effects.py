@@ -30,11 +30,14 @@ from volery.model.faults import (
     BatteryLow,
     CameraBlack,
     CompassStuck,
+    CompassTurned,
     ComputerSlowed,
     ComputerStopped,
     Fault,
     GpsDrift,
     GpsLost,
+    ImuBiased,
+    ImuNoisy,
     LinkCut,
     LinkDegraded,
     MotorDead,
@@ -44,6 +47,7 @@ from volery.model.faults import (
     ProcessorFault,
     RangesMaximum,
     RangesNotANumber,
+    RcLost,
     SensorClockOff,
     SensorSilent,
     SensorStuck,
@@ -54,6 +58,7 @@ from volery.run.assembly.computers import LOAD_PERIOD, LOAD_PRIORITY, load_name
 from volery.run.assembly.sensor_node import Alteration
 from volery.run.assembly.simulated_fleet import SimulatedFleet, wind_of
 from volery.simulation.added_sensors.beams import BeamSensor
+from volery.simulation.autopilots.autopilot import Autopilot
 from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.simulation.real_firmware.lock_step import RealFirmware
 from volery.simulation.real_firmware.outside_program import OutsideProgram
@@ -155,6 +160,15 @@ def inject(faults: Iterable[Fault], affected: Affected) -> None:
             autopilot = affected.fleet.autopilots[fault.vehicle]
             if isinstance(autopilot, RealFirmware | OutsideProgram):
                 autopilot.require(fault.kind, fault.name)
+            elif (
+                isinstance(fault, RcLost)
+                and isinstance(autopilot, Autopilot)
+                and not autopilot.vehicle.rules.rc.can_be_lost
+            ):
+                raise CapabilityError(
+                    f"fault {fault.name}: the simulated {autopilot.firmware.name} of {fault.vehicle} does "
+                    "without a transmitter; leave it out, or fly that vehicle on real firmware"
+                )
         kernel.call_at(fault.at_ns, partial(_happen, fault, affected, True))
         if fault.duration_ns is not None:
             kernel.call_at(fault.at_ns + fault.duration_ns, partial(_happen, fault, affected, False))
@@ -187,6 +201,20 @@ def _flight_effect(act: Callable[[Any, Any, bool], None]) -> Callable[[Any, Affe
 def _drift(flight: Any, fault: GpsDrift, active: bool) -> None:
     speed, direction = (fault.speed_m_s if active else 0.0), radians(fault.direction_deg)
     flight.drift_gps(speed * cos(direction), speed * sin(direction))
+
+
+def _turn_compass(flight: Any, fault: CompassTurned, active: bool) -> None:
+    flight.turn_compass(radians(fault.turn_deg) if active else 0.0)
+
+
+def _inertial(act: Callable[[Any], Callable[[float, float], None]]) -> Callable[[Any, Affected, bool], None]:
+    """Return the effect of a fault of gyroscope and accelerometer."""
+
+    def effect(flight: Any, fault: ImuBiased | ImuNoisy, active: bool) -> None:
+        share = 1.0 if active else 0.0
+        act(flight)(share * radians(fault.gyro_deg_s), share * fault.accel_m_s2)
+
+    return _flight_effect(effect)
 
 
 def _drain(flight: Any, fault: BatteryLow, active: bool) -> None:
@@ -303,6 +331,10 @@ EFFECTS: Mapping[type[Fault], Callable[[Any, Affected, bool], None]] = {
     GpsDrift: _flight_effect(_drift),
     BarometerStuck: _flight_effect(lambda flight, fault, active: flight.block_barometer(active)),
     CompassStuck: _flight_effect(lambda flight, fault, active: flight.block_compass(active)),
+    CompassTurned: _flight_effect(_turn_compass),
+    ImuBiased: _inertial(lambda flight: flight.bias_inertial),
+    ImuNoisy: _inertial(lambda flight: flight.shake_inertial),
+    RcLost: _flight_effect(lambda flight, fault, active: flight.block_transmitter(active)),
     SensorSilent: _sensor_effect(lambda fault, sensor: lambda sample: None),
     SensorStuck: _sensor_effect(_repeat),
     SensorClockOff: _sensor_effect(

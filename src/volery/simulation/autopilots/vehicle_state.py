@@ -221,6 +221,8 @@ class RcDefaults(NamedTuple):
 
     transmitter: Sequence[int]
     throttle_centred: bool = False
+    can_be_lost: bool = False
+    """Whether the firmware reacts to its loss."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import socket
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from math import radians
 from typing import Any
 
@@ -22,7 +22,7 @@ from volery.simulation.autopilots.flight_stack.flight import Flight
 from volery.simulation.real_firmware.exchange import ANSWER_LIMIT_S, pose_after
 from volery.simulation.real_firmware.firmware_instance import Assignment, Instance
 from volery.simulation.real_firmware.firmware_process import FirmwareProcess, Port
-from volery.simulation.real_firmware.ground_link import TcpConnection
+from volery.simulation.real_firmware.ground_link import UdpConnection
 from volery.simulation.world.body_specs import FRAMES, BodySpec, Multirotor
 from volery.simulation.world.state_layout import (
     M_ACCEL,
@@ -36,8 +36,11 @@ from volery.simulation.world.state_layout import (
 
 JSON_PORT = Port("udp", 9002, 10)
 """Where the firmware sends its questions."""
-GROUND_PORT = Port("tcp", 5766, 10)
-"""Where this program waits for the firmware's first serial port, which connects."""
+GROUND_PORT = Port("udp", 5766, 10)
+"""Where the firmware sends what it says on its first serial port.
+
+Over TCP what it says would wait for acknowledgements, whose time is that of the wall clock.
+"""
 _TRANSMITTER_PORT = Port("udp", 5501, 10)
 LISTENS = (Port("tcp", 5762, 10), Port("tcp", 5763, 10), _TRANSMITTER_PORT)
 """What the firmware opens beside: its other serial ports, and the receiver of a transmitter."""
@@ -48,6 +51,10 @@ _KINDS = {"multirotor": (2, 13, 14), "rover": (10,)}
 _CRUISE_SPEED = 2.0
 """CRUISE_SPEED of ArduRover [m/s], for which a builder measures the throttle."""
 _SAMPLES = 2.0
+_DEFAULTS = "parameters.parm"
+"""In the folder in which the firmware runs: a path with a comma would count as several files."""
+_DEFAULTS_READ: Ns = 5 * S
+"""Time from a firmware's start after which it has read them, and named on its console what it lacks."""
 _START_TIME = 1_700_000_000
 """UTC of the firmware's start [s]; without one it would be that of the wall clock."""
 _COMPASS_OFFSET = 1e-4
@@ -142,22 +149,39 @@ class ArduPilotExchange:
         home: North, east, down of the firmware's home about the world's origin [m].
         commands: Motor commands of the pulse widths.
         period: Time between two exchanges.
+        parameters: Names of the parameters that must exist.
     """
 
-    def __init__(self, process: FirmwareProcess, home: Vector, commands: Commands, period: Ns) -> None:
+    def __init__(
+        self,
+        process: FirmwareProcess,
+        home: Vector,
+        commands: Commands,
+        period: Ns,
+        parameters: Set[str] = frozenset(),
+    ) -> None:
         self.period = period
+        self._parameters = parameters
         self._process, self._answers, self._commands = process, Answers(home, period), commands
         self._socket = process.sockets[0]
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", 1, 0))
         self._asked = -1
         self._address: Any = None
+        self._answer = b""
         self._transmitter = "127.0.0.1", _TRANSMITTER_PORT.of(process.instance)
 
-    def send(self, time: Ns, row: Sequence[float], ahead: float) -> None:
+    def prepare(self, time: Ns, row: Sequence[float], ahead: float) -> None:
+        """See ``Exchange``."""
+        self._answer = self._answers.answer(time, row, ahead)
+        if self._parameters and time > _DEFAULTS_READ:
+            self._process.refuse_absent(self._parameters, r"Ignored unknown param (\w+)")
+            self._parameters = frozenset()
+
+    def send(self) -> None:
         """See ``Exchange``."""
         if self._address is None:
             self.receive()  # it asks first
-        self._socket.sendto(self._answers.answer(time, row, ahead), self._address)
+        self._socket.sendto(self._answer, self._address)
 
     def transmit(self, pulses: Sequence[int]) -> None:
         """See ``Exchange``."""
@@ -307,8 +331,7 @@ def start(asked: Assignment) -> Instance:
         own["LOG_BACKEND_TYPE"] = 0.0  # its logger is a thread that arming waits for
     asked.folder.mkdir(parents=True, exist_ok=True)
     parameters = own | dict(asked.parameters)
-    defaults = asked.folder / "parameters.parm"
-    defaults.write_text(defaults_text(parameters), "ascii")
+    (asked.folder / _DEFAULTS).write_text(defaults_text(parameters), "ascii")
     east, north, up = flight.truth().position
     process = FirmwareProcess(
         asked.name,
@@ -317,16 +340,17 @@ def start(asked: Assignment) -> Instance:
             "--model=JSON:127.0.0.1",
             "-I{instance}",
             home_option(flight),
-            f"--defaults={defaults}",
+            f"--defaults={_DEFAULTS}",
             f"--sysid={asked.system}",
             f"--start-time={_START_TIME}",
-            "--serial0=tcpclient:127.0.0.1:{port1}",
+            "--serial0=udpclient:127.0.0.1:{port1}",
         ],
         asked.folder,
         sockets=(JSON_PORT, GROUND_PORT),
         listens=LISTENS,
     )
     period = exchange_period(kind, parameters)
-    exchange = ArduPilotExchange(process, (north, east, -up), commands_of(flight.spec), period)
-    connection = TcpConnection(process.sockets[1])
+    commands = commands_of(flight.spec)
+    exchange = ArduPilotExchange(process, (north, east, -up), commands, period, asked.parameters.keys())
+    connection = UdpConnection(process.sockets[1])
     return Instance(process, exchange, connection, _mode_names(kind), _KINDS[kind], arms_lost=True)

@@ -1,8 +1,8 @@
 """What the link to a firmware's simulation port does: samples of sensors in, commands of motors out.
 
 The firmware's clock is the time that the samples state. After ``send`` it computes by itself while this
-program goes on; ``receive`` waits for its answer. So a command acts one exchange after the samples that it
-answers, about as late as on a board.
+program goes on and prepares the next samples; ``receive`` waits for its answer. So a command acts one
+exchange after the samples that it answers, about as late as on a board.
 """
 
 from __future__ import annotations
@@ -63,14 +63,17 @@ class Exchange(Protocol):
     def period(self) -> Ns:
         """Time between two exchanges."""
 
-    def send(self, time: Ns, row: Sequence[float], ahead: float) -> None:
-        """Send the samples of *time* without waiting for the answer.
+    def prepare(self, time: Ns, row: Sequence[float], ahead: float) -> None:
+        """Make the samples of *time*; the firmware may still compute.
 
         Args:
             time: Clock of the firmware from now on, from its start; it grows from call to call.
             row: State row of the body, by the columns of ``state_layout``.
             ahead: Time since the grid step of the row [s].
         """
+
+    def send(self) -> None:
+        """Send the samples to the firmware, which waits; do not wait for the answer."""
 
     def transmit(self, pulses: Sequence[int]) -> None:
         """Send the pulse widths of a pilot's transmitter [us], channel 1 first."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
+from math import radians
 from typing import NamedTuple
 
 from volery.base.errors import CapabilityError
@@ -26,6 +27,8 @@ from volery.simulation.world.state_layout import (
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
     U_MAG_BLOCKED,
+    U_MAG_TURN,
+    U_RC_BLOCKED,
 )
 
 
@@ -58,10 +61,16 @@ class ByParameters(NamedTuple):
     Args:
         column: Column of the state row that is not 0 while the fault is present.
         settings: What is set; of each group the first that the firmware has.
+        unit: What a value of 1 in the settings stands for in the column; 0: values are fixed.
     """
 
     column: int
     settings: tuple[tuple[Setting, ...], ...]
+    unit: float = 0.0
+
+    def value(self, setting: Setting, row: Sequence[float]) -> float:
+        """Return the value of a setting for the fault that is in a state row."""
+        return setting.value * round(row[self.column] / self.unit) if self.unit else setting.value
 
 
 _IN_THE_WORLD = dict.fromkeys(
@@ -84,6 +93,8 @@ _IN_THE_WORLD = dict.fromkeys(
     Way.WORLD,
 )
 _FROZEN_COMPASS = 2.0
+_ORIENTATION = radians(45.0)
+"""Angle from one orientation about the vertical to the next in ArduPilot's list, clockwise from above."""
 
 _BATTERY_OF_THE_WORLD = LinkFrom(4, 6)
 
@@ -103,6 +114,14 @@ WAYS: Mapping[str, Mapping[str, Way | LinkFrom | ByParameters]] = {
             U_MAG_BLOCKED,
             tuple((Setting(f"SIM_MAG{number}_FAIL", _FROZEN_COMPASS),) for number in (1, 2, 3)),
         ),
+        "compass-turned": ByParameters(
+            U_MAG_TURN,
+            tuple((Setting(f"SIM_MAG{number}_ORIENT", 1.0),) for number in (1, 2, 3)),
+            _ORIENTATION,
+        ),
+        "imu-biased": Way.LINK,
+        "imu-noisy": Way.LINK,
+        "rc-lost": ByParameters(U_RC_BLOCKED, ((Setting("SIM_RC_FAIL", 1.0),),)),
     },
     "px4": {
         **_IN_THE_WORLD,
@@ -112,6 +131,10 @@ WAYS: Mapping[str, Mapping[str, Way | LinkFrom | ByParameters]] = {
         "gps-drift": Way.LINK,
         "barometer-stuck": Way.LINK,
         "compass-stuck": Way.LINK,
+        "compass-turned": Way.LINK,
+        "imu-biased": Way.LINK,
+        "imu-noisy": Way.LINK,
+        "rc-lost": Way.LINK,
     },
 }
 """How each kind of fault that a model can state reaches a firmware, by project and kind."""
@@ -247,17 +270,15 @@ class FirmwareFaults:
         self._refuse()
         for kind, way in self._ways.items():
             if isinstance(way, ByParameters) and (row[way.column] != 0.0) != (kind in self._before):
-                self._set(self._begin(kind, way) if kind not in self._before else self._before.pop(kind), now)
+                starts = kind not in self._before
+                self._set(self._begin(kind, way, row) if starts else self._before.pop(kind), now)
         self._check(now)
         if self._counts:
             self._count(row, now)
 
-    def _begin(self, kind: str, way: ByParameters) -> list[Setting]:
-        settings = [
-            next(setting for setting in group if setting.name in self._known)
-            for group in way.settings
-            if any(setting.name in self._known for setting in group)
-        ]
+    def _begin(self, kind: str, way: ByParameters, row: Sequence[float]) -> list[Setting]:
+        owned = [[setting for setting in group if setting.name in self._known] for group in way.settings]
+        settings = [Setting(group[0].name, way.value(group[0], row)) for group in owned if group]
         self._before[kind] = [Setting(name, self._known[name]) for name, _ in settings]
         return settings
 

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import select
 import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from contextlib import suppress
+from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +24,7 @@ CONSOLE_FILE = "console.txt"
 ISOLATE = True
 """Whether a firmware gets a network of its own where the system allows that."""
 _LAST_LINES = 4
-_LAST_OCTETS = 4096
+_LAST_OCTETS = 65_536
 _START_LIMIT_S = 20.0
 _END_LIMIT_S = 1.0
 _REST_LIMIT_S = 1.0
@@ -210,8 +212,26 @@ class FirmwareProcess:
             with self.console.open("rb") as file:
                 file.seek(max(0, self.console.stat().st_size - _LAST_OCTETS))
                 lines = file.read().decode(errors="replace").splitlines()
-            return " · ".join([line.strip() for line in lines if line.strip()][-_LAST_LINES:])
+            lines = _without_repeats([line.strip() for line in lines if line.strip()])
+            return " · ".join(lines[-_LAST_LINES:])
         return ""
+
+    def refuse_absent(self, parameters: Set[str], complaint: str) -> None:
+        """Refuse parameters that it lacks, as its console says.
+
+        Args:
+            parameters: Names of those that it must have.
+            complaint: Regular expression of a line about one that it lacks, with a group that is the name.
+
+        Raises:
+            FirmwareError: It lacks one; the text names it.
+        """
+        absent = parameters & set(re.findall(complaint, self.console.read_text(errors="replace")))
+        if absent:
+            raise FirmwareError(
+                f"{self.name}: {self.program} has no parameter {', '.join(sorted(absent))}; leave it out, or "
+                "give the name that this version has for it"
+            )
 
     def ending(self) -> str:
         """Return how it has ended, with its last words; empty: it runs."""
@@ -251,6 +271,21 @@ class FirmwareProcess:
             self._ended = True
             with suppress(ProcessLookupError):
                 os.killpg(self.pid, signal.SIGKILL)
+            self._shorten_console()
+
+    def _shorten_console(self) -> None:
+        """Count repeated lines: a firmware that waits for its world may print one every second."""
+        with suppress(OSError):
+            lines = self.console.read_text(errors="replace").splitlines()
+            shorter = _without_repeats(lines)
+            if len(shorter) < len(lines):
+                self.console.write_text("".join(f"{line}\n" for line in shorter))
+
+
+def _without_repeats(lines: Sequence[str]) -> list[str]:
+    """Return *lines* with those that follow each other and are equal as one, with their number."""
+    counted = [(line, len([*group])) for line, group in groupby(lines)]
+    return [line if count == 1 else f"{line} ({count} times)" for line, count in counted]
 
 
 def _runs(state: bytes) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Protocol
 
 from volery.base.errors import UsageError
@@ -113,61 +114,16 @@ class Connection(Protocol):
         """Close it."""
 
 
-class TcpConnection:
-    """A connection that the firmware opens to *listener*, again after its restart."""
-
-    def __init__(self, listener: socket.socket) -> None:
-        self._listener = listener
-        listener.setblocking(False)
-        self._peer: socket.socket | None = None
-
-    def _connected(self) -> socket.socket | None:
-        if self._peer is None:
-            try:
-                self._peer, _ = self._listener.accept()
-            except BlockingIOError:
-                return None
-            self._peer.setblocking(False)
-            self._peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        return self._peer
-
-    def read(self) -> bytes:
-        """See ``Connection``."""
-        peer = self._connected()
-        if peer is None:
-            return b""
-        try:
-            octets = peer.recv(_LARGEST)
-        except BlockingIOError:
-            return b""
-        except OSError:
-            octets = b""
-        if not octets:
-            peer.close()
-            self._peer = None
-        return octets
-
-    def write(self, octets: bytes) -> None:
-        """See ``Connection``."""
-        peer = self._connected()
-        if peer is not None:
-            try:
-                peer.sendall(octets)
-            except OSError:  # it restarts, or has ended, which the next exchange finds
-                peer.close()
-                self._peer = None
-
-    def close(self) -> None:
-        """See ``Connection``."""
-        if self._peer is not None:
-            self._peer.close()
-
-
 class UdpConnection:
-    """A bound socket that the firmware sends to; *peer* is where the firmware listens."""
+    """A bound socket that the firmware sends to. What it says is there before its next question is.
 
-    def __init__(self, bound: socket.socket, peer: tuple[str, int]) -> None:
-        self._socket, self._peer = bound, peer
+    Args:
+        bound: The socket.
+        peer: Where the firmware listens; None: where it has sent from last.
+    """
+
+    def __init__(self, bound: socket.socket, peer: tuple[str, int] | None = None) -> None:
+        self._socket, self._peer, self._learns = bound, peer, peer is None
         bound.setblocking(False)
 
     def read(self) -> bytes:
@@ -177,16 +133,18 @@ class UdpConnection:
     def datagram(self) -> bytes:
         """Return the next datagram; empty: there is none."""
         try:
-            return self._socket.recv(_LARGEST)
+            octets, sender = self._socket.recvfrom(_LARGEST)
         except OSError:  # nothing more, or nothing listens any more
             return b""
+        if self._learns:
+            self._peer = sender
+        return octets
 
     def write(self, octets: bytes) -> None:
         """See ``Connection``."""
-        try:
-            self._socket.sendto(octets, self._peer)
-        except OSError:  # no peer any more, which the next exchange finds
-            return
+        if self._peer is not None:
+            with suppress(OSError):  # no peer any more, which the next exchange finds
+                self._socket.sendto(octets, self._peer)
 
     def close(self) -> None:
         """See ``Connection``; the process closes its sockets."""

@@ -151,18 +151,19 @@ class RealFirmware:
 
     def attend(self) -> None:
         """See ``Attendant``: take the last answer for the motors, and send the present samples."""
-        self._settle()
+        self._exchange_now(self._flight.row, 1e-9 * (self._due - self.next_step * STEP))
         if self._answer is not None:
             self._flight.command_motors(self._answer)
-        self._exchange_now(self._flight.row, 1e-9 * (self._due - self.next_step * STEP))
         self._due += self._exchange.period
         self.next_step = self._due // STEP
 
     def _exchange_now(self, row: Sequence[float], ahead: float) -> None:
-        self._settle()
+        """Take the answer to the last samples and send the next, which are made while it still computes."""
         self._clock += self._exchange.period
         try:
-            self._exchange.send(self._clock, row, ahead)
+            self._exchange.prepare(self._clock, row, ahead)
+            self._settle()
+            self._exchange.send()
         except BaseException:
             self._flight.attend(None)
             raise
@@ -191,7 +192,7 @@ class RealFirmware:
         while texts:
             severity, text = texts.pop(0)
             self._kernel.record(Text(self._kernel.now(), self._name, severity, text))
-        if any(self.transmitter):
+        if any(self.transmitter) and not self._flight.transmitter_blocked:
             self._exchange.transmit(self.transmitter)
 
     def swap_battery(self) -> None:

@@ -53,6 +53,8 @@ from volery.simulation.world.state_layout import (
     S_AMPS,
     S_CHARGE,
     S_VOLTS,
+    U_BARO_BLOCKED,
+    U_MAG_BLOCKED,
 )
 
 SIMULATOR_PORT = Port("tcp", 4560, 1)
@@ -72,6 +74,8 @@ BATTERY_EVERY: Ns = S // 2
 RANGE_EVERY: Ns = 48 * MS
 _NO_FIX_EVERY: Ns = 200 * MS
 """Time between two reports of a receiver without a fix, and between two samples of the range finder."""
+_STUCK_EVERY: Ns = 52 * MS
+"""Time between two samples of a stuck barometer or magnetometer, a multiple of ``PERIOD``."""
 _START_TIME_US = 1_700_000_000_000_000
 """UTC of the firmware's start [us]."""
 
@@ -278,45 +282,61 @@ class Px4Exchange:
         self._battery = Outgoing(
             "BATTERY_STATUS", "iihHHHHHHHHHHhBBBb", (system, constant("MAV_COMP_ID_BATTERY"))
         )
-        self._sent = 0  # time of the last samples [us]
+        self._time = 0  # of the samples that were made last [us]
+        self._sent = 0  # of those that were sent last [us]
+        self._samples = self._battery_report = b""
         self._answering = False  # the start script has ended
         self._counts = [-1.0, -1.0, -1.0]
         self._dither = 1.0
+        self._field: Sequence[float] = (0.0, 0.0, 0.0)  # the last sample of the magnetometer, as it was sent
+        self._air = 0.0, 0.0  # the last one of the barometer: pressure [Pa], temperature [deg C]
 
-    def send(self, time: Ns, row: Sequence[float], ahead: float) -> None:
+    def prepare(self, time: Ns, row: Sequence[float], ahead: float) -> None:
         """See ``Exchange``; a period is a whole number of the world's steps, so *ahead* is 0."""
         time += CLOCK_START
-        self._sent = time // US
+        self._time = time // US
         octets = b""
-        if self._answering and time % BATTERY_EVERY < PERIOD:
-            self._ground.write(self._battery_status(row))
+        self._battery_report = self._battery_status(row) if time % BATTERY_EVERY < PERIOD else b""
         if time % RANGE_EVERY < PERIOD and row[P_MAX_RANGE]:
             octets += self._range(row)
         if row[M_GPS_COUNT] != self._counts[0] or (not row[M_GPS_FIX] and time % _NO_FIX_EVERY < PERIOD):
             self._counts[0] = row[M_GPS_COUNT]
             octets += self._fix(row)
-        self._write(octets + self._sensors(row))
+        self._samples = octets + self._sensors(row)
+
+    def send(self) -> None:
+        """See ``Exchange``."""
+        if self._answering and self._battery_report:
+            self._ground.write(self._battery_report)
+        self._sent = self._time
+        self._write(self._samples)
 
     def _sensors(self, row: Sequence[float]) -> bytes:
         fields = _INERTIAL
-        north, east, down = row[M_MAG : M_MAG + 3]
+        field: Sequence[float] = row[M_MAG : M_MAG + 3]
         pascals, degrees = 0.0, 0.0
+        repeats = self._time * US % _STUCK_EVERY < PERIOD
         if row[M_MAG_COUNT] != self._counts[1]:
             self._counts[1] = row[M_MAG_COUNT]
             self._dither = -self._dither
-            north += self._dither * _DITHER_GAUSS
+            field = self._field = field[0] + self._dither * _DITHER_GAUSS, field[1], field[2]
+            fields |= _MAGNETIC
+        elif repeats and row[U_MAG_BLOCKED]:
+            field = self._field
             fields |= _MAGNETIC
         if row[M_BARO_COUNT] != self._counts[2]:
             self._counts[2] = row[M_BARO_COUNT]
             amsl = self._frame.amsl + row[M_BARO]
             pascals = pressure_at(amsl) + self._dither * _DITHER_PA
             degrees = _GROUND_TEMPERATURE - 0.0065 * amsl
+            self._air = pascals, degrees
+            fields |= _BAROMETRIC
+        elif repeats and row[U_BARO_BLOCKED]:
+            pascals, degrees = self._air
             fields |= _BAROMETRIC
         accel, gyro = row[M_ACCEL : M_ACCEL + 3], row[M_GYRO : M_GYRO + 3]
         hectopascals = 0.01 * pascals
-        return SENSOR.pack(
-            self._sent, *accel, *gyro, north, east, down, hectopascals, 0.0, 0.0, degrees, fields, 0
-        )
+        return SENSOR.pack(self._time, *accel, *gyro, *field, hectopascals, 0.0, 0.0, degrees, fields, 0)
 
     def _fix(self, row: Sequence[float]) -> bytes:
         fix = int(row[M_GPS_FIX])
@@ -324,7 +344,7 @@ class Px4Exchange:
         latitude, longitude, amsl = self._frame.from_enu(position)
         north, east, down = (round(100.0 * each) for each in row[M_GPS_VELOCITY : M_GPS_VELOCITY + 3])
         return GPS.pack(
-            _START_TIME_US + self._sent,
+            _START_TIME_US + self._time,
             round(1e7 * latitude),
             round(1e7 * longitude),
             round(1000.0 * amsl),
@@ -343,7 +363,7 @@ class Px4Exchange:
     def _range(self, row: Sequence[float]) -> bytes:
         reach = round(100.0 * row[P_MAX_RANGE])
         distance = round(100.0 * row[M_RANGE]) if row[M_RANGE] >= 0.0 else reach + 1
-        times = self._sent // 1000, 1, reach, distance
+        times = self._time // 1000, 1, reach, distance
         return RANGE.pack(*times, _LASER, 0, _NED_DOWN, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
 
     def _battery_status(self, row: Sequence[float]) -> bytes:
@@ -384,12 +404,7 @@ class Px4Exchange:
             return (0.0,) * self._motors
         self._answering = True
         self._limit(1.0)
-        console = self._process.console.read_text(errors="replace")
-        absent = self._parameters & set(re.findall(r"Parameter (\w+) not found", console))
-        if absent:
-            raise FirmwareError(
-                f"{self._process.name}: {self._process.program} has no parameter {', '.join(sorted(absent))}"
-            )
+        self._process.refuse_absent(self._parameters, r"Parameter (\w+) not found")
         return answer
 
     def _limit(self, seconds: float) -> None:

@@ -21,7 +21,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from volery.base.elementary import exp
+from volery.base.elementary import exp, sine_cosine
 from volery.base.errors import UsageError, choices, did_you_mean
 from volery.base.frames import Quaternion, Vector
 from volery.base.installed import Registry
@@ -70,12 +70,17 @@ from volery.simulation.world.state_layout import (
     S_SPECIFIC_FORCE,
     S_VELOCITY,
     STEP_S,
+    U_ACCEL_NOISE,
+    U_ACCEL_OFFSET,
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
     U_GPS_DRIFT,
     U_GPS_DRIFT_START,
     U_GPS_OFFSET,
+    U_GYRO_NOISE,
+    U_GYRO_OFFSET,
     U_MAG_BLOCKED,
+    U_MAG_TURN,
     W_ROTATION,
     WHITE_SIGMA,
     Array,
@@ -556,12 +561,13 @@ def _advance_biases(row: Array, key: np.uint64, k: int) -> None:
 
 @numeric
 def _sample_inertial(row: Array, key: np.uint64, k: int) -> None:
-    gyro = row[P_GYRO_ERROR + WHITE_SIGMA]
-    accel = row[P_ACCEL_ERROR + WHITE_SIGMA]
+    gyro = row[P_GYRO_ERROR + WHITE_SIGMA] + row[U_GYRO_NOISE]
+    accel = row[P_ACCEL_ERROR + WHITE_SIGMA] + row[U_ACCEL_NOISE]
     for axis in range(3):
         sign = 1.0 if axis == 0 else -1.0
-        row[M_GYRO + axis] = sign * row[S_RATES + axis] + row[M_GYRO_BIAS + axis]
-        row[M_ACCEL + axis] = sign * row[S_SPECIFIC_FORCE + axis] + row[M_ACCEL_BIAS + axis]
+        row[M_GYRO + axis] = sign * row[S_RATES + axis] + row[M_GYRO_BIAS + axis] + row[U_GYRO_OFFSET]
+        force = sign * row[S_SPECIFIC_FORCE + axis]
+        row[M_ACCEL + axis] = force + row[M_ACCEL_BIAS + axis] + row[U_ACCEL_OFFSET]
         if gyro > 0.0 or accel > 0.0:
             row[M_GYRO + axis] += gyro * gaussian(key, _GYRO_STREAM + axis, k)
             row[M_ACCEL + axis] += accel * gaussian(key, _ACCEL_STREAM + axis, k)
@@ -591,6 +597,11 @@ def _sample_magnetometer(row: Array, key: np.uint64, k: int) -> None:
         )
         error = row[M_MAG_BIAS + axis] + white * gaussian(key, _MAG_STREAM + axis, k)
         row[M_MAG + axis] = sign * field + error
+    if row[U_MAG_TURN] != 0.0:
+        sine, cosine = sine_cosine(row[U_MAG_TURN])
+        forward, right = row[M_MAG], row[M_MAG + 1]
+        row[M_MAG] = cosine * forward + sine * right
+        row[M_MAG + 1] = cosine * right - sine * forward
     row[M_MAG_COUNT] += 1.0
 
 

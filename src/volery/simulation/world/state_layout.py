@@ -135,6 +135,12 @@ U_MOTION = _add("U_MOTION", "mixed", "given motion at the end of the step", MOTI
 U_SPEEDS = _add("U_SPEEDS", "rad/s", "given rotor speeds; NaN: by the world's own law", ROTORS, MOTORS)
 U_FORCE = _add("U_FORCE", "m/s^2", "given specific force; NaN: that of the velocities", 3, FLU)
 U_CURRENT = _add("U_CURRENT", "A", "given current of the rotors; NaN: by the world's own law")
+U_MAG_TURN = _add("U_MAG_TURN", "rad", "turn of the magnetometer on its mount, clockwise from above")
+U_GYRO_OFFSET = _add("U_GYRO_OFFSET", "rad/s", "error that is added to each axis of the gyroscope")
+U_ACCEL_OFFSET = _add("U_ACCEL_OFFSET", "m/s^2", "error that is added to each axis of the accelerometer")
+U_GYRO_NOISE = _add("U_GYRO_NOISE", "rad/s", "standard deviation of more white noise of the gyroscope")
+U_ACCEL_NOISE = _add("U_ACCEL_NOISE", "m/s^2", "standard deviation of more white noise of the accelerometer")
+U_RC_BLOCKED = _add("U_RC_BLOCKED", "1", "1: the receiver hears no transmitter")
 
 # --- measurements: last sample of each sensor, in the axes of autopilots ---
 M_GYRO = _add("M_GYRO", "rad/s", "body rates", 3, FRD)

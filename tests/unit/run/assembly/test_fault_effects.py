@@ -1,8 +1,10 @@
 """The effect of every kind of fault, in short runs of the simulated parts that it acts on."""
 
-from math import hypot
+from dataclasses import replace
+from math import atan2, degrees, hypot, radians
 from random import Random
 
+import numpy as np
 import pytest
 
 from volery.base.errors import CapabilityError, ModelError
@@ -19,20 +21,33 @@ from volery.model.faults import (
     BatteryCellDead,
     BatteryLow,
     CompassStuck,
+    CompassTurned,
     ComputerSlowed,
     ComputerStopped,
     GpsDrift,
     GpsLost,
+    ImuBiased,
+    ImuNoisy,
     LinkCut,
     LinkDegraded,
     MotorDead,
     NetworkCut,
     NetworkDegraded,
+    RcLost,
     WindChange,
 )
 from volery.run.assembly.fault_effects import EFFECTS, Affected, FleetLinks, inject, with_faulty_links
 from volery.run.assembly.simulated_fleet import SimulatedFleet, Surroundings
-from volery.simulation.world.state_layout import M_BARO, M_GPS, M_GPS_FIX, M_MAG, U_MOTOR_HEALTH, U_WIND
+from volery.simulation.world.state_layout import (
+    M_ACCEL,
+    M_BARO,
+    M_GPS,
+    M_GPS_FIX,
+    M_GYRO,
+    M_MAG,
+    U_MOTOR_HEALTH,
+    U_WIND,
+)
 from volery.trace.events import Slice, Text
 
 PAD = Place("pad", 47.0, 8.0, 0.0, 0.0, 0.0)
@@ -44,13 +59,14 @@ FAULT = {"name": "trouble", "at_ns": BEGIN, "duration_ns": END - BEGIN}
 class Run:
     """A drone on its pad, a computer and a network, with one fault from 2 s to 4 s."""
 
-    def __init__(self, fault):
+    def __init__(self, fault, autopilot):
         self.events = []
         self.kernel = VirtualKernel(record=self.events.append)
-        environment = Environment(vehicles=(DRONE,), faults=(fault,))
+        drone = replace(DRONE, autopilot=autopilot)
+        environment = Environment(vehicles=(drone,), faults=(fault,))
         self.fleet = SimulatedFleet(
             self.kernel,
-            [DRONE],
+            [drone],
             Surroundings(LocalFrame(47.0, 8.0), Wind()),
             1,
             through_bytes=with_faulty_links(environment),
@@ -83,8 +99,8 @@ class Run:
 def run():
     made = []
 
-    def make(kind, **arguments):
-        made.append(Run(kind(**FAULT, **arguments)))
+    def make(kind, autopilot="ardupilot", **arguments):
+        made.append(Run(kind(**FAULT, **arguments), autopilot))
         return made[-1]
 
     yield make
@@ -148,6 +164,52 @@ def test_a_stuck_sensor_repeats_its_last_value(run, kind, column, width):
     samples = [trouble.row(at)[column : column + width].tolist() for at in (3 * S, 3500 * MS, 5 * S)]
     assert samples[0] == samples[1]
     assert samples[1] != samples[2]
+
+
+def test_a_turned_compass_sees_the_heading_off_by_its_angle(run):
+    trouble = run(CompassTurned, vehicle="drone", turn_deg=135.0)
+    headings = []
+    for at in (1 * S, 3 * S, 5 * S):
+        forward, right, _ = trouble.row(at)[M_MAG : M_MAG + 3]
+        headings.append(degrees(atan2(-right, forward)))
+    assert (headings[1] - headings[0]) % 360.0 == pytest.approx(135.0, abs=6.0)
+    assert (headings[2] - headings[0] + 180.0) % 360.0 == pytest.approx(180.0, abs=6.0)
+
+
+def inertial_samples(trouble, at):
+    """Return 100 samples of gyroscope and accelerometer from a time on."""
+    return np.array([trouble.row(at + 2 * MS * number)[[*GYRO, *ACCEL]] for number in range(100)])
+
+
+GYRO, ACCEL = range(M_GYRO, M_GYRO + 3), range(M_ACCEL, M_ACCEL + 3)
+
+
+def test_inertial_sensors_are_off_on_each_axis_while_they_are_biased(run):
+    trouble = run(ImuBiased, vehicle="drone", gyro_deg_s=10.0, accel_m_s2=2.0)
+    before, during, after = (inertial_samples(trouble, at).mean(axis=0) for at in (1 * S, 3 * S, 5 * S))
+    assert during - before == pytest.approx([radians(10.0)] * 3 + [2.0] * 3, rel=0.05)
+    assert after == pytest.approx(before, abs=0.05)
+
+
+def test_inertial_sensors_are_noisy_while_they_shake(run):
+    trouble = run(ImuNoisy, vehicle="drone", gyro_deg_s=30.0, accel_m_s2=3.0)
+    before, during, after = (inertial_samples(trouble, at).std(axis=0) for at in (1 * S, 3 * S, 5 * S))
+    assert during == pytest.approx([radians(30.0)] * 3 + [3.0] * 3, rel=0.3)
+    assert after == pytest.approx(before, rel=0.5)
+
+
+def test_an_autopilot_without_its_transmitter_has_its_throttle_down_and_gets_it_back(run):
+    trouble = run(RcLost, vehicle="drone")
+    pulses = []
+    for at in (1 * S, 3 * S, 5 * S):
+        trouble.kernel.run(at)
+        pulses.append(trouble.fleet.autopilots["drone"].transmitter[2])
+    assert pulses == [1000, 950, 1000]
+
+
+def test_an_autopilot_that_needs_no_transmitter_cannot_lose_one(run):
+    with pytest.raises(CapabilityError, match=r"fault trouble: the simulated px4.* of drone does without"):
+        run(RcLost, vehicle="drone", autopilot="px4")
 
 
 def frames_in(trouble, start, end):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import socket
+from math import radians
 from types import SimpleNamespace
 from typing import Any
 
@@ -30,6 +31,7 @@ from volery.simulation.world.state_layout import (
     U_GPS_DRIFT,
     U_GPS_OFFSET,
     U_MAG_BLOCKED,
+    U_MAG_TURN,
     WORLD,
 )
 
@@ -41,6 +43,10 @@ OF_4_6 = dict.fromkeys(
         "SIM_MAG1_FAIL",
         "SIM_MAG2_FAIL",
         "SIM_MAG3_FAIL",
+        "SIM_MAG1_ORIENT",
+        "SIM_MAG2_ORIENT",
+        "SIM_MAG3_ORIENT",
+        "SIM_RC_FAIL",
     ),
     0.0,
 )
@@ -141,6 +147,17 @@ def test_faults_of_several_sensors_end_each_for_itself_with_the_users_own_values
     assert firmware.parameters == OF_4_6 | frozen | {"SIM_MAG2_FAIL": 1.0}
 
 
+def test_a_turned_compass_has_the_orientation_of_its_angle() -> None:
+    firmware = Firmware("ardupilot", OF_4_6)
+    firmware.run(6 * S)
+    firmware.row[U_MAG_TURN] = radians(135.0)
+    firmware.run(S)
+    assert firmware.sets == [(f"SIM_MAG{number}_ORIENT", 3.0) for number in (1, 2, 3)]
+    firmware.row[U_MAG_TURN] = 0.0
+    firmware.run(S)
+    assert firmware.parameters == OF_4_6
+
+
 def test_a_fault_is_refused_by_name_once_it_is_known_that_its_parameter_is_missing() -> None:
     firmware = Firmware("ardupilot", OF_4_6)
     del firmware.parameters["SIM_GPS_DISABLE"]
@@ -205,7 +222,8 @@ def test_a_drift_of_the_receiver_is_in_position_and_velocity_and_ends_with_the_f
         row[S_ATTITUDE] = 1.0
 
         def sent(at: int) -> list[str]:
-            exchange.send(at, row, 0.0)
+            exchange.prepare(at, row, 0.0)
+            exchange.send()
             text = firmware.recv(4096).decode()
             return re.findall(r'"(?:position|velocity)":\[([^]]*)\]', text)
 

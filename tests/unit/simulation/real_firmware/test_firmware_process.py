@@ -78,6 +78,14 @@ def test_program_that_has_ended_is_at_rest(started: Any) -> None:
     assert process.rest(started=True)
 
 
+def test_lines_that_repeat_are_counted_on_the_console(started: Any) -> None:
+    process = started(["/bin/sh", "-c", "echo ready; for i in 1 2 3; do echo I wait; done; exec sleep 60"])
+    assert process.rest(started=True)
+    assert process.last_words() == "ready · I wait (3 times)"
+    process.end()
+    assert process.console.read_text() == "ready\nI wait (3 times)\n"
+
+
 def test_instance_whose_file_is_locked_is_passed_over(started: Any, tmp_path: Path) -> None:
     lock = str(tmp_path / "lock-{instance}")
     with (tmp_path / "lock-1").open("w") as taken:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -292,15 +292,45 @@ def test_a_second_instance_has_another_number(tmp_path: Path) -> None:
         assert second.autopilot.process.instance > first.autopilot.process.instance
 
 
-def test_the_pilot_reaches_it_over_the_simulator_link(tmp_path: Path) -> None:
+def messages_after(folder: Path, act: Callable[[FlownFirmware], None]) -> list[Any]:
+    """What the firmware is sent within a tenth of a second from an act on."""
     sent: list[bytes] = []
-    with flown(tmp_path) as one:
+    with flown(folder) as one:
         one.open()
         exchange: Any = one.autopilot._exchange
         write = exchange._write
         exchange._write = lambda octets: (sent.append(octets), write(octets))
-        one.autopilot.transmitter[:] = [1500 + at for at in range(16)]
+        act(one)
         with one.as_script():
-            one.kernel.sleep_until(one.kernel.now() + S // 20)
-    messages = [decoded(octets) for octets in sent if octets[7] == dialect.MAVLINK_MSG_ID_RC_CHANNELS]
-    assert {(each.chan1_raw, each.chan16_raw, each.chancount) for each in messages} == {(1500, 1515, 16)}
+            one.kernel.sleep_until(one.kernel.now() + S // 10)
+    return dialect.MAVLink(None).parse_buffer(b"".join(sent)) or []
+
+
+def test_the_pilot_reaches_it_over_the_simulator_link(tmp_path: Path) -> None:
+    def move(one: FlownFirmware) -> None:
+        one.autopilot.transmitter[:] = [1500 + at for at in range(16)]
+
+    heard = [each for each in messages_after(tmp_path, move) if each.get_type() == "RC_CHANNELS"]
+    assert {(each.chan1_raw, each.chan16_raw, each.chancount) for each in heard} == {(1500, 1515, 16)}
+
+
+def test_a_pilot_whose_transmitter_is_lost_does_not_reach_it(tmp_path: Path) -> None:
+    def lose(one: FlownFirmware) -> None:
+        one.autopilot.transmitter[:] = [1500] * 16
+        one.flight.block_transmitter()
+
+    kinds = [each.get_type() for each in messages_after(tmp_path, lose)]
+    assert "RC_CHANNELS" not in kinds[10:]  # the fault counts from the next step of the world on
+    assert len(kinds) > 20
+
+
+def test_stuck_sensors_repeat_their_last_sample(tmp_path: Path) -> None:
+    def block(one: FlownFirmware) -> None:
+        one.flight.block_barometer()
+        one.flight.block_compass()
+
+    samples = [each for each in messages_after(tmp_path, block) if each.get_type() == "HIL_SENSOR"]
+    fields = [(each.xmag, each.ymag, each.zmag) for each in samples if each.fields_updated & 0x01C0]
+    pressures = [each.abs_pressure for each in samples if each.fields_updated & 0x1A00]
+    assert min(len(fields), len(pressures)) >= 2
+    assert len(set(fields)) == len(set(pressures)) == 1

@@ -375,7 +375,9 @@ def copter(version: Version, optional: Collection[str]) -> Firmware:
                 motors_rest=2 * S, spool_up=500 * MS, takeoff_slew=100 * MS, abandoned_after=1500 * MS
             ),
             parameters=parameter_table(build, optional, version, parameters, copter_tuning),
-            rc=RcDefaults((1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0)),
+            rc=RcDefaults(
+                (1500, 1500, 1000, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0), can_be_lost=True
+            ),
         ),
         boot=BootSequence(boot.copter_events(version, finish_setup), start_warm, boot.on_position),
         periodic=PeriodicWork(

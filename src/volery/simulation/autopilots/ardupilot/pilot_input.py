@@ -150,7 +150,7 @@ def on_step(vehicle: Vehicle) -> None:
     simulate_rc_failure(vehicle)
     received, faults = received_of(vehicle), faults_of(vehicle)
     if not received.transmitter:
-        pulses = vehicle.parameters["SIM_RC_FAIL"] != NO_PULSES
+        pulses = not _no_pulses(vehicle)
         received.transmitter = pulses or bool(vehicle.rc.overridden)
     if vehicle.parameters.changes != faults.compared_at:
         faults.compared_at = vehicle.parameters.changes
@@ -228,12 +228,19 @@ def expire_overrides(vehicle: Vehicle) -> None:
 
 
 def simulate_rc_failure(vehicle: Vehicle) -> None:
-    """Simulate SIM_RC_FAIL, whose values 1 and 2 both read as a throttle of 950 us, and its end."""
+    """Simulate the loss of the transmitter, which reads as a throttle of 950 us, and its end.
+
+    It is lost by a fault of the world, or by the values 1 and 2 of SIM_RC_FAIL.
+    """
     throttle = vehicle.tuning.sticks.throttle
-    if vehicle.parameters["SIM_RC_FAIL"]:
+    if vehicle.parameters["SIM_RC_FAIL"] or vehicle.flight.transmitter_blocked:
         vehicle.rc.transmitter[throttle - 1] = FAILED_THROTTLE
     elif vehicle.rc.transmitter[throttle - 1] == FAILED_THROTTLE:
         vehicle.rc.transmitter[throttle - 1] = vehicle.rules.rc.transmitter[throttle - 1]
+
+
+def _no_pulses(vehicle: Vehicle) -> bool:
+    return vehicle.parameters["SIM_RC_FAIL"] == NO_PULSES or vehicle.flight.transmitter_blocked
 
 
 LACKING = 0.3
@@ -325,8 +332,7 @@ def read_mode_switch(vehicle: Vehicle, channel: str, modes: str) -> None:
     """
     position = _mode_position(vehicle, channel)
     booting = vehicle.uptime() < vehicle.rules.startup.ready_after
-    no_pulses = vehicle.parameters["SIM_RC_FAIL"] == NO_PULSES
-    if position is None or booting or no_pulses or radio_lost(vehicle):
+    if position is None or booting or _no_pulses(vehicle) or radio_lost(vehicle):
         return
     now, switches = vehicle.kernel.now(), switches_of(vehicle)
     if position != switches.read:

@@ -312,7 +312,11 @@ def rover(version: Version, optional: Collection[str]) -> Firmware:
             firmware_state=lambda _vehicle: build,
             startup=StartupTimes(READY, HOME, POSITION, HOME),
             parameters=parameter_table(build, optional, version, parameters, rover_tuning),
-            rc=RcDefaults((1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0), True),
+            rc=RcDefaults(
+                (1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, 0, 0, 0, 0, 0, 0, 0, 0),
+                True,
+                can_be_lost=True,
+            ),
         ),
         boot=BootSequence(boot.rover_events(version, finish_setup), start_warm, boot.on_position),
         periodic=PeriodicWork(

@@ -60,13 +60,19 @@ from volery.simulation.world.state_layout import (
     S_CHARGE,
     S_GUST,
     S_VELOCITY,
+    U_ACCEL_NOISE,
+    U_ACCEL_OFFSET,
     U_BARO_BLOCKED,
     U_GPS_BLOCKED,
     U_GPS_DRIFT,
     U_GPS_OFFSET,
+    U_GYRO_NOISE,
+    U_GYRO_OFFSET,
     U_MAG_BLOCKED,
+    U_MAG_TURN,
     U_MOTOR_HEALTH,
     U_PUSH,
+    U_RC_BLOCKED,
     U_THROTTLE,
     U_WIND,
     W_ROTATION,
@@ -492,6 +498,29 @@ class Flight:
     def block_compass(self, blocked: bool = True) -> None:
         """Inject or clear a fault: the magnetometer gives no new samples."""
         self._world.set_input(self._body, U_MAG_BLOCKED, float(blocked))
+
+    def turn_compass(self, angle: float) -> None:
+        """Inject or clear a fault: the magnetometer is turned by *angle* [rad], clockwise from above."""
+        self._world.set_input(self._body, U_MAG_TURN, angle)
+
+    def bias_inertial(self, gyro: float, accel: float) -> None:
+        """Inject or clear a fault: each axis of gyroscope [rad/s] and accelerometer [m/s^2] is off."""
+        self._world.set_input(self._body, U_GYRO_OFFSET, gyro)
+        self._world.set_input(self._body, U_ACCEL_OFFSET, accel)
+
+    def shake_inertial(self, gyro: float, accel: float) -> None:
+        """Inject or clear a fault: white noise of the gyroscope [rad/s] and accelerometer [m/s^2] grows."""
+        self._world.set_input(self._body, U_GYRO_NOISE, gyro)
+        self._world.set_input(self._body, U_ACCEL_NOISE, accel)
+
+    def block_transmitter(self, blocked: bool = True) -> None:
+        """Inject or clear a fault: the receiver hears no transmitter."""
+        self._world.set_input(self._body, U_RC_BLOCKED, float(blocked))
+
+    @property
+    def transmitter_blocked(self) -> bool:
+        """Whether the receiver hears no transmitter."""
+        return self._row[U_RC_BLOCKED] != 0.0
 
     def set_charge(self, left: float) -> None:
         """Set the fraction *left* of the battery's charge: a fault, charging, or another battery."""
