@@ -572,7 +572,9 @@ def write_start_scripts(source: Path, folder: Path, parameters: Mapping[str, flo
     )
     script = scripts / "rcS"
     text = script.read_text(encoding="utf-8")
-    script.write_text(re.sub(r"(?m)^(\s*)battery_simulator start", r"\1:", text), "utf-8")
+    text = re.sub(r"(?m)^(\s*)battery_simulator start", r"\1:", text)
+    text = re.sub(r"(?m)^\. px4-alias\.sh$", r"\g<0>\nR=./", text)  # blanks would split an absolute path
+    script.write_text(text, "utf-8")
 
 
 def _mode_name(number: int) -> str:
@@ -601,12 +603,11 @@ def start(asked: Assignment) -> Instance:
         write_start_scripts(source, asked.folder, own | dict(asked.parameters))
     except OSError as error:
         raise FirmwareError(f"{asked.name}: PX4's start scripts cannot be copied: {error}") from error
-    folder = asked.folder.resolve()
-    options = ["-i", "{instance}", "-d", "-s", "etc/init.d-posix/rcS", "-w", str(folder), str(folder / "etc")]
+    options = ["-i", "{instance}", "-d", "-s", "etc/init.d-posix/rcS", "-w", ".", "etc"]
     process = FirmwareProcess(
         asked.name,
         [str(asked.program), *options],
-        folder,
+        asked.folder,
         sockets=(SIMULATOR_PORT, GROUND_PORT),
         listens=(_FIRMWARE_GROUND_PORT,),
         environment=_ENVIRONMENT,

@@ -193,12 +193,15 @@ def test_start_scripts_get_an_airframe_one_link_and_no_battery(tmp_path: Path) -
     scripts = tmp_path / "program" / "etc" / "init.d-posix"
     (scripts / "airframes").mkdir(parents=True)
     (scripts / "px4-rc.mavlink").write_text("mavlink start -x -u 18570\nmavlink start -x -u 14580\n")
-    (scripts / "rcS").write_text("load_mon start\n\tbattery_simulator start\ncommander start\n")
+    (scripts / "rcS").write_text(
+        ". px4-alias.sh\nload_mon start\n\tbattery_simulator start\ncommander start\n"
+    )
     write_start_scripts(tmp_path / "program" / "etc", tmp_path / "folder", {"MAV_SYS_ID": 3})
     copied = tmp_path / "folder" / "etc" / "init.d-posix"
     (airframe,) = (copied / "airframes").iterdir()
     assert "param set MAV_SYS_ID 3\n" in airframe.read_text()
-    assert (copied / "rcS").read_text() == "load_mon start\n\t:\ncommander start\n"
+    script = (copied / "rcS").read_text()
+    assert script == ". px4-alias.sh\nR=./\nload_mon start\n\t:\ncommander start\n"
     assert (copied / "px4-rc.mavlink").read_text().count("mavlink start") == 1
     assert (scripts / "rcS").read_text().count("battery_simulator") == 1
 
