@@ -6,8 +6,8 @@ file plays the firmware: it ends with an error at the first frames whose answers
     python tests/rigs/recorded_firmware.py record PROGRAM FILE     with a real firmware
     python tests/rigs/recorded_firmware.py FILE MODE [OPTIONS]     in the place of a firmware
 
-*MODE* is ``play``, ``absent`` (it lacks a parameter), or what happens at frame 400: ``die``, ``hang``,
-``repeat`` (each question thrice), ``foreign`` (a packet of another kind).
+*MODE* is ``play``, or what happens at frame 400: ``die``, ``hang``, ``repeat`` (each question thrice),
+``foreign`` (a packet of another kind).
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ QUESTION = struct.Struct("<HHI16H")
 DIGEST_EVERY = 100
 FAULT_AT = 400
 LIMIT_S = 20.0
-ABSENT = "NO_SUCH_PARAM"
 
 
 def stand_in(folder: Path, recording: Path, mode: str = "play") -> Path:
@@ -65,8 +64,6 @@ def play(recording: Path, mode: str, options: list[str]) -> int:
     world.settimeout(LIMIT_S)
     to = "127.0.0.1", 9002 + 10 * instance
     _say("a recorded firmware")
-    if mode == "absent":
-        _say(f"Ignored unknown param {ABSENT} in defaults file parameters.parm")
     answers: list[bytes] = []
     for frame, group in enumerate(pulses):
         if frame in said:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import socket
 import struct
-from collections.abc import Callable, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence
 from math import radians
 from typing import Any
 
@@ -53,8 +53,6 @@ _CRUISE_SPEED = 2.0
 _SAMPLES = 2.0
 _DEFAULTS = "parameters.parm"
 """In the folder in which the firmware runs: a path with a comma would count as several files."""
-_DEFAULTS_READ: Ns = 5 * S
-"""Time from a firmware's start after which it has read them, and named on its console what it lacks."""
 _START_TIME = 1_700_000_000
 """UTC of the firmware's start [s]; without one it would be that of the wall clock."""
 _COMPASS_OFFSET = 1e-4
@@ -149,19 +147,10 @@ class ArduPilotExchange:
         home: North, east, down of the firmware's home about the world's origin [m].
         commands: Motor commands of the pulse widths.
         period: Time between two exchanges.
-        parameters: Names of the parameters that must exist.
     """
 
-    def __init__(
-        self,
-        process: FirmwareProcess,
-        home: Vector,
-        commands: Commands,
-        period: Ns,
-        parameters: Set[str] = frozenset(),
-    ) -> None:
+    def __init__(self, process: FirmwareProcess, home: Vector, commands: Commands, period: Ns) -> None:
         self.period = period
-        self._parameters = parameters
         self._process, self._answers, self._commands = process, Answers(home, period), commands
         self._socket = process.sockets[0]
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", 1, 0))
@@ -173,9 +162,6 @@ class ArduPilotExchange:
     def prepare(self, time: Ns, row: Sequence[float], ahead: float) -> None:
         """See ``Exchange``."""
         self._answer = self._answers.answer(time, row, ahead)
-        if self._parameters and time > _DEFAULTS_READ:
-            self._process.refuse_absent(self._parameters, r"Ignored unknown param (\w+)")
-            self._parameters = frozenset()
 
     def send(self) -> None:
         """See ``Exchange``."""
@@ -350,7 +336,14 @@ def start(asked: Assignment) -> Instance:
         listens=LISTENS,
     )
     period = exchange_period(kind, parameters)
-    commands = commands_of(flight.spec)
-    exchange = ArduPilotExchange(process, (north, east, -up), commands, period, asked.parameters.keys())
+    exchange = ArduPilotExchange(process, (north, east, -up), commands_of(flight.spec), period)
     connection = UdpConnection(process.sockets[1])
-    return Instance(process, exchange, connection, _mode_names(kind), _KINDS[kind], arms_lost=True)
+    return Instance(
+        process,
+        exchange,
+        connection,
+        _mode_names(kind),
+        _KINDS[kind],
+        arms_lost=True,
+        parameters=asked.parameters.keys(),  # it passes over those that it lacks, without a word
+    )

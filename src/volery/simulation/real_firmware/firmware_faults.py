@@ -11,7 +11,7 @@ that it cannot be given is refused by name.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from enum import Enum
 from math import radians
 from typing import NamedTuple
@@ -19,6 +19,7 @@ from typing import NamedTuple
 from volery.base.errors import CapabilityError
 from volery.base.time import Ns, S, to_seconds
 from volery.links.mavlink_messages import message_type
+from volery.simulation.real_firmware.firmware_process import lacks
 from volery.simulation.real_firmware.ground_link import GroundLink
 from volery.simulation.world.state_layout import (
     P_CAPACITY,
@@ -147,8 +148,13 @@ _ALL_BATTERIES = 255.0
 
 _ASK_AFTER: Ns = S
 """Time from a firmware's start until it answers."""
+_STATED_AFTER: Ns = 10 * S
+"""Time from a firmware's start until it has all parameters: some come with what others switch on."""
+_ASK_EVERY: Ns = S // 10
+_AT_ONCE = 10
 _ASK_AGAIN: Ns = S
 _ASKED_AT_MOST = 3
+_VERSION = "AUTOPILOT_VERSION"
 _TAKEN_UP_WITHIN: Ns = 2 * S
 
 
@@ -172,20 +178,22 @@ class FirmwareFaults:
         project: One of ``WAYS``.
         whose: Vehicle and program, for messages.
         ground: Connection over which parameters are asked for and set.
+        stated: Names of parameters that it must have.
     """
 
-    def __init__(self, project: str, whose: str, ground: GroundLink) -> None:
+    def __init__(self, project: str, whose: str, ground: GroundLink, stated: Set[str] = frozenset()) -> None:
         self._ways, self._whose, self._ground = WAYS[project], whose, ground
         self._known = ground.reported.parameters
         self._by_version = any(isinstance(way, LinkFrom) for way in self._ways.values())
         self._counts = project in _COUNTS_CHARGE
         self._counted, self._counted_until = 0.0, 0  # [A s] that the firmware has counted, on its clock
-        self._asked = 0
+        self._stated = stated
+        self._asked: dict[str, tuple[int, Ns]] = {}  # how often and when last, by what was asked for
         self._ask_at: Ns = 0
         self._wanted: dict[str, str] = {}  # kind by name of the fault
         self._before: dict[str, list[Setting]] = {}  # by kind of a present fault, what is to be restored
         self._changes: list[_Change] = []
-        self.settled = not self._by_version and not any(self._unknown())
+        self.settled = not self._by_version and not stated and not any(self._unknown())
         """Whether it is known which parameters and which version the firmware has."""
 
     def _unknown(self) -> Iterator[str]:
@@ -200,20 +208,36 @@ class FirmwareFaults:
 
         Args:
             now: The firmware's clock, for the time between two requests and the limit of all.
+
+        Raises:
+            FirmwareError: It lacks a parameter that it must have.
         """
-        if self.settled or now < _ASK_AFTER:
+        if self.settled or now < max(_ASK_AFTER, self._ask_at):
             return
-        names = [*self._unknown()]
-        version_known = bool(self._ground.reported.version) or not self._by_version
-        if version_known and not names:
+        self._ask_at = now + _ASK_EVERY
+        complete = not self._stated or now >= _STATED_AFTER
+        missing = [*self._unknown()]
+        if self._by_version and not self._ground.reported.version:
+            missing.append(_VERSION)
+        if complete:
+            missing += sorted(self._stated - self._known.keys())
+        asked = {name: self._asked.get(name, (0, -_ASK_AGAIN)) for name in missing}
+        waits = [name for name, (_, at) in asked.items() if now - at < _ASK_AGAIN]
+        due = [name for name, (count, _) in asked.items() if count < _ASKED_AT_MOST and name not in waits]
+        for name in due[:_AT_ONCE]:
+            self._asked[name] = asked[name][0] + 1, now
+            self._request(name)
+        if complete and not waits and not due:
             self.settled = True
-        elif now >= self._ask_at:
-            self.settled = self._asked == _ASKED_AT_MOST
-            self._asked, self._ask_at = self._asked + 1, now + _ASK_AGAIN
-            for name in names:
-                self._ground.ask_parameter(name)
-            if not version_known:
-                self._ground.command("MAV_CMD_REQUEST_MESSAGE", float(message_type("AUTOPILOT_VERSION").id))
+            absent = self._stated - self._known.keys()
+            if absent:
+                raise lacks(self._whose, absent)
+
+    def _request(self, name: str) -> None:
+        if name == _VERSION:
+            self._ground.command("MAV_CMD_REQUEST_MESSAGE", float(message_type(name).id))
+        else:
+            self._ground.ask_parameter(name)
 
     def require(self, kind: str, fault: str) -> None:
         """Refuse a fault that the firmware cannot be given; at once, or when its parameters are known.

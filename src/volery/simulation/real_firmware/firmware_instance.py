@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Set
 from pathlib import Path
 from typing import NamedTuple
 
@@ -44,6 +44,7 @@ class Instance(NamedTuple):
         mode_name: Returns the name of a ``custom_mode`` of HEARTBEAT.
         kinds: Values of MAV_TYPE that fit the body.
         arms_lost: Whether its arming checks pass before its estimator has a position.
+        parameters: Names of the parameters that it is asked for, as it must have them.
     """
 
     process: FirmwareProcess
@@ -52,3 +53,4 @@ class Instance(NamedTuple):
     mode_name: Callable[[int], str]
     kinds: tuple[int, ...]
     arms_lost: bool = False
+    parameters: Set[str] = frozenset()

@@ -42,6 +42,12 @@ class FirmwareError(VoleryError):
     """A firmware or an FMU does not start, has died, hangs, or does not fit; the text names the vehicle."""
 
 
+def lacks(whose: str, parameters: Set[str]) -> FirmwareError:
+    """Return the error that a firmware has no such *parameters*; *whose*: vehicle and program."""
+    names = ", ".join(sorted(parameters))
+    return FirmwareError(f"{whose} has no parameter {names}; leave it out, or name it as this version does")
+
+
 class Port(NamedTuple):
     """A port of loopback: of instance i it is *number* + i *stride*."""
 
@@ -228,10 +234,7 @@ class FirmwareProcess:
         """
         absent = parameters & set(re.findall(complaint, self.console.read_text(errors="replace")))
         if absent:
-            raise FirmwareError(
-                f"{self.name}: {self.program} has no parameter {', '.join(sorted(absent))}; leave it out, or "
-                "give the name that this version has for it"
-            )
+            raise lacks(f"{self.name}: {self.program}", absent)
 
     def ending(self) -> str:
         """Return how it has ended, with its last words; empty: it runs."""

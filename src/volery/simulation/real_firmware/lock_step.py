@@ -81,7 +81,8 @@ class RealFirmware:
         self._exchange, self._mode_name, self._kinds = instance.exchange, instance.mode_name, instance.kinds
         self._arms_lost = instance.arms_lost
         self._ground = GroundLink(instance.connection, flight.frame, self._meet)
-        self._faults = FirmwareFaults(project, f"{name}: {self.process.program}", self._ground)
+        whose = f"{name}: {self.process.program}"
+        self._faults = FirmwareFaults(project, whose, self._ground, instance.parameters)
         self._clock: Ns = 0  # the firmware's time at its last exchange
         self._due: Ns = 0  # virtual time of its next one
         self._waiting = False  # for the answer to the last samples

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import socket
+from collections.abc import Set
 from math import radians
 from types import SimpleNamespace
 from typing import Any
@@ -20,6 +21,7 @@ from volery.model.faults import FAULTS
 from volery.simulation.real_firmware.ardupilot import ArduPilotExchange
 from volery.simulation.real_firmware.family import PROJECTS
 from volery.simulation.real_firmware.firmware_faults import WAYS, FirmwareFaults
+from volery.simulation.real_firmware.firmware_process import FirmwareError
 from volery.simulation.real_firmware.ground_link import GroundLink
 from volery.simulation.world.state_layout import (
     P_CAPACITY,
@@ -59,7 +61,14 @@ PERIOD = 10 * MS
 class Firmware:
     """The other end of a ground link: a firmware of parameters alone, and faults that act on it."""
 
-    def __init__(self, project: str, parameters: dict[str, float], *, stubborn: bool = False) -> None:
+    def __init__(
+        self,
+        project: str,
+        parameters: dict[str, float],
+        *,
+        stubborn: bool = False,
+        stated: Set[str] = frozenset(),
+    ) -> None:
         self.parameters = dict(parameters)
         self.version = 0x040603FF
         self.commands: list[tuple[int, float]] = []
@@ -70,7 +79,7 @@ class Firmware:
         self.row = [0.0] * WORLD
         self.row[P_CAPACITY] = 18_000.0
         self._ground = GroundLink(self, LocalFrame(0.0, 0.0, 0.0), lambda: None)
-        self.faults = FirmwareFaults(project, "drone_1: arducopter", self._ground)
+        self.faults = FirmwareFaults(project, "drone_1: arducopter", self._ground, stated)
         self.now = 0
 
     def run(self, duration: int) -> None:
@@ -168,6 +177,18 @@ def test_a_fault_is_refused_by_name_once_it_is_known_that_its_parameter_is_missi
     with pytest.raises(CapabilityError, match=words):
         firmware.faults.require("gps-lost", "blind")
     firmware.faults.require("barometer-stuck", "deaf")
+
+
+def test_parameters_that_the_firmware_lacks_are_named_after_its_boot() -> None:
+    has = {f"OWN_{number}": 1.0 for number in range(200)}
+    Firmware("ardupilot", OF_4_6 | has, stated=has.keys()).run(20 * S)
+    firmware = Firmware("ardupilot", OF_4_6 | has, stated={*has, "NO_SUCH", "A_NAME_THAT_IS_MUCH_TOO_LONG"})
+    firmware.run(10 * S)
+    with pytest.raises(
+        FirmwareError, match=r"drone_1: arducopter has no parameter A_NAME_\w+, NO_SUCH; leave"
+    ):
+        firmware.run(10 * S)
+    firmware.run(S)  # it is said once
 
 
 def test_a_version_that_keeps_a_battery_of_its_own_is_named() -> None:
