@@ -87,13 +87,13 @@ _FIRST = "0"
 """Frame of the first sensor of a kind."""
 _COPTER, _ROVER = 2, 1
 _ROVER_TYPES = (10, 11)
-_SAFETY_ARMED = 128
-_ON_GROUND = 1
-_PREARM_CHECK = 0x1000_0000
+_SAFETY_ARMED = constant("MAV_MODE_FLAG_SAFETY_ARMED")
+_ON_GROUND = constant("MAV_LANDED_STATE_ON_GROUND")
+_PREARM_CHECK = constant("MAV_SYS_STATUS_PREARM_CHECK")
 _HEALTH_OF = {21: 0x1_0000, 22: 0x200_0000}
 """MAV_SYS_STATUS_SENSOR that is not healthy in the failsafes of radio and battery."""
-_CRITICAL = 5
-"""MAV_STATE of a failsafe."""
+_CRITICAL = constant("MAV_STATE_CRITICAL")
+"""State of a failsafe."""
 _UNKNOWN_U16 = 65_535
 _NO_TEMPERATURE = 32_767
 _DO_SET_MODE, _CUSTOM_MODE_ENABLED = 176, 1

@@ -31,12 +31,20 @@ from volery.bridge.node_interface import (
     stamped,
 )
 from volery.kernel.waiting import Lock
+from volery.links.mavlink_messages import constant
 from volery.ros.messages import message_class, new, service
 
 ACK_TIMEOUT: Ns = 5 * S
-ACCEPTED, FAILED, IN_PROGRESS = 0, 4, 5
-CUSTOM_MODE_ENABLED = 1
-LAND, TAKEOFF, SET_HOME, ARM_DISARM, GET_HOME, SET_MESSAGE_INTERVAL = 21, 22, 179, 400, 410, 511
+ACCEPTED = constant("MAV_RESULT_ACCEPTED")
+FAILED = constant("MAV_RESULT_FAILED")
+IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
+CUSTOM_MODE_ENABLED = constant("MAV_MODE_FLAG_CUSTOM_MODE_ENABLED")
+LAND = constant("MAV_CMD_NAV_LAND")
+TAKEOFF = constant("MAV_CMD_NAV_TAKEOFF")
+SET_HOME = constant("MAV_CMD_DO_SET_HOME")
+ARM_DISARM = constant("MAV_CMD_COMPONENT_ARM_DISARM")
+GET_HOME = constant("MAV_CMD_GET_HOME_POSITION")
+SET_MESSAGE_INTERVAL = constant("MAV_CMD_SET_MESSAGE_INTERVAL")
 _INT_FIELDS = ("frame", "command", "current", "autocontinue", "param1", "param2", "param3", "param4", *"xyz")
 
 

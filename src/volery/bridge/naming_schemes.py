@@ -81,7 +81,7 @@ from volery.bridge.status_publishers import (
     StatusPublisher,
 )
 from volery.bridge.trajectory_setpoints import TRAJECTORY_TOPICS, TrajectorySetpoints
-from volery.links.mavlink_messages import entry_name
+from volery.links.mavlink_messages import constant, entry_name
 from volery.ros.messages import new, service
 from volery.ros.messages.package_versions import use_version, versions_of
 
@@ -164,8 +164,8 @@ MILLI = 1000.0
 FIX_3D = 3
 NO_FIX, FIX, GPS = -1, 0, 1
 """sensor_msgs/NavSatStatus."""
-SAFETY_ARMED, GUIDED_ENABLED = 128, 8
-"""MAV_MODE_FLAG."""
+SAFETY_ARMED = constant("MAV_MODE_FLAG_SAFETY_ARMED")
+GUIDED_ENABLED = constant("MAV_MODE_FLAG_GUIDED_ENABLED")
 EMPTY = "std_srvs/srv/Empty"
 RC_TYPE = "roscopter/msg/RC"
 

@@ -22,7 +22,7 @@ from volery.bridge.node_interface import (
     stamped,
 )
 from volery.links.frame import Frame
-from volery.links.mavlink_messages import item_scale, mission_type
+from volery.links.mavlink_messages import constant, item_scale, mission_type
 from volery.ros.messages import new, service
 
 ANSWERED_WITHIN: Ns = 1500 * MS
@@ -31,7 +31,7 @@ READ_AFTER: Ns = 15 * S
 """When MAVROS reads the lists, after it has connected."""
 REPORTS = 5
 """Reports of the current item that may still state the one before."""
-ACCEPTED = 0
+ACCEPTED = constant("MAV_MISSION_ACCEPTED")
 _ITEM_PARAMETERS = ("param1", "param2", "param3", "param4")
 _LIST = "mavros_msgs/msg/WaypointList"
 

@@ -68,7 +68,7 @@ RATES: Mapping[str, float] = {
 _ALWAYS = ("home_position", "vehicle_command_ack", "vehicle_status")
 """Topics that are published without a subscription, too: a late one receives what is kept."""
 
-SAFETY_ARMED = 128
+SAFETY_ARMED = constant("MAV_MODE_FLAG_SAFETY_ARMED")
 DISARMED, ARMED = 1, 2
 COPTER, ROVER = 1, 3
 """``vehicle_type``."""

@@ -22,7 +22,7 @@ from volery.bridge.node_interface import (
     Translator,
     stamped,
 )
-from volery.links.mavlink_messages import StatusTextAssembler, entry_name
+from volery.links.mavlink_messages import StatusTextAssembler, constant, entry_name
 from volery.ros.messages import message_class, new
 
 _UNKNOWN_U16 = 65535
@@ -174,7 +174,7 @@ _ARRAY = "diagnostic_msgs/msg/DiagnosticArray"
 OK, WARN, ERROR, STALE = range(4)
 LOW = 20
 """Percentage of the battery below which the level is WARN."""
-_SAFETY_ARMED = 128
+_SAFETY_ARMED = constant("MAV_MODE_FLAG_SAFETY_ARMED")
 _NO_FIX, _FIX_3D = 1, 3
 _UNKNOWN_U8 = 255
 

@@ -37,13 +37,15 @@ from volery.kernel.task import ExecutionContext, Scope, Task
 from volery.kernel.waiting import sleep
 from volery.links.frame import Frame
 from volery.links.link import Link
+from volery.links.mavlink_messages import constant
 from volery.links.pprzros_messages import FROM_ROS, PPRZROS_TYPE, TO_ROS, to_frame, to_message
 from volery.ros.graph import DEFAULT, INVALID_VALUES, SENSOR_DATA, Group, Node, Publisher, RosGraph, Work
 from volery.trace.events import Text
 
-ONBOARD_CONTROLLER, NO_AUTOPILOT, ACTIVE = 18, 8, 4
-SAFETY_ARMED = 128
-"""MAV_MODE_FLAG."""
+ONBOARD_CONTROLLER = constant("MAV_TYPE_ONBOARD_CONTROLLER")
+NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
+ACTIVE = constant("MAV_STATE_ACTIVE")
+SAFETY_ARMED = constant("MAV_MODE_FLAG_SAFETY_ARMED")
 WARNING = 4
 LOOK_AGAIN: Ns = 10 * US
 """Period at which a request looks whether the set-points before it are through."""

@@ -36,8 +36,8 @@ _NO_PARAMETERS = (0.0, 0.0, 0.0, 0.0)
 
 AUTOPILOTS: Mapping[str, int] = {"ArduPilot": 3, "PX4": 12}
 """MAV_AUTOPILOT in a file, by the name in telemetry."""
-QUADROTOR, GROUND_ROVER = 2, 10
-"""MAV_TYPE in a file."""
+QUADROTOR = constant("MAV_TYPE_QUADROTOR")
+GROUND_ROVER = constant("MAV_TYPE_GROUND_ROVER")
 VERSION, PART_VERSION = 1, 2
 """Versions of a file, and of its mission, geofence and rally points, that are read and written."""
 _ALTITUDE_MODES: Mapping[int, int] = {0: 2, 3: 1, 5: 2, 6: 1, 10: 4, 11: 4}

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache, partial
 
 from volery.base.time import MS, S, from_seconds, to_seconds
+from volery.links.mavlink_messages import constant
 from volery.simulation.autopilots.ardupilot import (
     boot,
     commands,
@@ -86,8 +87,7 @@ from volery.simulation.autopilots.vehicle_state import (
     VehicleRules,
 )
 
-QUADROTOR = 2
-"""MAV_TYPE."""
+QUADROTOR = constant("MAV_TYPE_QUADROTOR")
 
 CAPABILITIES = 64_495
 """MAV_PROTOCOL_CAPABILITY bits, as recorded."""

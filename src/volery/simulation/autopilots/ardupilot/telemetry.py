@@ -10,6 +10,7 @@ from math import degrees, hypot, nan, pi
 from volery.base.elementary import atan2
 from volery.base.frames import attitude_enu_to_ned, euler_to_quaternion, quaternion_to_euler
 from volery.base.time import US, S
+from volery.links.mavlink_messages import constant
 from volery.simulation.autopilots.ardupilot.sensor_status import FIX_AFTER, NO_FIX_AFTER, receiver_is_lost
 from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
 from volery.simulation.autopilots.ardupilot.versions import Version
@@ -320,14 +321,15 @@ def origin(vehicle: Vehicle) -> Fields | None:
     }
 
 
-ARMED = 128
-"""MAV_MODE_FLAG_SAFETY_ARMED."""
-
-CALIBRATING, STANDBY, ACTIVE, CRITICAL = 2, 3, 4, 5
-"""MAV_STATE."""
-
-ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
-"""MAV_LANDED_STATE."""
+ARMED = constant("MAV_MODE_FLAG_SAFETY_ARMED")
+CALIBRATING = constant("MAV_STATE_CALIBRATING")
+STANDBY = constant("MAV_STATE_STANDBY")
+ACTIVE = constant("MAV_STATE_ACTIVE")
+CRITICAL = constant("MAV_STATE_CRITICAL")
+ON_GROUND = constant("MAV_LANDED_STATE_ON_GROUND")
+IN_AIR = constant("MAV_LANDED_STATE_IN_AIR")
+TAKING_OFF = constant("MAV_LANDED_STATE_TAKEOFF")
+LANDING = constant("MAV_LANDED_STATE_LANDING")
 
 
 def heartbeat(vehicle: Vehicle, kind: int, system_status: int) -> Fields:

@@ -11,7 +11,7 @@ from volery.base.time import MS, Ns, S
 from volery.kernel.api import Kernel
 from volery.links.frame import Frame
 from volery.links.link import ByteLink, FillingLink, Link, SelectiveLink
-from volery.links.mavlink_messages import MessageStreams
+from volery.links.mavlink_messages import MessageStreams, constant
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.trace.events import LinkState
 
@@ -24,8 +24,7 @@ WAITING = 4
 STATION_SILENT: Ns = 2500 * MS
 """Time after its last heartbeat for which a ground station counts as connected [ns]."""
 
-GROUND_STATION = 6
-"""MAV_TYPE_GCS."""
+GROUND_STATION = constant("MAV_TYPE_GCS")
 
 HIGH_LATENCY_STREAMS: Mapping[str, Ns] = {"HIGH_LATENCY2": 5 * S}
 """Periods of the streams that a link of high latency carries without a request, as in ArduPilot."""

@@ -11,6 +11,7 @@ from math import degrees, isfinite, nan
 from typing import Any, NamedTuple
 
 from volery.base.time import MS, US
+from volery.links.mavlink_messages import constant
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE
 from volery.simulation.autopilots.vehicle_state import Vehicle
 
@@ -106,8 +107,11 @@ def attitude_quaternion(vehicle: Vehicle) -> Fields:
     }
 
 
-ACCEPTED, TEMPORARILY_REJECTED, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
-"""MAV_RESULT."""
+ACCEPTED = constant("MAV_RESULT_ACCEPTED")
+TEMPORARILY_REJECTED = constant("MAV_RESULT_TEMPORARILY_REJECTED")
+DENIED = constant("MAV_RESULT_DENIED")
+UNSUPPORTED = constant("MAV_RESULT_UNSUPPORTED")
+FAILED = constant("MAV_RESULT_FAILED")
 
 NOT_GIVEN = 2_147_483_647
 """Value of a coordinate of COMMAND_INT that is not given."""

@@ -15,7 +15,7 @@ from zlib import crc32
 
 from volery.base.time import MS, US, Ns
 from volery.kernel.api import Handle
-from volery.links.mavlink_messages import from_bytewise, message_type_of, to_bytewise
+from volery.links.mavlink_messages import constant, from_bytewise, message_type_of, to_bytewise
 from volery.simulation.autopilots.autopilot_parameters import Parameter, quantised
 from volery.simulation.autopilots.mavlink.channel import MavlinkChannel, Peer
 from volery.simulation.autopilots.mavlink.firmware import MavlinkFirmware, ParameterPolicy
@@ -239,8 +239,11 @@ class ParameterService:
 
 # --- missions ---
 
-MISSION_ACCEPTED, MISSION_ERROR, MISSION_UNSUPPORTED, NO_SPACE, INVALID_SEQUENCE = 0, 1, 3, 4, 13
-"""MAV_MISSION_RESULT."""
+MISSION_ACCEPTED = constant("MAV_MISSION_ACCEPTED")
+MISSION_ERROR = constant("MAV_MISSION_ERROR")
+MISSION_UNSUPPORTED = constant("MAV_MISSION_UNSUPPORTED")
+NO_SPACE = constant("MAV_MISSION_NO_SPACE")
+INVALID_SEQUENCE = constant("MAV_MISSION_INVALID_SEQUENCE")
 
 MISSION, FENCE, RALLY = 0, 1, 2
 """MAV_MISSION_TYPE."""

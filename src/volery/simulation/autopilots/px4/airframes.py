@@ -15,6 +15,7 @@ from types import MappingProxyType
 from volery.base.elementary import atan2
 from volery.base.frames import Vector
 from volery.base.time import MS, S
+from volery.links.mavlink_messages import constant
 from volery.simulation.autopilots.autopilot import Firmware
 from volery.simulation.autopilots.autopilot_parameters import REAL32, Parameter, Parameters, Tuning
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
@@ -235,8 +236,7 @@ def _report_short_return(vehicle: Vehicle, stage: str, amsl: float, above: float
         log.send(event_interface.RETURN_LAND)
 
 
-QUADROTOR = 2
-"""MAV_TYPE."""
+QUADROTOR = constant("MAV_TYPE_QUADROTOR")
 
 
 def _take_off(vehicle: Vehicle) -> Manoeuvre:
@@ -329,8 +329,7 @@ def copter(version: Version) -> Firmware:
     )
 
 
-GROUND_ROVER = 10
-"""MAV_TYPE."""
+GROUND_ROVER = constant("MAV_TYPE_GROUND_ROVER")
 
 ASSUMED = (Parameter("GND_SPEED_MAX", REAL32, 10.0), Parameter("GND_SPEED_TRIM", REAL32, 3.0))
 """Documented defaults of parameters that the recorded multirotor does not list."""

@@ -6,6 +6,7 @@ from itertools import takewhile
 
 from volery.base.frames import Vector
 from volery.base.time import from_seconds
+from volery.links.mavlink_messages import constant
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
     FOREVER,
     Leg,
@@ -38,10 +39,10 @@ from volery.simulation.autopilots.px4.flight_modes import Descent, Hold, TakeOff
 from volery.simulation.autopilots.px4.modes import CRITICAL, INFO, commander_of
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
 
-UNSUPPORTED_FRAME, UNSUPPORTED = 2, 3
-"""MAV_MISSION_RESULT."""
+UNSUPPORTED_FRAME = constant("MAV_MISSION_UNSUPPORTED_FRAME")
+UNSUPPORTED = constant("MAV_MISSION_UNSUPPORTED")
 
-MISSION_FRAME = 2
+MISSION_FRAME = constant("MAV_FRAME_MISSION")
 
 ROI_LOCATION, ROI_NONE, ROI = 195, 197, 201
 FLOWN = frozenset(

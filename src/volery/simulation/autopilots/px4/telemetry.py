@@ -11,6 +11,7 @@ from zlib import crc32
 from volery.base.elementary import atan2
 from volery.base.frames import euler_to_quaternion, quaternion_to_euler
 from volery.base.time import MS, US, Ns, S
+from volery.links.mavlink_messages import constant
 from volery.simulation.autopilots.mavlink import messages
 from volery.simulation.autopilots.mavlink.messages import (
     EPOCH_US,
@@ -316,14 +317,15 @@ def orbit_status(vehicle: Vehicle) -> Fields | None:
     }
 
 
-ARMED = 128
-"""MAV_MODE_FLAG_SAFETY_ARMED."""
-
-STANDBY, ACTIVE, CRITICAL, TERMINATED = 3, 4, 5, 8
-"""MAV_STATE."""
-
-ON_GROUND, IN_AIR, TAKING_OFF, LANDING = 1, 2, 3, 4
-"""MAV_LANDED_STATE."""
+ARMED = constant("MAV_MODE_FLAG_SAFETY_ARMED")
+STANDBY = constant("MAV_STATE_STANDBY")
+ACTIVE = constant("MAV_STATE_ACTIVE")
+CRITICAL = constant("MAV_STATE_CRITICAL")
+TERMINATED = constant("MAV_STATE_FLIGHT_TERMINATION")
+ON_GROUND = constant("MAV_LANDED_STATE_ON_GROUND")
+IN_AIR = constant("MAV_LANDED_STATE_IN_AIR")
+TAKING_OFF = constant("MAV_LANDED_STATE_TAKEOFF")
+LANDING = constant("MAV_LANDED_STATE_LANDING")
 
 NOT_THERE = 65_535
 NO_CURRENT = -100
