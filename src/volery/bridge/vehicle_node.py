@@ -40,13 +40,12 @@ from volery.links.link import Link
 from volery.links.mavlink_messages import constant
 from volery.links.pprzros_messages import FROM_ROS, PPRZROS_TYPE, TO_ROS, to_frame, to_message
 from volery.ros.graph import DEFAULT, INVALID_VALUES, SENSOR_DATA, Group, Node, Publisher, RosGraph, Work
-from volery.trace.events import Text
+from volery.trace.events import WARNING, Text
 
 ONBOARD_CONTROLLER = constant("MAV_TYPE_ONBOARD_CONTROLLER")
 NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
 ACTIVE = constant("MAV_STATE_ACTIVE")
 SAFETY_ARMED = constant("MAV_MODE_FLAG_SAFETY_ARMED")
-WARNING = 4
 LOOK_AGAIN: Ns = 10 * US
 """Period at which a request looks whether the set-points before it are through."""
 

@@ -27,7 +27,7 @@ from volery.control.vehicle_answer import (
     Answer,
     answer_of,
 )
-from volery.trace.events import Text
+from volery.trace.events import WARNING, Text
 from volery.vehicles import Drone
 from volery.vehicles.telemetry import HALF_US, MIDDLE_US, Attitude
 
@@ -273,7 +273,6 @@ class _TiltLoop:
 LOW_THROTTLE = (800, 1300)
 """Pulse widths in µs with which a throttle stick commands a fast descent in altitude hold."""
 THROTTLE = 3
-WARNING = 4
 
 
 class RcOverride(Actuation):

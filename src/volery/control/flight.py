@@ -27,7 +27,7 @@ from volery.control.safety_switch import Authority, Emergency, Received, SwitchS
 from volery.control.vehicle_answer import LEAST_SHARE, suited
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Rate, sleep
-from volery.trace.events import ControlSample, Text
+from volery.trace.events import NOTICE, ControlSample, Text
 from volery.vehicles import Drone
 
 PERIOD: Ns = 50 * MS
@@ -54,8 +54,6 @@ LEAST_DESCENT = 0.8
 """Rate of descent in m/s that is harmless at the ground."""
 MARGIN = 1.5
 """Height in m that is left when the last command ends: the drone still has to stop."""
-NOTICE = 5
-"""Severity of the record's lines about who has control (syslog)."""
 
 
 def limited_descent(command: Command, height: float) -> Command:

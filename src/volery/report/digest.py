@@ -27,6 +27,7 @@ from volery.requirements.record import DELIVERY_KIND
 from volery.trace.attachments import RunSetup, Scenery
 from volery.trace.events import (
     NONE,
+    WARNING,
     Activation,
     Collision,
     Event,
@@ -105,7 +106,6 @@ _CURVE_STRETCHES = 350
 _MOST_REMARKS = 400
 _MOST_SUBJECTS = 60  # of a kind of notes
 _MOST_STEPS = 200  # of a subject, after its first one
-_WARNING = 4  # syslog's severity of a warning
 
 Json = dict[str, Any]
 
@@ -246,7 +246,7 @@ class Digest:
             case LinkState():
                 self._note(event.at, "link", event.link, f"{event.state} {event.detail}".strip())
             case Text():
-                kind = "warning" if event.severity <= _WARNING else "words"
+                kind = "warning" if event.severity <= WARNING else "words"
                 self._note(event.at, kind, event.source, event.text)
             case _:
                 pass

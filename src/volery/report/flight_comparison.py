@@ -26,6 +26,7 @@ from volery.base.time import to_seconds
 from volery.report.digest import thin_track
 from volery.report.flights import ANGLES, DONE, EAST, HEIGHT, Answer, Array, Flight, Stretch
 from volery.report.grids import NOTHING, Cell, Column, Grid, number
+from volery.trace.events import WARNING
 
 SHARE, LEAST_S, WITHIN_M = 0.1, 1.0, 2.0
 """Differences of phases that are alike: of the longer duration, at least in seconds, and of the ways in
@@ -45,8 +46,6 @@ _PATH_TOLERANCE_M, _MOST_PLACES = 0.05, 1000
 """Of a way: distance at which a place between others is left out, and how many there are at most."""
 _MOST_PAIRS = 2_000_000
 """Pairs of a point and a line that are computed at once."""
-WARNING = 4
-"""Severity of a warning (syslog)."""
 
 
 class Phase(NamedTuple):

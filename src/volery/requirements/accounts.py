@@ -47,6 +47,7 @@ from volery.requirements.response_bounds import Demands
 from volery.trace.attachments import ComponentSetup, ProcessorSetup, RunSetup, VehicleSetup
 from volery.trace.events import (
     NONE,
+    WARNING,
     Activation,
     BatteryService,
     Call,
@@ -70,8 +71,6 @@ from volery.trace.events import (
 APPLICATION = "application"
 FRAMEWORK = "volery"
 """The source of texts of the framework: its warnings become warnings of the record."""
-WARNING = 4
-"""Syslog's severity of a warning."""
 
 
 class Circumstances(NamedTuple):

@@ -19,7 +19,7 @@ from volery.components.programs import load_function
 from volery.components.virtual_stdlib import virtual_modules
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
-from volery.requirements.accounts import FRAMEWORK, WARNING
+from volery.requirements.accounts import FRAMEWORK
 from volery.run.assembly.observed_vehicles import ObservedVehicles
 from volery.run.assembly.vehicles import OpenedVehicles, VehicleSettings, open_vehicles
 from volery.run.ending import Ending
@@ -34,7 +34,7 @@ from volery.trace.attachments import (
     VehicleSetup,
     to_json,
 )
-from volery.trace.events import Failure, Text
+from volery.trace.events import WARNING, Failure, Text
 from volery.trace.mcap_writer import Attachment
 from volery.vehicles import Drone, Fence, Limits, Rover, Vehicle
 from volery.vehicles.address import parse

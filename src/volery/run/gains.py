@@ -21,12 +21,11 @@ from volery.control.manoeuvres import Manoeuvre, set_gains
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import sleep
 from volery.ros.graph import Node
-from volery.trace.events import Text
+from volery.trace.events import NOTICE, Text
 from volery.vehicles import Drone
 
 READ_AGAIN: Ns = S
 """Time after which gains are read again."""
-NOTICE = 5
 AS_PARAMETERS = ("kp", "ki", "kd", "filter_s", "slew", "deceleration")
 """Gains that are parameters of the node, those of them that are finite."""
 

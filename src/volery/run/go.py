@@ -22,7 +22,7 @@ from volery.run.assembly.ros_graphs import GRAPHS, open_graph
 from volery.run.fly import fly
 from volery.run.gains import GainParameters, GainsFile
 from volery.run.result import Options, Run
-from volery.trace.events import Event, Text
+from volery.trace.events import INFO, Event, Text
 from volery.trace.stream import Stream
 from volery.vehicles import Drone
 from volery.vehicles.address import MAVLINK_OPTIONS, parse
@@ -38,7 +38,6 @@ RATES = {"rate": "20", "attitude": "50", "rc": "20"}
 """Telemetry that a control loop needs, Hz, unless the address states other rates."""
 SIMULATED_TRANSMITTERS = frozenset({"ardupilot"})
 """Simulated autopilots that receive a transmitter without being asked to."""
-INFO = 6
 NODE = "volery_go"
 """Node whose parameters are the gains."""
 

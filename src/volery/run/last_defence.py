@@ -7,13 +7,10 @@ autopilot's failsafe for a lost link does; it is asked for before the flight and
 from __future__ import annotations
 
 from volery.base.errors import VoleryError
-from volery.trace.events import Text
+from volery.trace.events import INFO, WARNING, Text
 from volery.vehicles import Vehicle
 from volery.vehicles.driver import LinkLossAction
 from volery.vehicles.vehicle_connection import ON_LINK_LOSS
-
-WARNING, INFO = 4, 6
-"""Severities of syslog."""
 
 
 class LastDefence:

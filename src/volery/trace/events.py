@@ -223,6 +223,10 @@ class Milestone(NamedTuple):
     detail: str
 
 
+EMERGENCY, ALERT, CRITICAL, ERROR, WARNING, NOTICE, INFO, DEBUG = range(8)
+"""Severities of syslog, which MAVLink has as well."""
+
+
 class Text(NamedTuple):
     """A component's log line or an autopilot's status text.
 

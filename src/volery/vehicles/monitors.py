@@ -31,7 +31,7 @@ from volery.base.frames import Vector
 from volery.base.position import AMSL, Position
 from volery.base.time import MINUTE, MS, Ns, S, to_seconds
 from volery.kernel.api import Kernel
-from volery.trace.events import Text
+from volery.trace.events import WARNING, Text
 from volery.vehicles.escalation import SINKING_M_S
 from volery.vehicles.executor import Check
 from volery.vehicles.limits import FLOOR, Bounds, Limits, Path
@@ -799,9 +799,6 @@ class Goal(NamedTuple):
 
 NO_GOAL = Goal(nan, nan, nan)
 
-JUMPED = 4
-"""Severity of the text that reports a jump of the estimate: a warning, as in syslog."""
-
 
 class FlightMonitor:
     """The monitors of one vehicle.
@@ -871,7 +868,7 @@ class FlightMonitor:
             off_track = self._track.check(operation, now, bounds)
             if self._track.jumped_m:
                 said = f"its estimate of the position has jumped by {self._track.jumped_m:.0f} m"
-                self._kernel.record(Text(now, seen.name, JUMPED, said))
+                self._kernel.record(Text(now, seen.name, WARNING, said))
             thrust = self._thrust.check(operation, now) if seen.flying or movement.travels else None
             upset = self.upset.check(operation, now)
             obstacle = self._obstacles.check(operation, now, limits.clearance if movement.bounded else 0.0)

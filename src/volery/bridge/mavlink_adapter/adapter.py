@@ -54,7 +54,7 @@ from volery.links.mavlink_messages import (
     message_type_of,
     status_text_chunks,
 )
-from volery.trace.events import Text
+from volery.trace.events import WARNING, Text
 from volery.vehicles.driver import ChangeSpeed, Driver, Land, MissionItem, ReturnHome, TakeOff, Waypoint
 from volery.vehicles.telemetry import StatusText
 
@@ -185,7 +185,6 @@ _ITEMS: Mapping[int, Callable[[Fields], MissionItem]] = {
 
 SYSTEM, AUTOPILOT = 1, 1
 """Ids of the vehicle on the link."""
-WARNING = 4
 SET_MODE = message_type("SET_MODE").id
 """SET_MODE is acknowledged as if it were the command with this number, as ArduPilot does."""
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, GET_HOME_POSITION, DO_SET_MODE = (

@@ -27,12 +27,11 @@ from volery.components.cpp.framework import (
 from volery.components.instance import ForeignError
 from volery.components.ports import PortList
 from volery.components.virtual_stdlib import EPOCH
-from volery.components.virtual_stdlib.process_environment import INFO
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
 from volery.kernel.waiting import Signal, current_task
 from volery.ros.client_libraries.abi_codec import CppFiber, Reader, RequestHandler, RequestHandlers, Writer
-from volery.trace.events import Failure, Text
+from volery.trace.events import INFO, Failure, Text
 from volery.vehicles import Drone
 
 STICK_FULL_SCALE = 1000

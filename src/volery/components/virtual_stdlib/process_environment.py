@@ -22,10 +22,7 @@ from volery.base.seeds import stream
 from volery.base.time import Ns, S, from_seconds, to_seconds
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
-from volery.trace.events import Text
-
-INFO = 6
-"""Severity of printed text, as in syslog."""
+from volery.trace.events import INFO, Text
 
 _PURE = ("struct_time", "strptime", "asctime", "timezone", "tzname")
 _DRAWS = (

@@ -21,9 +21,7 @@ from volery.components.virtual_stdlib.process_environment import make_module
 from volery.kernel import waiting
 from volery.kernel.api import Kernel
 from volery.kernel.task import Task
-from volery.trace.events import Text
-
-_WARNING = 4
+from volery.trace.events import WARNING, Text
 
 
 class KernelBound:
@@ -204,7 +202,7 @@ class Lock(ContextManaged):
     def _warn_of_deadlock(kernel: Kernel) -> None:
         component, where = waiting.current_task(kernel).context.component, place_of_call()
         what = f"waits for a lock that the same thread holds{where}: only another one can release it"
-        kernel.record(Text(kernel.now(), component, _WARNING, what))
+        kernel.record(Text(kernel.now(), component, WARNING, what))
 
 
 class RLock(Lock):

@@ -17,10 +17,7 @@ from volery.kernel.waiting import current_task
 from volery.ros.graph import EmbeddedGraph, Node, Publisher, QoS, RosGraph
 from volery.ros.graph.interface import NameTakenError, full_node_name, join_names
 from volery.ros.messages import message_class
-from volery.trace.events import Text
-
-WARNING = 4
-"""Severity as in syslog."""
+from volery.trace.events import WARNING, Text
 
 # -- components and their launch settings
 

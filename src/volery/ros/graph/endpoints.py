@@ -38,10 +38,7 @@ from volery.ros.graph.unserved import PUBLISHED, SERVICE, SUBSCRIBED
 from volery.ros.graph.work import Work
 from volery.ros.messages import cdr_size, message_class, service
 from volery.ros.messages.encodings import abridged_cdr, copied_to_cdr, encoded_size
-from volery.trace.events import NONE, Call, Message, Omitted, Published, Text
-
-WARNING = 4
-"""Severity, as in syslog."""
+from volery.trace.events import NONE, WARNING, Call, Message, Omitted, Published, Text
 
 
 def topic_named(graph: GraphContext, name: str, message_type: str, node: NodeContext) -> Topic:

@@ -18,7 +18,6 @@ from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
 from volery.ros.graph.embedded_graph import record_short
-from volery.ros.graph.endpoints import WARNING
 from volery.ros.graph.graph_context import GraphContext, Records
 from volery.ros.graph.interface import (
     BEST_AVAILABLE,
@@ -37,7 +36,7 @@ from volery.ros.graph.unserved import PUBLISHED, SUBSCRIBED, Surroundings, unser
 from volery.ros.messages import new, to_cdr
 from volery.ros.transports.client_library import ClientLibrary, LibraryNode, ReceivedMessage, run_in_thread
 from volery.ros.transports.transport_node import TransportNode
-from volery.trace.events import Text, Unserved
+from volery.trace.events import WARNING, Text, Unserved
 
 if TYPE_CHECKING:
 

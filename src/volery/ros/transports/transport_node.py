@@ -19,7 +19,7 @@ from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
 from volery.ros.graph.callbacks import CallbackGroup
 from volery.ros.graph.embedded_graph import LocalNode
-from volery.ros.graph.endpoints import WARNING, CallFailedError, ServiceError, failure_text
+from volery.ros.graph.endpoints import CallFailedError, ServiceError, failure_text
 from volery.ros.graph.graph_context import GraphContext, NodeContext
 from volery.ros.graph.interface import (
     AS_OFFERED,
@@ -46,7 +46,7 @@ from volery.ros.transports.client_library import (
     poll_in_thread,
     run_in_thread,
 )
-from volery.trace.events import Call, Published, Text
+from volery.trace.events import WARNING, Call, Published, Text
 from volery.trace.events import Message as MessageEvent
 
 if TYPE_CHECKING:

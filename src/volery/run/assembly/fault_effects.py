@@ -63,9 +63,7 @@ from volery.simulation.autopilots.fleet_autopilot import firmwares
 from volery.simulation.real_firmware.lock_step import RealFirmware
 from volery.simulation.real_firmware.outside_program import OutsideProgram
 from volery.simulation.world.sensors import Measurement, SampledSensor
-from volery.trace.events import Text
-
-WARNING = 4
+from volery.trace.events import WARNING, Text
 
 ALWAYS: tuple[tuple[Ns, Ns], ...] = ((0, 1 << 62),)
 NO_WIRE_FAULTS = WireFaults()

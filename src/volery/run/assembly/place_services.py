@@ -13,13 +13,11 @@ from volery.kernel.api import Kernel
 from volery.model.environment import Load, Place
 from volery.simulation.world.body_specs import Multirotor
 from volery.simulation.world.world import Truth
-from volery.trace.events import BatteryService, Failure, Text
+from volery.trace.events import NOTICE, WARNING, BatteryService, Failure, Text
 
 if TYPE_CHECKING:
     from volery.run.assembly.simulated_fleet import SimulatedFleet
 
-WARNING, NOTICE = 4, 5
-"""MAVLink severities."""
 
 SERVICE_PERIOD: Ns = 1 * S
 REACH_M = 5.0

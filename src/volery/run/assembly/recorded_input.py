@@ -10,11 +10,10 @@ from volery.base.time import to_seconds
 from volery.kernel.task import ExecutionContext
 from volery.model.recorded_inputs import RecordedInput
 from volery.model.system import System
-from volery.ros.client_libraries.library_base import WARNING
 from volery.ros.graph import RosGraph
 from volery.ros.graph.rosbag import PlayOptions, check_topics, play
 from volery.ros.messages.bags import Bag, open_bag
-from volery.trace.events import Text
+from volery.trace.events import WARNING, Text
 
 
 def recorded_input(system: System, stated: RecordedInput, graph: RosGraph) -> Callable[[], object]:

@@ -22,10 +22,8 @@ from volery.run.distributed.topic_messages import (
     to_message,
 )
 from volery.run.ending import Ending
-from volery.trace.events import Text
+from volery.trace.events import WARNING, Text
 
-WARNING = 4
-"""Severity of syslog."""
 LEAVE_PERIOD: Ns = 500 * MS
 LEAVE_WITHIN: Ns = 60 * S
 

@@ -42,7 +42,7 @@ from volery.run.distributed.topic_messages import (
     to_message,
 )
 from volery.run.distributed.worker import ORPHAN_S, Worker
-from volery.trace.events import Event, Failure, Text
+from volery.trace.events import WARNING, Event, Failure, Text
 
 REPEAT_S = 0.5
 """Wall seconds between two ``Ready``."""
@@ -50,8 +50,6 @@ WATCH_S = 2.0
 """Wall seconds between two looks for the node of the run."""
 ABSENT = 3
 """Looks in a row without the node of the run after which the run is gone."""
-ERROR, WARNING = 3, 4
-"""Severities of syslog."""
 
 
 class _ToRun:

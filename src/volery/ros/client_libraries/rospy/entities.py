@@ -9,7 +9,6 @@ from typing import Any, ClassVar, cast
 from volery.base.errors import UsageError
 from volery.base.time import MS, Ns
 from volery.kernel.waiting import Signal
-from volery.ros.client_libraries.library_base import WARNING
 from volery.ros.client_libraries.rospy.master import canonicalize_name
 from volery.ros.client_libraries.rospy.session import (
     ROSException,
@@ -23,6 +22,7 @@ from volery.ros.graph.endpoints import EmbeddedPublisher
 from volery.ros.messages import Message, ros1_type, to_cdr, to_ros1
 from volery.ros.messages.client_classes import SerializationError, adopt, library_of, receiving
 from volery.ros.messages.encodings import ros1_name
+from volery.trace.events import WARNING
 
 _TYPE_POLL: Ns = 100 * MS
 """Period at which an ``AnyMsg`` subscription looks for the type of its topic."""

@@ -18,23 +18,14 @@ from volery.base.time import Ns, S, from_seconds
 from volery.kernel.api import Kernel
 from volery.kernel.task import Cancelled, Scope
 from volery.kernel.waiting import Signal, current_task, poll, read_clock
-from volery.ros.client_libraries.library_base import (
-    WARNING,
-    AtEnd,
-    Launch,
-    LaunchedComponents,
-    Rosout,
-    node_of_file,
-)
+from volery.ros.client_libraries.library_base import AtEnd, Launch, LaunchedComponents, Rosout, node_of_file
 from volery.ros.graph import LATCHED, Group, Node, RosGraph, Work
 from volery.ros.messages.client_classes import ROSPY, message_of
 from volery.ros.messages.message import nanoseconds
-from volery.trace.events import Failure, Text
+from volery.trace.events import ERROR, WARNING, Failure, Text
 
 READ_CLOCK: Ns = 1100
 """Time of ``get_time`` or ``Time.now`` in a loop that polls, ns; of rospy 1.15, measured."""
-ERROR = 3
-"""Severity as in syslog."""
 
 
 class ROSException(Exception):  # noqa: N818 - rospy's name

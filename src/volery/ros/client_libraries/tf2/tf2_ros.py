@@ -31,10 +31,8 @@ from volery.ros.graph import EmbeddedGraph, RosGraph
 from volery.ros.messages import message_class, new
 from volery.ros.messages.client_classes import RCLPY, ROSPY, adopt, library_of
 from volery.ros.messages.message import nanoseconds
-from volery.trace.events import Text
+from volery.trace.events import ERROR, WARNING, Text
 
-ERROR, WARNING = 3, 4
-"""Severities as in syslog."""
 LOOK_UP: Ns = 6 * US
 """Time of a look-up in a loop that polls; of tf2 0.7.6, measured."""
 

@@ -9,13 +9,7 @@ from __future__ import annotations
 
 from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Item, build_of
 from volery.simulation.autopilots.ardupilot.mission import mission_grew, path_jerk
-from volery.simulation.autopilots.ardupilot.modes import (
-    INFO,
-    NOTICE,
-    arm,
-    change_mode,
-    disarm,
-)
+from volery.simulation.autopilots.ardupilot.modes import arm, change_mode, disarm
 from volery.simulation.autopilots.ardupilot.pilot_input import HIGHEST, LOWEST, sticks_moved, switches_of
 from volery.simulation.autopilots.manoeuvres.zigzag import ZigZag
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAILED, Command
@@ -29,6 +23,7 @@ from volery.simulation.autopilots.onboard_mission import (
 )
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import INFO, NOTICE
 
 UP, DOWN = 1800, 1200
 """Pulse widths [us] beyond which a switch is up or down."""

@@ -12,7 +12,6 @@ from functools import partial
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.feature import build_of
 from volery.simulation.autopilots.ardupilot.modes import (
-    INFO,
     failing_prearm_checks,
     reports_of,
     update_prearm_state,
@@ -21,6 +20,7 @@ from volery.simulation.autopilots.ardupilot.versions import Version
 from volery.simulation.autopilots.autopilot import BootEvent
 from volery.simulation.autopilots.mavlink.firmware import BootBytes
 from volery.simulation.autopilots.vehicle_state import Vehicle, VehicleAction
+from volery.trace.events import INFO
 
 DEBUG = 7
 

@@ -9,12 +9,8 @@ from volery.base.frames import wrap
 from volery.simulation.autopilots.ardupilot.battery import on_battery_reset
 from volery.simulation.autopilots.ardupilot.fence import fence_admits
 from volery.simulation.autopilots.ardupilot.modes import (
-    CRITICAL,
     FORCE,
-    INFO,
-    NOTICE,
     SKIP_CHECKS,
-    WARNING,
     arm,
     change_mode,
     disarm,
@@ -48,6 +44,7 @@ from volery.simulation.autopilots.onboard_mission import (
     MissionItem,
 )
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import CRITICAL, INFO, NOTICE, WARNING
 
 LOITER_UNLIMITED, RETURN, LAND, TAKEOFF = 17, 20, 21, 22
 CONDITION_YAW, DO_SET_MODE, CHANGE_SPEED, SET_HOME = 115, 176, 178, 179

@@ -42,7 +42,6 @@ from volery.simulation.autopilots.ardupilot.guided import (
 )
 from volery.simulation.autopilots.ardupilot.modes import (
     AUTO_BITS,
-    INFO,
     LEVEL_AND_HEIGHT,
     MANUAL_BITS,
     SHARED_CHECKS,
@@ -86,6 +85,7 @@ from volery.simulation.autopilots.vehicle_state import (
     Vehicle,
     VehicleRules,
 )
+from volery.trace.events import INFO
 
 QUADROTOR = constant("MAV_TYPE_QUADROTOR")
 

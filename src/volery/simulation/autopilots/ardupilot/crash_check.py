@@ -14,12 +14,11 @@ from volery.simulation.autopilots.ardupilot.modes import disarm
 from volery.simulation.autopilots.ardupilot.pilot_input import lacks_motor
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import EMERGENCY
 
 CRASH_AFTER = 2 * S
 CRASH_LEAN, CRASH_ERROR, CRASH_ACCEL, CRASH_SPEED = 15.0, 30.0, 3.0, 10.0
 """Lean and error of the lean [degrees], acceleration [m/s^2] and speed [m/s] of ArduCopter's crash check."""
-EMERGENCY = 0
-"""MAV_SEVERITY."""
 
 
 @dataclass

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 from volery.base.time import Ns, S
 from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Kept
-from volery.simulation.autopilots.ardupilot.modes import CRITICAL
 from volery.simulation.autopilots.ardupilot.parameter_checks import EXTERNAL, GPS, SETS
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, Command, Fields
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import CRITICAL
 
 SET_SOURCES, SOURCES_OPTION = 42_007, 90
 """MAV_CMD, and value of RCn_OPTION."""

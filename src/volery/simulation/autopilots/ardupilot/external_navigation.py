@@ -16,13 +16,13 @@ from volery.base.time import MS, Ns, S
 from volery.simulation.autopilots.ardupilot.boot import for_both_units
 from volery.simulation.autopilots.ardupilot.estimator_sources import sources_of
 from volery.simulation.autopilots.ardupilot.feature import Check, Feature, Kept
-from volery.simulation.autopilots.ardupilot.modes import INFO, WARNING
 from volery.simulation.autopilots.ardupilot.parameter_checks import EXTERNAL, GPS
 from volery.simulation.autopilots.ardupilot.telemetry import EKF_ALIGNED_AFTER
 from volery.simulation.autopilots.external_aiding import ExternalAiding, Fusion, Pose, place_origin, pose_of
 from volery.simulation.autopilots.mavlink.messages import Fields
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import INFO, WARNING
 
 HEALTHY_FOR: Ns = 300 * MS
 """AP_VISUALODOM_TIMEOUT_MS."""

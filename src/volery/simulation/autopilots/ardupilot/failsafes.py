@@ -9,19 +9,13 @@ from functools import partial
 from volery.base.time import Ns, S, from_seconds
 from volery.simulation.autopilots.ardupilot.battery import left_mah, used_mah
 from volery.simulation.autopilots.ardupilot.feature import Kept
-from volery.simulation.autopilots.ardupilot.modes import (
-    AUTO_RTL,
-    CRITICAL,
-    WARNING,
-    change_mode,
-    disarm,
-    received_of,
-)
+from volery.simulation.autopilots.ardupilot.modes import AUTO_RTL, change_mode, disarm, received_of
 from volery.simulation.autopilots.autopilot import Failsafe
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import FlyMission
 from volery.simulation.autopilots.manoeuvres.to_point import Land
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import CRITICAL, WARNING
 
 LOST_FOR: Ns = S
 """Ten checks, ten a second (EKF_CHECK_ITERATIONS_MAX)."""

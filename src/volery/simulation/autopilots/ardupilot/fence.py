@@ -22,15 +22,11 @@ from volery.simulation.autopilots.ardupilot.fence_points import (
     on_fence_point,
 )
 from volery.simulation.autopilots.ardupilot.fence_shapes import shapes
-from volery.simulation.autopilots.ardupilot.modes import (
-    NOTICE,
-    change_mode,
-    disarm,
-    first_of,
-)
+from volery.simulation.autopilots.ardupilot.modes import change_mode, disarm, first_of
 from volery.simulation.autopilots.manoeuvres.manual_flight import Stabilize
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, to_uint32
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import NOTICE
 
 CEILING, CIRCLE, POLYGON, FLOOR = 1, 2, 4, 8
 """Bits of FENCE_TYPE."""

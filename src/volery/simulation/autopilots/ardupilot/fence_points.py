@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from volery.simulation.autopilots.ardupilot.feature import Kept
-from volery.simulation.autopilots.ardupilot.modes import INFO, WARNING
 from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.mavlink.messages import finite
 from volery.simulation.autopilots.onboard_mission import (
@@ -21,6 +20,7 @@ from volery.simulation.autopilots.onboard_mission import (
     MissionItem,
 )
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import INFO, WARNING
 
 FENCE, RALLY = 1, 2
 """MAV_MISSION_TYPE."""

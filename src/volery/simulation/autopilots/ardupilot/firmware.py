@@ -22,7 +22,7 @@ from volery.simulation.autopilots.ardupilot.battery import battery_status
 from volery.simulation.autopilots.ardupilot.commands import go_to_item
 from volery.simulation.autopilots.ardupilot.feature import ArmingProblems, Build, Feature
 from volery.simulation.autopilots.ardupilot.features import absent, features_of
-from volery.simulation.autopilots.ardupilot.modes import INFO, set_mode
+from volery.simulation.autopilots.ardupilot.modes import set_mode
 from volery.simulation.autopilots.ardupilot.parameters import LEAST_HOVER, MOST_HOVER
 from volery.simulation.autopilots.ardupilot.sensor_status import Health, sys_status
 from volery.simulation.autopilots.ardupilot.versions import Version
@@ -51,6 +51,7 @@ from volery.simulation.autopilots.mavlink.messages import (
 )
 from volery.simulation.autopilots.vehicle_state import ParameterTable, Vehicle, VehicleAction
 from volery.simulation.world.body_specs import Multirotor
+from volery.trace.events import INFO
 
 SEND_BANNER = 42_428
 

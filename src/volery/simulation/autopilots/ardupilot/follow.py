@@ -15,13 +15,14 @@ from volery.base.elementary import atan2
 from volery.base.frames import Vector, quaternion_to_euler, turn_clockwise
 from volery.base.time import Ns, S, to_seconds
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
-from volery.simulation.autopilots.ardupilot.modes import AUTO_BITS, INFO, LEVEL_AND_HEIGHT, WARNING, enter
+from volery.simulation.autopilots.ardupilot.modes import AUTO_BITS, LEVEL_AND_HEIGHT, enter
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import root_speed
 from volery.simulation.autopilots.mavlink.messages import all_within
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
+from volery.trace.events import INFO, WARNING
 
 OUTDATED: Ns = 3 * S
 """Age from which a position does not count."""

@@ -11,10 +11,10 @@ from math import hypot
 
 from volery.simulation.autopilots.ardupilot import sensor_status, telemetry
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, build_of
-from volery.simulation.autopilots.ardupilot.modes import NOTICE
 from volery.simulation.autopilots.mavlink.firmware import HighLatency
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, boot_ms
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import NOTICE
 
 CONTROL_HIGH_LATENCY = 2600
 PROTOCOL = 43

@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
-from volery.simulation.autopilots.ardupilot.modes import INFO
 from volery.simulation.autopilots.ardupilot.servo_outputs import channels, move
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, Command
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import INFO
 
 GEAR_OUTPUT = 29
 """SERVOn_FUNCTION."""

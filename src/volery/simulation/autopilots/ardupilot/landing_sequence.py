@@ -11,18 +11,11 @@ from math import dist
 from volery.simulation.autopilots.ardupilot.commands import to_mode
 from volery.simulation.autopilots.ardupilot.feature import Feature
 from volery.simulation.autopilots.ardupilot.mission import fly_mission
-from volery.simulation.autopilots.ardupilot.modes import (
-    AUTO,
-    AUTO_BITS,
-    AUTO_RTL,
-    INFO,
-    LEVEL_AND_HEIGHT,
-    WARNING,
-    enter,
-)
+from volery.simulation.autopilots.ardupilot.modes import AUTO, AUTO_BITS, AUTO_RTL, LEVEL_AND_HEIGHT, enter
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import item_point
 from volery.simulation.autopilots.onboard_mission import LAND_START
 from volery.simulation.autopilots.vehicle_state import Mode, Vehicle
+from volery.trace.events import INFO, WARNING
 
 SEQUENCE_SWITCH = 99
 """RCn_OPTION."""

@@ -14,13 +14,7 @@ from volery.simulation.autopilots.ardupilot.commands import (
     turn_to,
 )
 from volery.simulation.autopilots.ardupilot.feature import Item, Kept, build_of
-from volery.simulation.autopilots.ardupilot.modes import (
-    INFO,
-    MISSION_MODES,
-    NOTICE,
-    change_mode,
-    disarm,
-)
+from volery.simulation.autopilots.ardupilot.modes import MISSION_MODES, change_mode, disarm
 from volery.simulation.autopilots.manoeuvres.manual_flight import HoldPlace
 from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import (
     FlyMission,
@@ -61,6 +55,7 @@ from volery.simulation.autopilots.onboard_mission import (
     MissionItem,
 )
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.trace.events import INFO, NOTICE
 
 UNSUPPORTED_FRAME, UNSUPPORTED, INVALID_PARAM1, INVALID_X, INVALID_Y, INVALID_Z = 2, 3, 6, 10, 11, 12
 """MAV_MISSION_RESULT."""

@@ -18,9 +18,7 @@ from volery.simulation.autopilots.mavlink.messages import ACCEPTED, DENIED, FAIL
 from volery.simulation.autopilots.onboard_mission import DELAY, TAKEOFF
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import FIX_3D, Mode, Vehicle
-
-CRITICAL, WARNING, NOTICE, INFO = 2, 4, 5, 6
-"""MAV_SEVERITY."""
+from volery.trace.events import CRITICAL, INFO, NOTICE, WARNING
 
 FORCE, SKIP_CHECKS = 21_196, 2_989
 """Values of param2 that skip the checks: for both directions, and for arming only."""

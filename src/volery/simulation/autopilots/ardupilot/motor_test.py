@@ -13,7 +13,7 @@ from math import isfinite
 from volery.base.time import Ns, from_seconds
 from volery.simulation.autopilots.ardupilot.failsafes import conditions_of
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
-from volery.simulation.autopilots.ardupilot.modes import CRITICAL, INFO, arm, disarm
+from volery.simulation.autopilots.ardupilot.modes import arm, disarm
 from volery.simulation.autopilots.ardupilot.pilot_input import switches_of
 from volery.simulation.autopilots.autopilot_parameters import single
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
@@ -21,6 +21,7 @@ from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Comm
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import OFF, Vehicle
 from volery.simulation.world.body_specs import FRAMES, Multirotor
+from volery.trace.events import CRITICAL, INFO
 
 MOTOR_TEST = 209
 PERCENT, PULSE, PILOT = 0, 1, 2

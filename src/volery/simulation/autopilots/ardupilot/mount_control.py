@@ -8,7 +8,6 @@ from typing import Any
 from volery.base.time import S
 from volery.simulation.autopilots.ardupilot.commands import is_place
 from volery.simulation.autopilots.ardupilot.feature import Feature, Item, as_command
-from volery.simulation.autopilots.ardupilot.modes import WARNING
 from volery.simulation.autopilots.ardupilot.mount import (
     AT_HOME,
     AT_POINT,
@@ -47,6 +46,7 @@ from volery.simulation.autopilots.mavlink.messages import (
 )
 from volery.simulation.autopilots.onboard_mission import GLOBAL, GLOBAL_RELATIVE
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import WARNING
 
 ROI_LOCATION, ROI_NONE, ROI = 195, 197, 201
 ROI_SYSTEM, MOUNT_CONFIGURE, MOUNT_CONTROL, GIMBAL_PITCHYAW, GIMBAL_CONFIGURE = 198, 204, 205, 1000, 1001

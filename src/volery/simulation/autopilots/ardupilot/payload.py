@@ -11,11 +11,11 @@ from functools import partial
 
 from volery.base.time import MS, S, from_seconds
 from volery.simulation.autopilots.ardupilot.feature import Feature, Item, as_command
-from volery.simulation.autopilots.ardupilot.modes import INFO
 from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command, Fields, boot_ms
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import INFO
 
 SET_RELAY, REPEAT_RELAY, SET_SERVO, REPEAT_SERVO, GRIPPER = 181, 182, 183, 184, 211
 """Commands that are mission items, too."""

@@ -11,7 +11,6 @@ from enum import Enum, auto
 from volery.base.frames import Vector
 from volery.base.time import MS, from_seconds
 from volery.simulation.autopilots.ardupilot.feature import Feature, Item
-from volery.simulation.autopilots.ardupilot.modes import INFO, WARNING
 from volery.simulation.autopilots.ardupilot.payload import LET_GO, move_gripper
 from volery.simulation.autopilots.ardupilot.servo_outputs import outputs_of
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
@@ -19,6 +18,7 @@ from volery.simulation.autopilots.manoeuvres.onboard_mission_flight import Leg, 
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint, stopping_point
 from volery.simulation.autopilots.onboard_mission import PAYLOAD_PLACE, MissionItem
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.trace.events import INFO, WARNING
 
 SETTLES = 500 * MS
 """Time from touch-down to the end of PLDP_DELAY, beside it [ns]."""

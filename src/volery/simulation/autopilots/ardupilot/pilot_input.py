@@ -15,10 +15,11 @@ from volery.base.elementary import cos, sin
 from volery.base.time import MS, Ns, S, from_seconds
 from volery.simulation.autopilots.ardupilot.failsafes import radio_lost
 from volery.simulation.autopilots.ardupilot.feature import Kept
-from volery.simulation.autopilots.ardupilot.modes import WARNING, arm, change_mode, disarm, received_of
+from volery.simulation.autopilots.ardupilot.modes import arm, change_mode, disarm, received_of
 from volery.simulation.autopilots.manual_control import ChannelRange
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import WARNING
 
 IGNORE, RELEASE = 65_535, 65_534
 LAST_PLAIN_CHANNEL = 8

@@ -15,7 +15,6 @@ from volery.base.elementary import tan
 from volery.base.frames import Vector, turn_clockwise, world_to_body
 from volery.base.time import MS, Ns, to_seconds
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept, LogForm
-from volery.simulation.autopilots.ardupilot.modes import CRITICAL, INFO
 from volery.simulation.autopilots.ardupilot.range_finder import range_below
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
@@ -23,6 +22,7 @@ from volery.simulation.autopilots.mavlink.messages import to_uint32
 from volery.simulation.autopilots.onboard_log import LogRow
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import CRITICAL, INFO
 
 COMPANION, IRLOCK, SIMULATED = 1, 2, 4
 """PLND_TYPE; the simulated beacon answers to the last two."""

@@ -11,10 +11,10 @@ from typing import Any
 from volery.base.frames import Vector
 from volery.simulation.autopilots.ardupilot.feature import Feature
 from volery.simulation.autopilots.ardupilot.fence_points import RALLY, RALLY_POINT
-from volery.simulation.autopilots.ardupilot.modes import WARNING
 from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import WARNING
 
 
 def return_point(vehicle: Vehicle) -> Vector | None:

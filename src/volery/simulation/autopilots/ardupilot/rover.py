@@ -27,12 +27,10 @@ from volery.simulation.autopilots.ardupilot.modes import (
     ATTITUDE_CONTROL,
     CUSTOM,
     GUIDED,
-    INFO,
     MANUAL,
     RATE_CONTROL,
     SHARED_CHECKS,
     STABILIZED,
-    WARNING,
     XY_CONTROL,
     YAW_CONTROL,
     between_uptimes,
@@ -77,6 +75,7 @@ from volery.simulation.autopilots.vehicle_state import (
     Vehicle,
     VehicleRules,
 )
+from volery.trace.events import INFO, WARNING
 
 GROUND_ROVER = 10
 """MAV_TYPE."""

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 from volery.base.time import Ns, S
 from volery.simulation.autopilots.ardupilot.feature import Feature, Kept
-from volery.simulation.autopilots.ardupilot.modes import CRITICAL
 from volery.simulation.autopilots.mavlink.messages import Fields, to_uint16
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import CRITICAL
 
 TELEMETRY_FROM = 6 * S
 """Time after boot of the first report of a speed controller [ns]."""

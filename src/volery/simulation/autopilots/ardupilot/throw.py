@@ -11,11 +11,12 @@ from math import dist, hypot
 from volery.base.elementary import cos
 from volery.base.time import MS, Ns
 from volery.simulation.autopilots.ardupilot.feature import Feature
-from volery.simulation.autopilots.ardupilot.modes import INFO, MANUAL_BITS, change_mode, enter
+from volery.simulation.autopilots.ardupilot.modes import MANUAL_BITS, change_mode, enter
 from volery.simulation.autopilots.flight_stack.flight import Control, Setpoint
 from volery.simulation.autopilots.manoeuvres.to_point import BRAKE_ACCEL, root_speed
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import IDLE, OFF, Manoeuvre, Mode, Vehicle
+from volery.trace.events import INFO
 
 GRAVITY = 9.80665
 DROP = 1

@@ -16,6 +16,7 @@ from volery.simulation.autopilots.manoeuvres.manual_flight import ManualFlight
 from volery.simulation.autopilots.state_groups import NEVER, CommandedLimits
 from volery.simulation.autopilots.vehicle_state import Vehicle
 from volery.simulation.world.arithmetic import wrap_angle
+from volery.trace.events import INFO
 
 ALLOWED = 1 << 7
 """Bit of AUTO_OPTIONS and GUID_OPTIONS."""
@@ -28,8 +29,6 @@ WAITS: Ns = 2 * S
 """Time for which the conditions must hold before it turns."""
 DECAY = 400 * log(0.98)
 """Logarithm of the share of the rate that is left after a second: 0.98 at each of 400 steps, as there."""
-INFO = 6
-"""MAV_SEVERITY."""
 
 
 @dataclass

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 from volery.base.time import to_seconds
 from volery.simulation.autopilots.ardupilot.feature import TICK, Check, Feature, Item, Kept
-from volery.simulation.autopilots.ardupilot.modes import INFO
 from volery.simulation.autopilots.ardupilot.parameters import channel_range
 from volery.simulation.autopilots.ardupilot.servo_outputs import channels, deflect, write
 from volery.simulation.autopilots.mavlink.messages import ACCEPTED, FAILED, Command
 from volery.simulation.autopilots.onboard_mission import MissionItem
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import INFO
 
 DO_WINCH = 42_600
 WINCH = 88

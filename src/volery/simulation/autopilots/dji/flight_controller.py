@@ -46,9 +46,7 @@ from volery.simulation.autopilots.manoeuvres.to_point import Land
 from volery.simulation.autopilots.onboard_mission import GLOBAL_RELATIVE, MissionItem
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
-
-INFO, WARNING = 6, 4
-"""Severities as in syslog."""
+from volery.trace.events import INFO, WARNING
 
 SWITCH, F_ABOVE, P_BELOW = 5, 1700, 1300
 """Channel of the mode switch, and its pulse widths [us] for F and P; A is between them."""

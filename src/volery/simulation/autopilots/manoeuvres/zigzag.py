@@ -12,9 +12,7 @@ from volery.base.frames import Vector
 from volery.simulation.autopilots.manoeuvres.manual_flight import Loiter
 from volery.simulation.autopilots.manoeuvres.to_point import ToPoint, quarter_time
 from volery.simulation.autopilots.vehicle_state import Vehicle
-
-INFO = 6
-"""MAV_SEVERITY."""
+from volery.trace.events import INFO
 
 
 class ZigZag(Loiter):

@@ -16,6 +16,7 @@ from volery.simulation.autopilots.mavlink.channel import Peer
 from volery.simulation.autopilots.mavlink.messages import EPOCH_US
 from volery.simulation.autopilots.onboard_log import FlightLog
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import WARNING
 
 PIECE = 90
 """Bytes of a LOG_DATA."""
@@ -23,8 +24,6 @@ BURST = 50
 """Pieces that are sent at once."""
 PERIOD: Ns = 10 * MS
 """Time between two bursts."""
-WARNING = 4
-"""MAV_SEVERITY."""
 
 
 class LogPolicy(NamedTuple):

@@ -46,10 +46,11 @@ from volery.simulation.autopilots.px4.flight_modes import (
     TakeOff,
 )
 from volery.simulation.autopilots.px4.follow_target import FollowTarget
-from volery.simulation.autopilots.px4.modes import CRITICAL, INFO, commander_of
+from volery.simulation.autopilots.px4.modes import commander_of
 from volery.simulation.autopilots.px4.offboard import Offboard, OffboardTarget, StreamTarget
 from volery.simulation.autopilots.px4.versions import Version
 from volery.simulation.autopilots.vehicle_state import ArmingTimes, Manoeuvre, ParameterTable, Vehicle
+from volery.trace.events import CRITICAL, INFO
 
 _SHARED = {
     "PD_GRIPPER_EN": "any value but 0: there is a gripper",

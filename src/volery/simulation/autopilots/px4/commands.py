@@ -27,16 +27,10 @@ from volery.simulation.autopilots.mavlink.messages import (
 from volery.simulation.autopilots.onboard_mission import GLOBAL_INT
 from volery.simulation.autopilots.px4 import event_interface, failsafes, modes, offboard
 from volery.simulation.autopilots.px4.flight_modes import Hold
-from volery.simulation.autopilots.px4.modes import (
-    CRITICAL,
-    FORCE,
-    INFO,
-    OFFBOARD_LOST,
-    Commander,
-    commander_of,
-)
+from volery.simulation.autopilots.px4.modes import FORCE, OFFBOARD_LOST, Commander, commander_of
 from volery.simulation.autopilots.px4.offboard import deflection, set_rc_channels
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import CRITICAL, INFO
 
 RETURN, LAND, TAKEOFF, ORBIT = 20, 21, 22, 34
 DO_SET_MODE, CHANGE_SPEED, SET_HOME, FLIGHT_TERMINATION, REPOSITION = 176, 178, 179, 185, 192
@@ -241,7 +235,7 @@ def on_mission_start(vehicle: Vehicle, _command: Command) -> int:
     """Handle MISSION_START: enter AUTO.MISSION and arm."""
     commander = commander_of(vehicle)
     if not commander.has_mission:
-        vehicle.send_text(modes.CRITICAL, "Mission start denied! No valid mission\t")
+        vehicle.send_text(CRITICAL, "Mission start denied! No valid mission\t")
         return DENIED
     if commander.request_mode(modes.MISSION) != ACCEPTED:
         return DENIED

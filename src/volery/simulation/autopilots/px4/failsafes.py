@@ -19,8 +19,6 @@ from volery.simulation.autopilots.px4.geofence import TOO_FAR, TOO_HIGH, fence_b
 from volery.simulation.autopilots.px4.modes import (
     BATTERY_CRITICAL,
     BATTERY_EMERGENCY,
-    CRITICAL,
-    INFO,
     LINK_LOST,
     OFFBOARD_LOST,
     OUTSIDE_FENCE,
@@ -31,6 +29,7 @@ from volery.simulation.autopilots.px4.modes import (
 )
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Vehicle
+from volery.trace.events import CRITICAL, INFO
 
 OUTSIDE = "Reposition is outside geofence\t"
 

@@ -36,8 +36,9 @@ from volery.simulation.autopilots.onboard_mission import (
 from volery.simulation.autopilots.px4 import event_interface, modes
 from volery.simulation.autopilots.px4.commands import on_return
 from volery.simulation.autopilots.px4.flight_modes import Descent, Hold, TakeOff
-from volery.simulation.autopilots.px4.modes import CRITICAL, INFO, commander_of
+from volery.simulation.autopilots.px4.modes import commander_of
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.trace.events import CRITICAL, INFO
 
 UNSUPPORTED_FRAME = constant("MAV_MISSION_UNSUPPORTED_FRAME")
 UNSUPPORTED = constant("MAV_MISSION_UNSUPPORTED")

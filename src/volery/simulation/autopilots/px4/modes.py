@@ -29,6 +29,7 @@ from volery.simulation.autopilots.px4.simulated_faults import SimulatedFaults
 from volery.simulation.autopilots.px4.versions import ALTITUDE_CRUISE, EXTERNAL, POSITION_SLOW, Version
 from volery.simulation.autopilots.state_groups import NEVER, Home
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Mode, Vehicle
+from volery.trace.events import CRITICAL, INFO
 
 CUSTOM, AUTO, GUIDED, STABILIZED, MANUAL_INPUT = 1, 4, 8, 16, 64
 """MAV_MODE_FLAG."""
@@ -99,9 +100,6 @@ def mode_table(manoeuvres: Mapping[int, Callable[[Vehicle], Manoeuvre]], *, flie
         if mode.number in manoeuvres
     }
 
-
-CRITICAL, INFO = 2, 6
-"""MAV_SEVERITY."""
 
 FORCE = 21_196
 

@@ -29,6 +29,7 @@ from volery.simulation.autopilots.px4.event_interface import FRAME_UNSUPPORTED, 
 from volery.simulation.autopilots.px4.position_control import PositionLoops, Wanted
 from volery.simulation.autopilots.state_groups import NEVER
 from volery.simulation.autopilots.vehicle_state import Manoeuvre, Vehicle
+from volery.trace.events import CRITICAL
 
 INVALID = 32_767
 CENTRE = 500
@@ -114,9 +115,6 @@ def set_rc_channels(vehicle: Vehicle, given: StickDeflection) -> None:
     for channel, value in axes.items():
         vehicle.rc.override(channel, round(1500.0 + 500.0 * value), now)
 
-
-CRITICAL = 2
-"""MAV_SEVERITY."""
 
 NO_YAW, NO_YAW_RATE = 1 << 10, 1 << 11
 """Bits of ``type_mask``."""

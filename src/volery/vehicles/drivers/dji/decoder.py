@@ -24,7 +24,7 @@ from volery.ros.messages.dji_constants import (
     M100Status,
     display_name,
 )
-from volery.trace.events import Text
+from volery.trace.events import WARNING, Text
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import (
     PILOT_FLIES,
@@ -47,7 +47,6 @@ MOST_VOLTS = 100.0
 UNKNOWN = -1
 CONNECTED = 1
 """Value of ``rc_connection_status`` with a transmitter."""
-WARNING = 4
 TAKEN_OVER_FOR: Ns = 5 * S
 """Time for which another program counts as in control after set-points were not obeyed."""
 

@@ -16,7 +16,7 @@ from volery.kernel.api import Action, Kernel
 from volery.links.frame import Frame
 from volery.links.link import Link, ReceiveStatistics, SelectiveLink
 from volery.links.mavlink_messages import constant, entry_name, from_bytewise, message_type
-from volery.trace.events import LinkState, Text
+from volery.trace.events import INFO, WARNING, LinkState, Text
 from volery.vehicles.address import rate_option, records_texts, system_option
 from volery.vehicles.driver import AttitudeTarget, link_error
 from volery.vehicles.drivers.mavlink import obstacle_decoder
@@ -53,8 +53,6 @@ TRIES = 5
 UPLOAD_STALLED: Ns = 5 * S
 MISSION_TYPE = 0
 
-_WARNING, _INFORMATION = 4, 6
-"""Severities in syslog (RFC 5424)."""
 _IN_PROGRESS = constant("MAV_RESULT_IN_PROGRESS")
 _ACCEPTED = constant("MAV_RESULT_ACCEPTED")
 _NO_AUTOPILOT = constant("MAV_AUTOPILOT_INVALID")
@@ -406,7 +404,7 @@ class MavlinkClient:
             return True
         uncovered = self.firmware.coverage.uncovered(version)
         said = uncovered or tried(self.firmware.name, version)
-        severity = _WARNING if uncovered else _INFORMATION
+        severity = WARNING if uncovered else INFO
         self._kernel.record(Text(self._kernel.now(), self.telemetry.name, severity, said))
         return True
 

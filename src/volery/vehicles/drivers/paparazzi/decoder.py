@@ -15,7 +15,7 @@ from volery.base.time import MS, Ns, S, to_seconds
 from volery.kernel.api import Kernel
 from volery.links.paparazzi_aircraft import PaparazziAircraft
 from volery.links.pprzlink_messages import entry_name, entry_value, message_type
-from volery.trace.events import Text
+from volery.trace.events import NOTICE, WARNING, Text
 from volery.vehicles.drivers.steps import DRONE_KIND
 from volery.vehicles.telemetry import (
     PILOT_FLIES,
@@ -111,7 +111,6 @@ MISSED_AFTER: Ns = 3 * S
 PAUSE: Ns = S
 """Silence of the link after which the position has all of ``MISSED_AFTER`` again."""
 
-NOTICE, WARNING = 5, 4
 MAX_PPRZ = 9600
 """Full thrust in ROTORCRAFT_FP, full deflection in ROTORCRAFT_RADIO_CONTROL; above half AUTO2."""
 LOST_FILTERS = frozenset({4, 5, 6, 8})

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from volery.base.position import AMSL, Position
 from volery.base.time import Ns, S
 from volery.kernel.api import Kernel
+from volery.trace.events import WARNING
 from volery.vehicles.drivers.mavlink.decoder import Fields, TelemetryDecoder
 from volery.vehicles.drivers.px4.events import (
     KNOWN_EVENTS,
     REPORT_ENDS,
-    WARNING,
     WITHOUT_TEXT,
     ArmingChecks,
     EventTexts,

@@ -18,11 +18,10 @@ import zlib
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from volery.trace.events import ERROR, WARNING
 from volery.vehicles.drivers.px4.modes import MANUAL_MODES, MODES
 
 ALL_MODES = 0xFFFFFFFF
-ERROR, WARNING = 3, 4
-"""Log levels of syslog. An arming check for all modes that is not an error is only a warning."""
 
 _BASIS, _PRIME = 0x811C9DC5, 0x01000193
 _AUTOPILOT = 1 << 24
@@ -610,5 +609,5 @@ def _forbids(event: Event, mode: str) -> bool:
     if event.id == NO_MANUAL_CONTROL:
         return mode in MANUAL_MODES
     if event.modes == ALL_MODES:
-        return event.severity <= ERROR
+        return event.severity <= ERROR  # a check for all modes that is no error is only a warning
     return bool(event.modes >> MODES[mode].state & 1) if mode in MODES else True
