@@ -165,7 +165,8 @@ class VehicleNode:
                 self.link.wait(self._next_heartbeat)
 
     def _warn(self, text: str) -> None:
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             kernel.record(Text(kernel.now(), self._component, WARNING, text))
 
     # -- set-up
@@ -229,11 +230,11 @@ class VehicleNode:
         try:
             translated = subscription.translate(message, self._kernel.now())
             if isinstance(translated, Frame):
-                with self._kernel:
+                with self._kernel.interact():
                     self.link.pass_on(translated)
                 return
             outgoing = translated if isinstance(translated, list) else [translated]
-            with self._kernel:
+            with self._kernel.interact():
                 for name, fields in outgoing:
                     self.link.send_to_autopilot(name, fields)
         except INVALID_VALUES as error:
@@ -262,7 +263,8 @@ class VehicleNode:
     # -- the loop
 
     def _cycle(self, node: Node, interface: NodeInterface) -> None:
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             now = kernel.now()
             received = self.link.take_unpublished()
         self._publish_received(node, interface, received)
@@ -389,7 +391,7 @@ class PprzrosNode:
         self._kernel.spawn(group.spin, f"{context.component} (datalink)", helper, scope)
         rate = node.rate(PPRZROS_PERIOD)
         while not node.closed:
-            with self._kernel:
+            with self._kernel.interact():
                 received, self._unpublished = self._unpublished, []
             for frame, at in received:
                 publisher.publish(to_message(frame, self._graph.epoch + at))
@@ -398,10 +400,11 @@ class PprzrosNode:
     def _send(self, message: Any) -> None:
         try:
             frame = to_frame(message)
-            with self._kernel:
+            with self._kernel.interact():
                 self._link.send(frame)
         except UsageError as error:
-            with self._kernel as kernel:
+            kernel = self._kernel
+            with kernel.interact():
                 text = f"{FROM_ROS}: message dropped: {error}"
                 kernel.record(Text(kernel.now(), self._component, WARNING, text))
 

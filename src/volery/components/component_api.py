@@ -117,7 +117,7 @@ def note(kind: str, subject: str, state: str, detail: str = "") -> None:
         if word is None:
             raise UsageError(f"volery.note(): {name} is None; give a text")
         words[name] = str(word).encode(errors="backslashreplace").decode()  # surrogates are no UTF-8
-    with kernel:
+    with kernel.interact():
         kernel.record(Milestone(kernel.now(), task.context.component, **words))
 
 
@@ -149,5 +149,5 @@ def log(text: str, severity: str = "info") -> None:
     if severity not in SEVERITIES:
         raise UsageError(f"volery.log(severity={severity!r}): choose {', '.join(SEVERITIES)}")
     kernel, task = caller("volery.log()")
-    with kernel:
+    with kernel.interact():
         kernel.record(Text(kernel.now(), task.context.component, SEVERITIES[severity], str(text)))

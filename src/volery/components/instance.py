@@ -179,8 +179,8 @@ class Instance:
 
     def _record_failure(self, what: str) -> None:
         """Record a failure, after the time that the code has computed; at once if its task is cancelled."""
-        with suppress(Cancelled), self.kernel:
-            pass
+        with suppress(Cancelled):
+            self.kernel.interact()
         with self.kernel.guard:
             self.kernel.record(Failure(self.kernel.now(), self.name, what))
 

@@ -72,7 +72,7 @@ class Port:
 
     def _call(self, operation: str, /, *args: Any, **kwargs: Any) -> Any:
         kernel = self._kernel
-        with kernel:  # the caller's code so far is served in the caller's context
+        with kernel.interact():  # the caller's code so far is served in the caller's context
             start = kernel.now()
             task = kernel.current()
         if task is None:
@@ -112,7 +112,7 @@ class Port:
 
     def _transfer(self, transfer: Transfer | None, content: object) -> None:
         if transfer is not None:
-            with self._kernel:
+            with self._kernel.interact():
                 transfer(HEADER_BYTES + size_of(content))
 
 
@@ -204,5 +204,5 @@ class ObservedVehicle:
     @property
     def position(self) -> Position:
         """True position, with its altitude AMSL."""
-        with self._kernel:
+        with self._kernel.interact():
             return self._truth()

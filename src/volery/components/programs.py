@@ -325,7 +325,8 @@ def start(
         if not made:
             instance.set_unavailable("its constructor has failed")
         elif active:
-            with instance.kernel as kernel:
+            kernel = instance.kernel
+            with kernel.interact():
                 if instance.allocation.starts_at > kernel.now():
                     sleep(kernel, instance.allocation.starts_at - kernel.now())
             instance.run_guarded(lambda: program.run(instance.object), RUN)

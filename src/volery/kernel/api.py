@@ -1,17 +1,16 @@
 """The interface of a kernel: time and tasks. `virtual` implements it on greenlets, `wall` on threads.
 
 Framework callbacks (actions of ``call_at``, ``every`` and ``post``) never block. Component code (the body of
-a task) may block anywhere. ``with kernel:`` marks an interaction point, where component code enters the
-framework: the virtual clock first spends the task's pending execution time on its processor, the wall clock
-takes the one monitor that guards all data of the framework.
+a task) may block anywhere. It enters the framework at interaction points, by ``kernel.interact()``: the
+virtual clock spends the task's pending execution time on its processor then. What follows within ``with
+kernel.interact():`` holds, on the wall clock, the one monitor that guards all data of the framework.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from types import TracebackType
-from typing import Protocol, Self
+from typing import Protocol
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns
@@ -69,13 +68,16 @@ class Kernel(Protocol):
     def current(self) -> Task | None:
         """Return the running task; None in a framework callback."""
 
-    def __enter__(self) -> Self:
-        """Begin an interaction point. Raises ``Cancelled`` if the task's scope has been cancelled."""
+    def interact(self) -> AbstractContextManager[object]:
+        """Be an interaction point: it acts when it is called, and may block for any time.
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        """End the interaction point."""
+        Returns:
+            What a caller holds by ``with`` if it then uses data of the framework: the monitor on the wall
+            clock, nothing in virtual time, where no other task runs until this one blocks.
+
+        Raises:
+            Cancelled: The task's scope has been cancelled.
+        """
 
     def consume(self, amount: Ns) -> bool:
         """Block the current task until its processor has served `amount` ns; False if there is no task."""
@@ -86,8 +88,8 @@ class Kernel(Protocol):
     def park(self, deadline: Ns | None, waiting_for: str) -> bool:
         """Block the current task until it is woken (True) or `deadline`, ns, has passed (False).
 
-        A caller that checks a condition before it parks does both within one ``with kernel:``, so that it
-        cannot be woken in between.
+        A caller that checks a condition before it parks does both within one ``with kernel.interact():``, so
+        that it cannot be woken in between.
 
         Args:
             deadline: Time, ns; None waits without limit.

@@ -110,7 +110,8 @@ class Network:
         Raises:
             LinkLost: they have not arrived by `deadline`, ns.
         """
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             task = current_task(kernel)
             start = kernel.now()
             transfer = Transfer(start, size, lambda: kernel.wake(task), deque())

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from heapq import heappop, heappush, heapreplace
 from itertools import count
 from time import monotonic_ns
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from greenlet import GreenletExit, getcurrent, greenlet
 
@@ -35,7 +35,6 @@ from volery.trace.events import Record, ignore
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from contextlib import AbstractContextManager
-    from types import TracebackType
 
     from volery.kernel.api import Action
 
@@ -47,6 +46,9 @@ VOID = 0
 TICKET_BITS = 48
 """Bits of an event below its time: a ticket for each microsecond of nine years."""
 
+
+_UNGUARDED = nullcontext()
+"""Held after an interaction point: not the guard, which a task that waits would keep from other threads."""
 
 LATE_S = 0.05
 """How late an event may be, s of wall time, for the later ones to be in time again."""
@@ -213,10 +215,10 @@ class VirtualKernel:
             if task.pending_cancellation is None:
                 task.release(self._now)
                 body()
-                with self:  # spends the execution time of the last activation
-                    activation = task.finish(self._now)
-                    if activation is not None:
-                        self.record(activation)
+                self.interact()  # spends the execution time of the last activation
+                activation = task.finish(self._now)
+                if activation is not None:
+                    self.record(activation)
         except Cancelled:
             pass
         finally:
@@ -229,18 +231,14 @@ class VirtualKernel:
 
     # -- interaction points
 
-    def __enter__(self) -> Self:
+    def interact(self) -> AbstractContextManager[object]:
+        """Spend the pending execution time of the current task, or raise ``Cancelled``."""
         task = self._current
         if task is not None and (
             task.pending_ns or task.pending_cancellation is not None or task.meter is not None
         ):
             self._interact(task)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        pass
+        return _UNGUARDED
 
     def _interact(self, task: Task) -> None:
         """Deliver a pending cancellation, else block until the pending execution time has been served."""

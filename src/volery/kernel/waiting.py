@@ -41,7 +41,7 @@ def current_task(kernel: Kernel) -> Task:
 
 
 def end_activation(kernel: Kernel, task: Task | None = None) -> None:
-    """Record the end of the activation of `task` (the current one); call it within ``with kernel``."""
+    """Record the end of the activation of `task` (the current one); call it at an interaction point."""
     activation = (task or current_task(kernel)).finish(kernel.now())
     if activation is not None:
         kernel.record(activation)
@@ -61,7 +61,7 @@ def read_clock(kernel: Kernel) -> Ns:
     having waited, and was late at the first reading, then its activation ended at the first reading and the
     next one began, which was due a period after its predecessor.
     """
-    with kernel:
+    with kernel.interact():
         now, task = kernel.now(), kernel.current()
         if task is not None and task.released is not None and _period_of(task) is not None:
             place = _place_of_caller()
@@ -160,12 +160,12 @@ def _place_of_caller() -> object:
 
 def sleep(kernel: Kernel, duration: Ns) -> None:
     """Block the current task for `duration` ns, counted from when its computing so far has been served."""
-    with kernel:
+    with kernel.interact():
         sleep_within(kernel, duration, kernel.now())
 
 
 def sleep_within(kernel: Kernel, duration: Ns, now: Ns) -> None:
-    """``sleep`` for a caller that is within ``with kernel`` already, at the time `now`."""
+    """``sleep`` for a caller that is at an interaction point, at the time `now`."""
     task = kernel.current()
     if duration > 0:
         if task is None:
@@ -191,7 +191,7 @@ class Rate:
         if period <= 0:
             raise UsageError(f"a period of {period} ns; it must be above 0")
         self._kernel, self.period = kernel, period
-        with kernel:
+        with kernel.interact():
             self._counted_from = kernel.now()
 
     @property
@@ -201,7 +201,8 @@ class Rate:
 
     def sleep(self) -> None:
         """End the activation; block the current task until the next one is due."""
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             task = current_task(kernel)
             before = task.released
             end_activation(kernel, task)
@@ -232,7 +233,8 @@ class Signal:
         self, predicate: Predicate, within: Ns | None = None, *, ends_activation: bool = False
     ) -> bool:
         """Block the current task until `predicate` holds (True), at most for `within` ns (False)."""
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             if predicate():
                 return True
             task = current_task(kernel)
@@ -274,18 +276,18 @@ class Event:
 
     def is_set(self) -> bool:
         """Return whether the flag is set."""
-        with self._kernel:
+        with self._kernel.interact():
             return self._set
 
     def set(self) -> None:
         """Set the flag and wake every waiting task."""
-        with self._kernel:
+        with self._kernel.interact():
             self._set = True
             self._changed.notify()
 
     def clear(self) -> None:
         """Reset the flag."""
-        with self._kernel:
+        with self._kernel.interact():
             self._set = False
 
     def wait(self, within: Ns | None = None) -> bool:
@@ -308,7 +310,7 @@ class Queue(Generic[T]):
 
     def put(self, item: T) -> bool:
         """Append `item`; return False if the oldest one was dropped. An interaction point; never waits."""
-        with self._kernel:
+        with self._kernel.interact():
             fits = len(self._items) != self._items.maxlen
             self._items.append(item)
             self._filled.notify()
@@ -320,7 +322,7 @@ class Queue(Generic[T]):
     def get(self, within: Ns | None) -> T | None: ...
     def get(self, within: Ns | None = None) -> T | None:
         """Block the current task until there is an item and take it; None if there is none `within` ns."""
-        with self._kernel:
+        with self._kernel.interact():
             if self._filled.wait_for(lambda: self._items, within, ends_activation=True):
                 return self._items.popleft()
             return None
@@ -340,7 +342,8 @@ class Lock:
         self._depth = 0
 
     def __enter__(self) -> Self:
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             task = current_task(kernel)
             if self.owner is None:
                 self.owner = task
@@ -384,18 +387,16 @@ def executing_in(kernel: Kernel, context: ExecutionContext) -> Iterator[None]:
 
     That also holds for an exception that leaves the block; a cancelled task spends nothing.
     """
-    with kernel:
+    with kernel.interact():
         task = current_task(kernel)
         task.enter(context)
     try:
         try:
             yield
         except Exception:
-            with kernel:
-                pass
+            kernel.interact()
             raise
-        with kernel:
-            pass
+        kernel.interact()
     finally:
         task.take_pending()
         task.leave()

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count
 from time import monotonic_ns
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from volery.base.errors import UsageError
 from volery.base.time import Ns, to_seconds
@@ -27,7 +27,6 @@ from volery.trace.events import Record, ignore
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from contextlib import AbstractContextManager
-    from types import TracebackType
 
     from volery.kernel.api import Action
 
@@ -126,10 +125,10 @@ class WallKernel:
     def _live(self, task: Task, body: Action, spawned: Ns) -> None:
         self._local.task = task
         try:
-            with self:
+            with self.interact():
                 task.release(spawned)
             body()
-            with self:
+            with self.interact():
                 activation = task.finish(self.now())
                 if activation is not None:
                     self.record(activation)
@@ -164,31 +163,24 @@ class WallKernel:
 
     # -- interaction points
 
-    def __enter__(self) -> Self:
-        self._monitor.acquire()
+    def interact(self) -> AbstractContextManager[object]:
+        """Raise ``Cancelled`` if the current task is cancelled; return the monitor, which is not held yet."""
         task = self.current()
         if task is not None:
-            task.take_pending()
-            if task.pending_cancellation is not None:
-                try:
+            with self._monitor:
+                task.take_pending()
+                if task.pending_cancellation is not None:
                     self._cancel_task(task)
-                finally:
-                    self._monitor.release()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._monitor.release()
+        return self._monitor
 
     def consume(self, amount: Ns) -> bool:
         """Return whether there is a current task; the computing itself has taken its time already."""
-        with self:
-            return self.current() is not None
+        self.interact()
+        return self.current() is not None
 
     def sleep_until(self, when: Ns) -> None:
         """Block the current task until `when`, ns."""
-        with self:
+        with self.interact():
             if when > self.now():
                 self.park(when, "time")
 
@@ -197,7 +189,8 @@ class WallKernel:
         task = self.current()
         if task is None:
             raise UsageError(f"a framework callback must not block, but waits for {waiting_for}")
-        with self:
+        with self._monitor:
+            self.interact()  # a cancellation may have come since the last one, and it wakes only once
             task.woken = False
             task.waiting_for = waiting_for
             while not task.woken and (deadline is None or self.now() < deadline):

@@ -193,7 +193,8 @@ class _Executor:
             _settle(self._loop, call.future, result, failure)
             self._ended.notify()
 
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             caller = current_task(kernel)
             call.scope = caller.scope.child("asyncio")
             call.task = kernel.spawn(body, "asyncio", caller.context, call.scope)

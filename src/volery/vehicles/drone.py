@@ -401,7 +401,7 @@ class Drone(Vehicle):
         self._connection.wait_for_link()
         self._executor.wait_for_interrupted()
         if self._acts_by_itself():
-            with self.kernel:
+            with self.kernel.interact():
                 self._driver.stop()
             return self._watch_landing()
         if telemetry.flying and (
@@ -410,7 +410,7 @@ class Drone(Vehicle):
             # manual control is repeated until the autopilot lands; otherwise it would fall
             self._land("come_to_rest")
             return "landed"
-        with self.kernel:
+        with self.kernel.interact():
             self._driver.stop()
         if telemetry.flying:
             return self._watch_landing()

@@ -311,7 +311,8 @@ class _StepRun:
     def _wait_for_telemetry(self) -> None:
         step, changed = self._step, self._telemetry.changed
         handles: list[Handle] = []
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             step.send()
             if step.again is not None:
                 handles.append(_repeat(kernel, step.again, self._send_again))

@@ -123,7 +123,8 @@ class _GroupOperation:
             return self._run()
 
     def _run(self) -> dict[str, Any]:
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             caller = current_task(kernel)
             scope = caller.scope.child(self._asked)
             tasks = [self._start(name, caller, scope) for name in self._vehicles]

@@ -183,7 +183,8 @@ class Operations:
             restarts: how often to start again after the sequence was undone before lift-off.
         """
         with self._kernel.joined():
-            with self._kernel as kernel:
+            kernel = self._kernel
+            with kernel.interact():
                 task = kernel.current()
                 if self._in_progress is not None:
                     self._abort_other(*self._in_progress, task, operation, policy)
@@ -410,7 +411,8 @@ class Operations:
 
     def set_manual_control(self, control: ManualControl) -> None:
         """Let the driver repeat *control*, unless another station has control."""
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             self.raise_bounds_error()
             self._executor.check_ours("manual control")
             self._manual_control_at = kernel.now()

@@ -126,7 +126,7 @@ class Rover(Vehicle):
             return "never sent a message"
         self._connection.wait_for_link()
         self._executor.wait_for_interrupted()
-        with self.kernel:
+        with self.kernel.interact():
             self._driver.stop()
         if not telemetry.armed:
             return "is disarmed"

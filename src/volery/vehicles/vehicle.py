@@ -226,14 +226,14 @@ class Vehicle(Session, ABC):
     @property
     def capabilities(self) -> frozenset[Capability]:
         """Operations that the vehicle supports; empty before the first message."""
-        with self.kernel:
+        with self.kernel.interact():
             return self._driver.capabilities
 
     @property
     def on_link_loss(self) -> str:
         """Reaction to a lost link in one line, from the parameters; empty until these are known."""
         self._connection.poll()
-        with self.kernel:
+        with self.kernel.interact():
             return self._driver.on_link_loss()
 
     # -- link

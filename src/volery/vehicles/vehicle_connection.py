@@ -54,7 +54,7 @@ class VehicleConnection:
         """Process received messages and return the telemetry."""
         if self._driver.cycle is not None:
             self._driver.poll()
-        with self._kernel:
+        with self._kernel.interact():
             return self._driver.telemetry
 
     def known(self, what: str, value: Position | None) -> Position:
@@ -86,7 +86,7 @@ class VehicleConnection:
         with self._kernel.joined():
             is_connected = self._executor.wait(connected, from_seconds(within))
         if not is_connected:
-            with self._kernel:
+            with self._kernel.interact():
                 problem = self._driver.problem()
             if problem is not None:
                 raise type(problem)(f"{self.name}: {problem}")

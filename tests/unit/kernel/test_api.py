@@ -170,7 +170,7 @@ def test_park_returns_whether_the_task_was_woken(kernel: Kernel, spawn: Spawn) -
 
     def sleeper() -> None:
         said.append(kernel.park(kernel.now() + MS, "nobody"))
-        with kernel:  # nobody wakes it before it waits
+        with kernel.interact():  # nobody wakes it before it waits
             kernel.call_at(kernel.now() + MS, lambda: kernel.wake(task))
             said.append(kernel.park(kernel.now() + LONG, "somebody"))
         parked.set()

@@ -400,7 +400,7 @@ def test_a_job_that_ends_at_the_instant_of_a_halt_is_complete(virtual: VirtualKe
     def body() -> None:
         virtual.sleep_until(MS)
         virtual.consume(4 * MS)
-        with virtual:
+        with virtual.interact():
             done.append(virtual.now())
 
     virtual.call_at(5 * MS, core.halt)  # asked for before the timer of the job

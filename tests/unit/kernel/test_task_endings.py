@@ -25,7 +25,7 @@ def test_an_end_comes_at_the_next_interaction_point_and_not_before(kernel: Kerne
         kernel.cancel(scope, "enough")
         seen.append("computes on")
         try:
-            with kernel:
+            with kernel.interact():
                 seen.append("never")
         except Cancelled as end:
             seen.append(str(end))

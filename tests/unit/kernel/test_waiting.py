@@ -591,7 +591,7 @@ def test_a_meter_is_pulled_at_every_interaction_point(
 
     def body() -> None:
         counted[0] += 2
-        with virtual:
+        with virtual.interact():
             assert virtual.now() == 2 * MS
         counted[0] += 3
         virtual.sleep_until(15 * MS)

@@ -157,7 +157,7 @@ def random_module(kernel: Kernel, seed: int) -> ModuleType:
 def record_output(kernel: Kernel, text: str) -> None:
     """Write text that a component prints, and record it as a line of the trace."""
     sys.stderr.write(text)
-    with kernel:
+    with kernel.interact():
         task = kernel.current()
         if task is not None and text.strip():
             kernel.record(Text(kernel.now(), task.context.component, INFO, text.rstrip()))

@@ -189,7 +189,8 @@ class ProcessModules:
         )
 
     def _exit(self, status: int) -> NoReturn:
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             self._leave(status)
             while True:
                 kernel.park(None, "os._exit")

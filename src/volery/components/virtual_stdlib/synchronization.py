@@ -91,7 +91,8 @@ class Thread(KernelBound):
         """Start the thread; it can be started once."""
         if self._task is not None:
             raise RuntimeError("threads can only be started once")
-        with self.kernel as kernel:
+        kernel = self.kernel
+        with kernel.interact():
             instance = component_of(waiting.current_task(kernel))
             if instance is None:
                 raise UsageError("threading.Thread: only components start threads")
@@ -120,7 +121,7 @@ class Thread(KernelBound):
 
     def is_alive(self) -> bool:
         """Return whether the thread has started and not ended."""
-        with self.kernel:
+        with self.kernel.interact():
             return self._task is not None and not self._over
 
 
@@ -140,7 +141,7 @@ class Timer(Thread):
 
     def cancel(self) -> None:
         """Cancel the call."""
-        with self.kernel:
+        with self.kernel.interact():
             self._cancelled = True
 
     def run(self) -> None:
@@ -175,7 +176,8 @@ class Lock(ContextManaged):
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
         """Acquire the lock; return False if it was not free in time."""
         longest = longest_wait(blocking, timeout)
-        with self.kernel as kernel:
+        kernel = self.kernel
+        with kernel.interact():
             if longest is None and self._owner is not None and self._owner is kernel.current():
                 self._warn_of_deadlock(kernel)
             if not self._free.wait_for(lambda: self._owner is None, longest, ends_activation=blocking):
@@ -195,7 +197,7 @@ class Lock(ContextManaged):
 
     def locked(self) -> bool:
         """Return whether the lock is held."""
-        with self.kernel:
+        with self.kernel.interact():
             return self._owner is not None
 
     @staticmethod
@@ -255,7 +257,7 @@ class Semaphore(ContextManaged):
     def acquire(self, blocking: bool = True, timeout: float | None = None) -> bool:
         """Decrement the counter; return False if it was zero for too long."""
         longest = longest_wait(blocking, timeout)
-        with self.kernel:
+        with self.kernel.interact():
             if not self._free.wait_for(lambda: self._value > 0, longest, ends_activation=blocking):
                 return False
             self._value -= 1
@@ -307,11 +309,13 @@ class Condition(ContextManaged):
 
     def wait_for(self, predicate: Callable[[], Any], timeout: float | None = None) -> Any:
         """Wait until ``predicate`` holds; return its last value."""
-        with self.kernel as kernel:
+        kernel = self.kernel
+        with kernel.interact():
             end = None if timeout is None else kernel.now() + from_seconds(timeout)
         held = predicate()
         while not held:
-            with self.kernel as kernel:
+            kernel = self.kernel
+            with kernel.interact():
                 left = None if end is None else to_seconds(end - kernel.now())
             if left is not None and left <= 0:
                 break
@@ -321,7 +325,7 @@ class Condition(ContextManaged):
 
     def notify(self, n: int = 1) -> None:
         """Wake the first ``n`` waiting tasks."""
-        with self.kernel:
+        with self.kernel.interact():
             for notified in self._waiting[:n]:
                 notified.append(True)
             self._waiting = self._waiting[n:]
@@ -358,7 +362,7 @@ class Queue(KernelBound):
 
     def put(self, item: Any, block: bool = True, timeout: float | None = None) -> None:
         """Append ``item``; raise ``Full`` if there was no room in time."""
-        with self.kernel:
+        with self.kernel.interact():
             if not self._changed.wait_for(
                 self._has_room, longest_wait(block, timeout), ends_activation=block
             ):
@@ -369,7 +373,7 @@ class Queue(KernelBound):
 
     def get(self, block: bool = True, timeout: float | None = None) -> Any:
         """Remove and return the next item; raise ``Empty`` if there was none in time."""
-        with self.kernel:
+        with self.kernel.interact():
             if not self._changed.wait_for(
                 lambda: self._items, longest_wait(block, timeout), ends_activation=block
             ):
@@ -388,7 +392,7 @@ class Queue(KernelBound):
 
     def qsize(self) -> int:
         """Return the number of items."""
-        with self.kernel:
+        with self.kernel.interact():
             return len(self._items)
 
     def empty(self) -> bool:
@@ -401,7 +405,7 @@ class Queue(KernelBound):
 
     def task_done(self) -> None:
         """Record that an item has been processed."""
-        with self.kernel:
+        with self.kernel.interact():
             if self._unfinished <= 0:
                 raise ValueError("task_done() called too many times")
             self._unfinished -= 1

@@ -186,7 +186,7 @@ class _Commands:
 
     def get_node_names(self, namespace: str | None = None) -> list[str]:
         """Return the names of all nodes, or of those in a namespace."""
-        with self._sessions.kernel:
+        with self._sessions.kernel.interact():
             names: list[str] = self._sessions.graph.node_names()
         below = f"/{(namespace or '').strip('/')}/".replace("//", "/")
         return [name for name in names if name.startswith(below) or name == below.rstrip("/")]
@@ -229,7 +229,7 @@ class _Commands:
             self._rospy.set_param(f"{ns.rstrip('/')}/{key}", value)
 
     def _services(self) -> Any:
-        with self._sessions.kernel:
+        with self._sessions.kernel.interact():
             return self._sessions.graph.services()
 
     def get_service_list(self, node: str | None = None, namespace: str | None = None, **_: Any) -> list[str]:

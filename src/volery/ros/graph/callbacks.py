@@ -85,7 +85,8 @@ class CallbackGroup:
 
     def spin_once(self, within: Ns | None = None) -> bool:
         """Run the next callback; see ``Group``."""
-        with self._node.kernel as kernel:
+        kernel = self._node.kernel
+        with kernel.interact():
             if within == 0:
                 self._charge_spin()
                 work = self._ready.popleft() if self._ready else None
@@ -105,7 +106,7 @@ class CallbackGroup:
 
     def spin_available(self) -> None:
         """Run the callbacks that are ready now, as one poll; later ones wait for the next spin."""
-        with self._node.kernel:
+        with self._node.kernel.interact():
             self._charge_spin()
             count = len(self._ready)
         for _ in range(count):
@@ -141,12 +142,13 @@ class NodeRate:
 
     def remaining(self) -> Ns:
         """Return the time until the next release, ns; 0 for a loop that is late."""
-        with self._node.kernel as kernel:
+        kernel = self._node.kernel
+        with kernel.interact():
             return max(0, self._rate.due - kernel.now())
 
     def sleep(self) -> None:
         """Block until the next release."""
-        with self._node.kernel:
+        with self._node.kernel.interact():
             self._node.consume("sleep", self.remaining() / US)
             self._rate.sleep()
 

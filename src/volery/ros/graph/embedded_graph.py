@@ -138,7 +138,7 @@ class LocalNode:
 
     def timer(self, period: Ns, callback: Callable[[], None], group: Group | None = None) -> NodeTimer:
         """Call back every `period` ns."""
-        with self._graph.kernel:
+        with self._graph.kernel.interact():
             self._node.check_open()
             return NodeTimer(self._node, period, callback, self._group_of(group))
 
@@ -148,12 +148,13 @@ class LocalNode:
 
     def sleep(self, duration: Ns) -> None:
         """Block the current task for `duration` ns; what the sleep itself takes is executed meanwhile."""
-        with self._graph.kernel as kernel:
+        kernel = self._graph.kernel
+        with kernel.interact():
             sleep_within(kernel, duration, self._node.consume("sleep", max(duration, 0) / US))
 
     def now(self) -> Ns:
         """Return ROS time, ns. An interaction point."""
-        with self._graph.kernel:
+        with self._graph.kernel.interact():
             return self._graph.stamp()
 
     def spin_once(self, within: Ns | None = None) -> bool:
@@ -205,7 +206,7 @@ class EmbeddedNode(LocalNode):
 
     def advertise(self, topic: str, message_type: str, qos: QoS = DEFAULT) -> EmbeddedPublisher:
         """Publish to a topic."""
-        with self._graph.kernel:
+        with self._graph.kernel.interact():
             self._node.check_open()
             found = topic_named(self._graph, self.resolve(topic), message_type, self._node)
             self._node.consume("advertise")
@@ -216,7 +217,7 @@ class EmbeddedNode(LocalNode):
     ) -> None:
         """See ``Node``."""
         publishers = [cast("EmbeddedPublisher", publisher) for publisher, _ in messages]
-        with self._graph.kernel:
+        with self._graph.kernel.interact():
             self._node.check_open()
             sent = self._node.consume_publications([publisher.connected for publisher in publishers])
             for index, (publisher, (_, message)) in enumerate(zip(publishers, messages, strict=True)):
@@ -234,7 +235,7 @@ class EmbeddedNode(LocalNode):
         group: Group | None = None,
     ) -> EmbeddedSubscription:
         """Call `callback` with each message of a topic."""
-        with self._graph.kernel:
+        with self._graph.kernel.interact():
             self._node.check_open()
             found = topic_named(self._graph, self.resolve(topic), message_type, self._node)
             self._node.consume("subscribe")
@@ -247,7 +248,7 @@ class EmbeddedNode(LocalNode):
         self, name: str, service_type: str, handler: Handler, group: Group | None = None
     ) -> EmbeddedService:
         """Answer requests."""
-        with self._graph.kernel:
+        with self._graph.kernel.interact():
             self._node.check_open()
             self._node.consume("advertise_service")
             into = self._group_of(group)
@@ -255,7 +256,7 @@ class EmbeddedNode(LocalNode):
 
     def client(self, name: str, service_type: str) -> EmbeddedClient:
         """Return a client of a service."""
-        with self._graph.kernel:
+        with self._graph.kernel.interact():
             self._node.check_open()
             self._node.consume("service_client")
             return EmbeddedClient(self._node, self.resolve(name), service_type)
@@ -268,7 +269,7 @@ class EmbeddedNode(LocalNode):
 
     def get_parameter(self, name: str, default: Any = ...) -> Any:
         """Return a parameter's value."""
-        with self._graph.kernel:
+        with self._graph.kernel.interact():
             full = self.resolve(name)
             if default is not ... and not self._graph.parameters.has(full):
                 return default
@@ -276,17 +277,17 @@ class EmbeddedNode(LocalNode):
 
     def set_parameter(self, name: str, value: Any) -> None:
         """Set a parameter."""
-        with self._graph.kernel:
+        with self._graph.kernel.interact():
             self._graph.parameters.set(self.resolve(name), value)
 
     def has_parameter(self, name: str) -> bool:
         """Return whether there is such a parameter."""
-        with self._graph.kernel:
+        with self._graph.kernel.interact():
             return self._graph.parameters.has(self.resolve(name))
 
     def delete_parameter(self, name: str) -> None:
         """Remove a parameter."""
-        with self._graph.kernel:
+        with self._graph.kernel.interact():
             self._graph.parameters.delete(self.resolve(name))
 
 
@@ -403,7 +404,7 @@ class EmbeddedGraph:
         Raises:
             UsageError: the name is not valid or is taken.
         """
-        with self.kernel:
+        with self.kernel.interact():
             if anonymous:
                 number = 1
                 while f"{namespace.rstrip('/')}/{name}_{number}" in self._nodes:

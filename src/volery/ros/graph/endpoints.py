@@ -206,7 +206,7 @@ class EmbeddedPublisher:
     def publish(self, message: Any) -> None:
         """Send a copy of `message` as it is when the call has been served."""
         node = self.node
-        with node.kernel:
+        with node.kernel.interact():
             if not self._open:
                 raise UsageError(f"node {node.name}: its publisher of {self.topic} is closed")
             if not isinstance(message, self._class):
@@ -217,7 +217,7 @@ class EmbeddedPublisher:
     def publish_to(self, connection: Connection, message: Any) -> None:
         """Send a message over one connection only."""
         node = self.node
-        with node.kernel:
+        with node.kernel.interact():
             sent = node.consume("publish", 1.0)
             content = message.copy()
             size = self._record(content, sent) if self._recorded else encoded_size(content)
@@ -271,7 +271,7 @@ class EmbeddedPublisher:
 
     def subscribers(self) -> int:
         """Return the number of subscriptions it is connected to."""
-        with self.node.kernel:
+        with self.node.kernel.interact():
             return len(self._connections)
 
     def counterparts(self) -> list[SubscriptionEnd]:
@@ -351,7 +351,7 @@ class EmbeddedSubscription:
 
     def publishers(self) -> int:
         """Return the number of publishers it is connected to."""
-        with self.node.kernel:
+        with self.node.kernel.interact():
             return sum(1 for publisher in self._topic.publishers if not incompatible(publisher.qos, self.qos))
 
     def counterparts(self) -> list[PublisherEnd]:
@@ -462,7 +462,7 @@ class EmbeddedService:
         """Run the handler and send the answer; an exception is reported to the caller and raised again."""
         if exchange not in self._pending:
             return
-        with self.node.kernel:
+        with self.node.kernel.interact():
             self.node.consume_if_priced("serve")
         self.caller = exchange.caller.name
         try:
@@ -471,17 +471,17 @@ class EmbeddedService:
                 raise UsageError(
                     f"the handler of {self.name} returned {answer!r}, not a {self.type} response"
                 )
-            with self.node.kernel:
+            with self.node.kernel.interact():
                 content = self.node.graph.copy(answer)
                 size = cdr_size(content)
         except Exception as error:
-            with self.node.kernel:
+            with self.node.kernel.interact():
                 self._pending.remove(exchange)
                 self._send_back(exchange, exchange.fail, failure_text(error), 0)
             if not isinstance(error, CallFailedError):
                 raise
             return
-        with self.node.kernel:
+        with self.node.kernel.interact():
             self._pending.remove(exchange)
             self._send_back(exchange, exchange.succeed, content, size)
 
@@ -513,7 +513,8 @@ class EmbeddedClient:
     def call(self, request: Any, within: Ns | None = None) -> Any:
         """Block until the answer has arrived; raise ``ServiceError`` if there is none."""
         node = self._node
-        with node.kernel as kernel:
+        kernel = node.kernel
+        with kernel.interact():
             start = kernel.now()
             server = self._server(request)
             node.consume_if_priced("call_service")
@@ -553,7 +554,7 @@ class EmbeddedClient:
 
     def ready(self) -> bool:
         """Return whether a node serves it now."""
-        with self._node.kernel:
+        with self._node.kernel.interact():
             return self.ready_now()
 
     def ready_now(self) -> bool:

@@ -79,7 +79,8 @@ class TransportPublisher:
     def publish(self, message: Any) -> None:
         """Send a copy of `message` as it is now."""
         node = self.node
-        with node.kernel as kernel:
+        kernel = node.kernel
+        with kernel.interact():
             if not self._open:
                 node.check_open()
                 raise UsageError(f"node {node.name}: its publisher of {self.topic} is closed")
@@ -95,7 +96,7 @@ class TransportPublisher:
 
     def subscribers(self) -> int:
         """Return the number of subscriptions it is connected to."""
-        with self.node.kernel:
+        with self.node.kernel.interact():
             return self._publisher.connected() if self._open else 0
 
     def awaited_from(self) -> Ns:
@@ -183,7 +184,8 @@ class TransportSubscription:
         except UsageError as error:
             self.garbled += 1
             sender = received.publisher or "an unknown node"
-            with self.node.kernel as kernel:
+            kernel = self.node.kernel
+            with kernel.interact():
                 text = f"{self.topic}: a message of {sender} dropped: {error}"
                 kernel.record(Text(kernel.now(), self.node.name, WARNING, text))
             return
@@ -195,7 +197,7 @@ class TransportSubscription:
 
     def publishers(self) -> int:
         """Return the number of publishers it is connected to."""
-        with self.node.kernel:
+        with self.node.kernel.interact():
             return self.subscription.connected() if self._open else 0
 
     def close(self) -> None:
@@ -287,7 +289,8 @@ class TransportClient:
             outcome.append((answer, problem))
             answered.notify()
 
-        with self._node.kernel as kernel:
+        kernel = self._node.kernel
+        with kernel.interact():
             start = kernel.now()
             give_up = self._client.call(request.copy(), lambda *end: kernel.post(partial(arrive, *end)))
             if not answered.wait_for(lambda: outcome, within):

@@ -73,7 +73,8 @@ class ComponentEnds(Host):
     def leave(self, component: str) -> None:
         """See ``Host``."""
         self._ending.say_farewell(component)
-        with self._kernel as kernel:  # spends the execution time of the last activation
+        kernel = self._kernel
+        with kernel.interact():  # spends the execution time of the last activation
             self._flown[component] = list(self._commanded_alone(component))
             self._close_nodes(component)
             kernel.call_at(kernel.now(), partial(self._remove, component, "it has ended"))

@@ -167,7 +167,8 @@ _SEVERITIES = (7, 6, 4, 3, 2)
 
 def _log(session: CppSession, arguments: Reader) -> None:
     severity, text = _SEVERITIES[arguments.integer()], arguments.text()
-    with session.kernel as kernel:
+    kernel = session.kernel
+    with kernel.interact():
         kernel.record(Text(kernel.now(), session.component, severity, text))
 
 

@@ -110,7 +110,7 @@ class Executor:
                     left[queue] -= 1
                     if not left[queue]:
                         del left[queue]
-                with self._kernel:
+                with self._kernel.interact():
                     work = queue.ready.take()
                 self._run(queue, work.run)
         finally:
@@ -145,7 +145,8 @@ class Executor:
             found = self._next()
             return found is not None or self._cancelled or not self._session.running or not self.spinning
 
-        with self._kernel as kernel:
+        kernel = self._kernel
+        with kernel.interact():
             if within == 0:
                 found = self._next()
             else:

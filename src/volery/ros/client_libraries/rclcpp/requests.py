@@ -105,7 +105,8 @@ def _advertise(session: Session, arguments: Reader) -> bytes:
 def _assert_liveliness(session: Session, arguments: Reader) -> bool:
     made: Any = session.find(arguments.integer(), CdrPublisher).made
     if isinstance(session.graph, EmbeddedGraph):
-        with session.kernel as kernel:
+        kernel = session.kernel
+        with kernel.interact():
             made.latest = kernel.now()
     return True
 
@@ -207,7 +208,8 @@ class _Server:
             started.append(self._count + 1)
             self._call(request)
 
-        with self._session.kernel as kernel:
+        kernel = self._session.kernel
+        with kernel.interact():
             self._queue.add(Work(kernel.now(), start))
         self._answered.wait_for(lambda: bool(started) and started[0] in self._answers)
         return self._answers.pop(started[0])
@@ -264,7 +266,8 @@ class _Client:
             def give() -> None:
                 session.call_back(callback, answer)
 
-            with session.kernel as kernel:
+            kernel = session.kernel
+            with kernel.interact():
                 queue.add(Work(kernel.now(), give))
 
         session.spawn(call, f"call of {self._client.name}")
@@ -393,7 +396,7 @@ def _pairs(pairs: Sequence[tuple[str, str]]) -> bytes:
 def _count(session: Session, arguments: Reader, end: str) -> int:
     node = _node(session, arguments)
     name = node.node.resolve(node.absolute_name(arguments.text()))
-    with session.kernel:
+    with session.kernel.interact():
         return sum(len(getattr(one, end)) for one in session.graph.topics() if one.name == name)
 
 

@@ -89,7 +89,7 @@ class Session(CppSession):
 
     def ok(self) -> bool:
         """Return whether the component is between init and shutdown. An interaction point."""
-        with self.kernel:
+        with self.kernel.interact():
             return self.running
 
     @property

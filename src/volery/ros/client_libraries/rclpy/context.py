@@ -208,8 +208,7 @@ class Context:
     def ok(self) -> bool:
         """Return whether the context runs. An interaction point, as every call is."""
         if not poll(self.kernel, OK):
-            with self.kernel:
-                pass
+            self.kernel.interact()
         return self._started
 
     @property
@@ -311,7 +310,8 @@ class Context:
 
     def log(self, severity: int, text: str) -> None:
         """Record a log line. An interaction point."""
-        with self.kernel as kernel:
+        kernel = self.kernel
+        with kernel.interact():
             kernel.record(Text(kernel.now(), self._component, severity, text))
 
 

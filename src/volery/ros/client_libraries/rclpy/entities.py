@@ -144,7 +144,8 @@ class Publisher:
     def assert_liveliness(self) -> None:
         """Assert that the publisher is alive, for ``LivelinessPolicy.MANUAL_BY_TOPIC``."""
         if isinstance(self._node.graph, EmbeddedGraph):
-            with self._node.context.kernel as kernel:
+            kernel = self._node.context.kernel
+            with kernel.interact():
                 self._made.latest = kernel.now()  # type: ignore[attr-defined]  # of the embedded graph
 
     def wait_for_all_acked(self, timeout: Any = None) -> bool:
@@ -524,7 +525,8 @@ class GuardCondition:
             raise InvalidHandle("cannot use Destroyable because destruction was requested")
         if not self._ready:
             self._ready = True
-            with self._node.context.kernel as kernel:
+            kernel = self._node.context.kernel
+            with kernel.interact():
                 self._queue.ready.add(Work(kernel.now(), self._run))
 
     def _run(self) -> None:

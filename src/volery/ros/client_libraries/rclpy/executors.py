@@ -456,7 +456,8 @@ class Executor:
         if within == 0 and not ready():
             poll(self._kernel, EMPTY_SPIN, executed=True)
         while True:
-            with self._kernel as kernel:
+            kernel = self._kernel
+            with kernel.interact():
                 if within != 0:
                     end_activation(kernel)
                     self._changed.wait_for(ready, within)

@@ -448,12 +448,12 @@ class Node(NodeParameters):
 
     def get_topic_names_and_types(self, no_demangle: bool = False) -> list[tuple[str, list[str]]]:
         """Return all topics with a publisher or a subscription."""
-        with self._context.kernel:
+        with self._context.kernel.interact():
             return [(one.name, [one.type]) for one in self.contexts.graph.topics()]
 
     def get_service_names_and_types(self) -> list[tuple[str, list[str]]]:
         """Return all services that have a server."""
-        with self._context.kernel:
+        with self._context.kernel.interact():
             return [(one.name, [one.type]) for one in self.contexts.graph.services()]
 
     def _named(self, node_name: str, node_namespace: str) -> str:
@@ -466,7 +466,7 @@ class Node(NodeParameters):
         self, node_name: str, node_namespace: str, no_demangle: bool = False
     ) -> list[tuple[str, list[str]]]:
         """Return the topics that a node publishes."""
-        with self._context.kernel:
+        with self._context.kernel.interact():
             full = self._named(node_name, node_namespace)
             found = self.contexts.graph.topics()
             return [(one.name, [one.type]) for one in found if full in one.publishers]
@@ -475,7 +475,7 @@ class Node(NodeParameters):
         self, node_name: str, node_namespace: str, no_demangle: bool = False
     ) -> list[tuple[str, list[str]]]:
         """Return the topics that a node subscribes to."""
-        with self._context.kernel:
+        with self._context.kernel.interact():
             full = self._named(node_name, node_namespace)
             found = self.contexts.graph.topics()
             return [(one.name, [one.type]) for one in found if full in one.subscribers]
@@ -484,7 +484,7 @@ class Node(NodeParameters):
         self, node_name: str, node_namespace: str
     ) -> list[tuple[str, list[str]]]:
         """Return the services that a node serves."""
-        with self._context.kernel:
+        with self._context.kernel.interact():
             full = self._named(node_name, node_namespace)
             return [(one.name, [one.type]) for one in self.contexts.graph.services() if one.server == full]
 
@@ -501,7 +501,7 @@ class Node(NodeParameters):
 
     def get_fully_qualified_node_names(self) -> list[str]:
         """Return the names of all nodes."""
-        with self._context.kernel:
+        with self._context.kernel.interact():
             return self.contexts.graph.node_names()
 
     def get_node_names_and_namespaces(self) -> list[tuple[str, str]]:
@@ -517,14 +517,14 @@ class Node(NodeParameters):
         self, topic_name: str, no_mangle: bool = False
     ) -> list[TopicEndpointInfo]:
         """Return node and quality of service of each publisher of a topic."""
-        with self._context.kernel:
+        with self._context.kernel.interact():
             return endpoint_infos(self.contexts.graph, self.resolve_topic_name(topic_name), publishers=True)
 
     def get_subscriptions_info_by_topic(
         self, topic_name: str, no_mangle: bool = False
     ) -> list[TopicEndpointInfo]:
         """Return node and quality of service of each subscription to a topic."""
-        with self._context.kernel:
+        with self._context.kernel.interact():
             return endpoint_infos(self.contexts.graph, self.resolve_topic_name(topic_name), publishers=False)
 
     def count_publishers(self, topic_name: str) -> int:
@@ -538,7 +538,7 @@ class Node(NodeParameters):
     def count_services(self, service_name: str) -> int:
         """Return the number of servers of a service."""
         full = self.resolve_service_name(service_name)
-        with self._context.kernel:
+        with self._context.kernel.interact():
             return sum(1 for one in self.contexts.graph.services() if one.name == full)
 
     def count_clients(self, service_name: str) -> int:
@@ -549,7 +549,7 @@ class Node(NodeParameters):
 
     def _count(self, topic_name: str, side: str) -> int:
         full = self.resolve_topic_name(topic_name)
-        with self._context.kernel:
+        with self._context.kernel.interact():
             return sum(len(getattr(one, side)) for one in self.contexts.graph.topics() if one.name == full)
 
     def wait_for_node(self, fully_qualified_node_name: str, timeout: float) -> bool:

@@ -45,7 +45,7 @@ class Session(CppSession):
 
     def ok(self) -> bool:
         """Return whether the node exists and is not shut down. An interaction point."""
-        with self.kernel:
+        with self.kernel.interact():
             return self._node is not None and not self.finished
 
     def end(self) -> None:

@@ -43,7 +43,7 @@ class Master:
 
     def getSystemState(self) -> list[list[list[Any]]]:  # noqa: N802 - rosgraph's name
         """Return publishers, subscribers and services, each as ``[name, [nodes]]``."""
-        with self.sessions.kernel:
+        with self.sessions.kernel.interact():
             graph = self.sessions.graph
             topics, services = graph.topics(), graph.services()
         return [
@@ -54,13 +54,13 @@ class Master:
 
     def getTopicTypes(self) -> list[list[str]]:  # noqa: N802 - rosgraph's name
         """Return the topics with their types."""
-        with self.sessions.kernel:
+        with self.sessions.kernel.interact():
             topics = self.sessions.graph.topics()
         return [[one.name, one.type.replace("/msg/", "/")] for one in topics]
 
     def getPublishedTopics(self, subgraph: str = "") -> list[list[str]]:  # noqa: N802 - rosgraph's name
         """Return the published topics below a namespace with their types."""
-        with self.sessions.kernel:
+        with self.sessions.kernel.interact():
             topics = [one for one in self.sessions.graph.topics() if one.publishers]
         below = subgraph.rstrip("/") + "/"
         return [[one.name, one.type.replace("/msg/", "/")] for one in topics if one.name.startswith(below)]
@@ -86,7 +86,7 @@ class Master:
         graph = self.sessions.graph
         if not isinstance(graph, EmbeddedGraph):
             raise UsageError("rosgraph.Master.getParamNames() works on the embedded graph only")
-        with self.sessions.kernel:
+        with self.sessions.kernel.interact():
             return graph.parameters.names()
 
     def __getattr__(self, name: str) -> NoReturn:

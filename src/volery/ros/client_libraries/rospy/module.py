@@ -65,7 +65,8 @@ class _Log:
 
     def _log(self, msg: Any, args: tuple[Any, ...], where: Caller) -> None:
         text = str(msg) % args if args else str(msg)
-        with self._sessions.kernel as kernel:
+        kernel = self._sessions.kernel
+        with kernel.interact():
             kernel.record(Text(kernel.now(), self._sessions.component, self._severity, text))
         session = self._sessions.find()
         if session is None or self._level < LEVELS["INFO"]:
@@ -82,7 +83,8 @@ class _Log:
 
     def throttle(self, period: float, msg: Any, *args: Any) -> None:
         """Log the same *msg* at most once each *period* seconds."""
-        with self._sessions.kernel as kernel:
+        kernel = self._sessions.kernel
+        with kernel.interact():
             key = (self._sessions.component, str(msg))
             last = self._last.get(key)
             if last is not None and kernel.now() - last < from_seconds(period):
@@ -187,7 +189,7 @@ def get_param_names(sessions: Sessions) -> list[str]:
     graph = sessions.graph
     if not isinstance(graph, EmbeddedGraph):
         raise UsageError("rospy.get_param_names() works on the embedded graph only")
-    with sessions.kernel:
+    with sessions.kernel.interact():
         return graph.parameters.names()
 
 
@@ -357,8 +359,7 @@ IS_SHUTDOWN: Ns = 30
 def is_shutdown(sessions: Sessions) -> bool:
     """Return whether this node is shutting down. An interaction point, as every call is."""
     if not poll(sessions.kernel, IS_SHUTDOWN):
-        with sessions.kernel:
-            pass
+        sessions.kernel.interact()
     session = sessions.find()
     return session is not None and bool(session.shutdown)
 
@@ -461,7 +462,7 @@ def is_wallclock(sessions: Sessions) -> bool:
 
 def get_published_topics(sessions: Sessions, namespace: str = "/") -> list[list[str]]:
     """Return the published topics below *namespace* with their types as spelled in ROS 1."""
-    with sessions.kernel:
+    with sessions.kernel.interact():
         states = [one for one in sessions.graph.topics() if one.publishers]
     below = namespace.rstrip("/") + "/"
     return [[one.name, one.type.replace("/msg/", "/")] for one in states if one.name.startswith(below)]

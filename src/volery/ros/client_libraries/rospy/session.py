@@ -109,7 +109,8 @@ class Session:
 
     def log(self, severity: int, text: str) -> None:
         """Record a log line of this node. An interaction point."""
-        with self.kernel as kernel:
+        kernel = self.kernel
+        with kernel.interact():
             kernel.record(Text(kernel.now(), self.node.context.component, severity, text))
 
     def check(self) -> None:

@@ -193,7 +193,8 @@ class Buffer:
         if (kind, child) not in self._said:
             self._said.add((kind, child))
             severity = WARNING if kind in ("TF_OLD_DATA", "TF_REPEATED_DATA") else ERROR
-            with self.kernel as kernel:
+            kernel = self.kernel
+            with kernel.interact():
                 component = current_task(kernel).context.component
                 kernel.record(Text(kernel.now(), component, severity, problem))
 
@@ -262,7 +263,7 @@ class Buffer:
 
         if within <= 0:
             poll(self.kernel, LOOK_UP)
-        with self.kernel:
+        with self.kernel.interact():
             if not can() and within > 0:
                 self._changed.wait_for(can, within, ends_activation=True)
             if isinstance(self.graph, EmbeddedGraph):

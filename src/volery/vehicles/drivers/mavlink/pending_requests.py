@@ -94,7 +94,7 @@ class PendingRequests:
         with self._kernel.joined(), _Listening(self._kernel, self._listeners, listen):
             until = self._kernel.now() + within
             while self._kernel.now() < until:
-                with self._kernel:
+                with self._kernel.interact():
                     send()
                 wait = min(again, until - self._kernel.now())
                 if self._arrived.wait_for(lambda: found or failed, wait, ends_activation=True):
@@ -133,7 +133,7 @@ class PendingRequests:
         """
         with self._kernel.joined(), _Listening(self._kernel, self._listeners, take):
             stalled = 0
-            with self._kernel:
+            with self._kernel.interact():
                 send()
             while not whole():
                 before = count()
@@ -145,7 +145,7 @@ class PendingRequests:
                 if stalled > TRIES:
                     raise NotArrived(self._name, asked, "; ".join(filter(None, (so_far(), self.cause()))))
                 if not whole():
-                    with self._kernel:
+                    with self._kernel.interact():
                         send()
 
 

@@ -312,7 +312,7 @@ class MavlinkServices(PendingRequests):
             asked = f"read its {_LISTS[kind]}"
             count = self.ask(asked, lambda: self._send_to("MISSION_REQUEST_LIST", mission_type=kind), counted)
             items = [self._download_item(asked, kind, number) for number in range(count)]
-            with self._kernel:
+            with self._kernel.interact():
                 self._send_to("MISSION_ACK", type=0, mission_type=kind)
         return items
 
@@ -420,14 +420,14 @@ class MavlinkServices(PendingRequests):
 
     def end_log_transfer(self) -> None:
         """See ``Services``."""
-        with self._kernel.joined(), self._kernel:
+        with self._kernel.joined(), self._kernel.interact():
             self._send_to("LOG_REQUEST_END")
 
     # -- corrections
 
     def send_corrections(self, message: bytes) -> None:
         """See ``Services``."""
-        with self._kernel.joined(), self._kernel:
+        with self._kernel.joined(), self._kernel.interact():
             for fields in correction_parts(message, self._correction):
                 self._send("GPS_RTCM_DATA", **fields)
             self._correction = (self._correction + 1) % 32

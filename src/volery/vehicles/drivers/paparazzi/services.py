@@ -56,7 +56,7 @@ class PaparazziServices(PartialServices):
 
         with self._kernel.joined():
             for _ in range(TRIES):
-                with self._kernel:
+                with self._kernel.interact():
                     send()
                 if changed.wait_for(lambda: not missing(), AGAIN, ends_activation=True):
                     return {
@@ -108,7 +108,7 @@ class PaparazziServices(PartialServices):
         decoder.values.pop(setting.number, None)
         with self._kernel.joined():
             for _ in range(TRIES):
-                with self._kernel:
+                with self._kernel.interact():
                     self._backend.write_setting(setting, value)
                 if changed.wait_for(kept, AGAIN, ends_activation=True):
                     return Parameter(setting.name, value, REAL32)

@@ -169,7 +169,7 @@ class PX4Mavlink(MavlinkClient):
                 texts = read_event_texts(self.services)
             except (VoleryError, ValueError):
                 return  # their numbers are shown
-            with self._kernel:
+            with self._kernel.interact():
                 self._decoder.set_event_texts(texts)
 
         self._kernel.spawn(read, name, ExecutionContext(self.telemetry.name))
