@@ -31,6 +31,7 @@ from __future__ import annotations
 
 from pydantic import model_validator
 
+from volery.base.warmth import COLD, Warmth
 from volery.cost.figures import Line, WithProvenance, line_through
 
 NOT_COUNTED = (
@@ -41,18 +42,16 @@ NOT_COUNTED = (
 )
 """What the law leaves out, as phrases for a report."""
 
-WARMER_CALLS = {
-    f"{call}{ending}": f"{call}{than}"
-    for call in ("publish", "receive")
-    for ending, than in (("_next", ""), ("_often", ""), ("_next_often", "_next"))
+ENDINGS = {
+    COLD: ("",),
+    Warmth(follows=True): ("_next", ""),
+    Warmth(often=True): ("_often", ""),
+    Warmth(follows=True, often=True): ("_next_often", "_next", ""),
 }
-"""Calls shortly after the library has sent or received (``next``), when its threads are awake, and in loops
-of some 20 ms (``often``), where caches are warmer; each with the call whose price holds where a law does not
-distinguish them."""
+"""How the names of a law's figures end; the first one that it has holds. ``publish_next`` is the figure of
+``publish`` shortly after the library has sent or received, ``publish_often`` that in loops of some 20 ms."""
 
-BACKGROUND_EVENTS = (
-    "receive", "receive_next", "receive_often", "receive_next_often", "connect", "accept", "wait"
-)  # fmt: skip
+BACKGROUND_EVENTS = ("receive", "connect", "accept", "wait")
 """Events beside calls, which cost nothing where a law has no figure.
 
 A message is received; a subscription connects to a publisher; a publisher accepts a subscription's

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 from volery.base.errors import EstimateError, choices
 from volery.base.time import Ns
+from volery.base.warmth import COLD, Warmth
 from volery.cost.figures import Line
-from volery.cost.ros_law import BACKGROUND_EVENTS, SERVICE_CALLS, WARMER_CALLS, RosLaw
+from volery.cost.ros_law import BACKGROUND_EVENTS, ENDINGS, SERVICE_CALLS, RosLaw
 
 _SPIN = {1.0: "spin_once_first", 0.0: "spin_once_next"}
 _MAX_CACHED = 4096
@@ -37,32 +38,41 @@ class Tariff:
         self.warnings = law.warnings(frequency_mhz)
         self._parts: dict[str, tuple[float, float]] = {}
         self._callers: dict[str, tuple[float, float]] = {}
-        self._known: dict[tuple[str, float], Price] = {}
+        self._known: dict[tuple[str, float, Warmth], Price] = {}
         for call, figures in law.calls.items():
             self._parts[call] = _at(frequency_mhz, *figures.lines())
             if figures.caller is not None:
                 self._callers[call] = _at(frequency_mhz, figures.caller, figures.caller_per_x)
 
-    def __call__(self, call: str, x: float = 0.0) -> Price:
+    def __call__(self, call: str, x: float = 0.0, warmth: Warmth = COLD) -> Price:
         """Return the price of one call.
 
         Args:
             call: Name of the call or of a background event.
             x: Number of subscribers of ``publish``, time slept in microseconds of ``sleep``.
+            warmth: Of the process that sends or receives.
 
         Raises:
             EstimateError: The call has no figure, or its line gives a negative time at this frequency.
         """
-        known = self._known.get((call, x))
-        return known if known is not None else self._compute(call, x)
+        known = self._known.get((call, x, warmth))
+        if known is None:
+            known = self._compute(call, x, warmth)
+            if len(self._known) < _MAX_CACHED:
+                self._known[call, x, warmth] = known
+        return known
 
-    def _compute(self, call: str, x: float) -> Price:
-        name = _SPIN.get(x, call) if call == "spin_once" else call
-        while name not in self._parts and name in WARMER_CALLS:
-            name = WARMER_CALLS[name]
-        free = name in BACKGROUND_EVENTS or name in SERVICE_CALLS
-        if free and name not in self._parts:
-            return self._keep(call, x, NO_PRICE)
+    def _name(self, call: str, x: float, warmth: Warmth) -> str:
+        """Return the name of the law's figures for a call."""
+        if call == "spin_once":
+            return _SPIN.get(x, call)
+        names = [call + ending for ending in ENDINGS[warmth]]
+        return next((name for name in names if name in self._parts), call)
+
+    def _compute(self, call: str, x: float, warmth: Warmth) -> Price:
+        name = self._name(call, x, warmth)
+        if name not in self._parts and (call in BACKGROUND_EVENTS or call in SERVICE_CALLS):
+            return NO_PRICE
         if name not in self._parts:
             raise EstimateError(
                 f"no figure for the ROS call {name!r} of {self.law.client} on {self.law.processor}; "
@@ -76,19 +86,14 @@ class Tariff:
                 f"{self.frequency_mhz:g} MHz; they hold from {self.law.least_mhz:g} to "
                 f"{self.law.greatest_mhz:g} MHz"
             )
-        return self._keep(call, x, self._split(name, constant, variable, x))
-
-    def _keep(self, call: str, x: float, price: Price) -> Price:
-        if len(self._known) < _MAX_CACHED:
-            self._known[call, x] = price
-        return price
+        if call == "sleep" or call in BACKGROUND_EVENTS:  # a sleep's cost falls while it sleeps
+            return Price(0, round(constant + variable), self._flags(name))
+        return self._split(name, constant, variable, x)
 
     def _split(self, name: str, constant: float, variable: float, x: float) -> Price:
         """Divide the cost of a call between the caller and the background."""
         flags = self._flags(name)
         whole = round(constant + variable)
-        if name == "sleep" or name in BACKGROUND_EVENTS:  # a sleep's cost falls while it sleeps
-            return Price(0, whole, flags)
         if name in self._callers:
             fixed, per_x = self._callers[name]
             caller = min(whole, max(0, round(fixed + per_x * x)))

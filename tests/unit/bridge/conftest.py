@@ -7,6 +7,7 @@ import pytest
 
 from volery.base.geoid import LevelGeoid
 from volery.base.time import MS, S
+from volery.base.warmth import Warmth
 from volery.bridge import ROSCOPTER, VehicleNode, VehicleNodeOptions
 from volery.cost import Price
 from volery.kernel.task import ExecutionContext
@@ -38,7 +39,7 @@ class BridgeRig:
         self.got: dict[str, list[Any]] = {}
 
     def _tariff(self, node: Any) -> Any:
-        def price(call: str, x: float) -> Price:
+        def price(call: str, x: float, warmth: Warmth) -> Price:
             self.priced.append((node.name, call))
             return Price(0, 0)
 

@@ -3,12 +3,14 @@ import math
 import pytest
 
 from volery.base.errors import EstimateError
+from volery.base.warmth import Warmth
 from volery.cost import Price, RosLaw, Tariff, load_catalogue
 from volery.cost.catalogue import parse_catalogue
 
 INTEL, ARM = "intel-i5-3470", "rpi4-cortex-a72"
 PLATFORMS = ((INTEL, 1600), (INTEL, 3000), (ARM, 600), (ARM, 1500))
 
+FOLLOWING = Warmth(follows=True)
 POINTS = {
     "spin_once_first": (21500, 20380, 54381, 24403),
     "spin_once_next": (6377, 6270, 21860, 9048),
@@ -179,14 +181,14 @@ def test_a_client_without_a_law_gets_a_hint() -> None:
 
 def test_a_warm_publish_costs_the_same_without_a_separate_figure() -> None:
     paper, mine = law(INTEL), measured_law("rospy")
-    assert Tariff(paper, 3000)("publish_next", 3) == Tariff(paper, 3000)("publish", 3)
-    assert Tariff(mine, 2600)("publish_next", 3) == Tariff(mine, 2600)("publish", 3)
+    assert Tariff(paper, 3000)("publish", 3, FOLLOWING) == Tariff(paper, 3000)("publish", 3)
+    assert Tariff(mine, 2600)("publish", 3, FOLLOWING) == Tariff(mine, 2600)("publish", 3)
     text = MEASURED + "          publish_next: {provenance: measured, source: s, constant: {offset: 7000}}\n"
-    apart = Tariff(parse_catalogue(text).processor("here").ros_law("rospy"), 2600)("publish_next", 3)
+    apart = Tariff(parse_catalogue(text).processor("here").ros_law("rospy"), 2600)("publish", 3, FOLLOWING)
     assert (apart.caller, apart.background) == (7000, 0)
     often = Tariff(parse_catalogue(text).processor("here").ros_law("rospy"), 2600)
-    assert often("publish_next_often", 3) == apart
-    assert often("publish_often", 3) == often("publish", 3)
+    assert often("publish", 3, Warmth(follows=True, often=True)) == apart
+    assert often("publish", 3, Warmth(often=True)) == often("publish", 3)
 
 
 def test_service_requests_cost_what_a_law_states_and_nothing_where_it_has_no_figure() -> None:

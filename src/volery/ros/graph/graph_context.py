@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 from volery.base.errors import UsageError, did_you_mean
 from volery.base.time import MS, US, Ns, S
+from volery.base.warmth import COLD, Warmth
 from volery.kernel.api import Action, Kernel
 from volery.kernel.task import ExecutionContext
 from volery.kernel.waiting import Signal
@@ -256,14 +257,14 @@ class NodeContext:
         now = kernel.now()
         if self._free:
             return now
-        priced = call
+        warmth = COLD
         if call == "sleep":
             self._slept += x
         elif call == "publish":
-            priced = self._by_rest(call, now)
+            warmth = self._warmth(now)
         caller = background = 0
         if self._tariff is not None:
-            cost = self._tariff(priced, x)
+            cost = self._tariff(call, x, warmth)
             caller, background = cost.caller, cost.background
         if not self.graph.unrecorded:
             kind = _KINDS.get(call) or f"ros:{call}"
@@ -285,9 +286,9 @@ class NodeContext:
             return now
         caller = background = 0
         for connections in subscribers:
-            priced = self._by_rest("publish", at)
+            warmth = self._warmth(at)
             if tariff is not None:
-                cost = tariff(priced, float(connections))
+                cost = tariff("publish", float(connections), warmth)
                 caller += cost.caller
                 background += cost.background
                 at += cost.caller
@@ -296,15 +297,13 @@ class NodeContext:
             kernel.record(Charge(now, self.id.component, self.id.processor, kind, caller, background, 0.0))
         return self._execute(now, caller, background)
 
-    def _by_rest(self, call: str, at: Ns) -> str:
-        """Return the name by which a law prices a message that is sent or received at ``at``."""
+    def _warmth(self, at: Ns) -> Warmth:
+        """Return how warm the node is when it sends or receives at `at`, ns; it is warmer after it."""
         rest = at - self._last_traffic
         self._last_traffic = at
-        if rest < WARM:
-            call += "_next"
-        else:
+        if rest >= WARM:
             self._rest = rest
-        return call if self._rest >= REST else call + "_often"
+        return Warmth(follows=rest < WARM, often=self._rest < REST)
 
     def _execute(self, now: Ns, caller: Ns, background: Ns) -> Ns:
         """Execute what has been charged at *now*; return the time at which the caller's part has been."""
@@ -320,7 +319,7 @@ class NodeContext:
     def consume_if_priced(self, call: str) -> None:
         """Execute a call as ``consume`` does, if the law has a figure for it."""
         if self._tariff is not None:
-            cost = self._tariff(call, 0.0)
+            cost = self._tariff(call, 0.0, COLD)
             if cost.caller or cost.background:
                 self.consume(call)
 
@@ -329,7 +328,7 @@ class NodeContext:
         processor = self.processor
         if processor is None or self._tariff is None:
             return
-        cost = self._tariff(self._by_rest(what, self.kernel.now()) if what == "receive" else what, x)
+        cost = self._tariff(what, x, self._warmth(self.kernel.now()) if what == "receive" else COLD)
         background = cost.caller + cost.background
         if not background:
             return
@@ -343,7 +342,7 @@ class NodeContext:
         if (
             self.processor is not None
             and self._tariff is not None
-            and self._tariff("wait", WAIT_PERIOD / US).background
+            and self._tariff("wait", WAIT_PERIOD / US, COLD).background
         ):
             self.kernel.every(WAIT_PERIOD, self._charge_wait)
 

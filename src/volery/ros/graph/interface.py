@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Protocol
 
 from volery.base.errors import UsageError, choices
 from volery.base.time import MS, Ns
+from volery.base.warmth import Warmth
 from volery.kernel.api import Kernel
 from volery.kernel.task import ExecutionContext
 from volery.ros.graph.work import Work
@@ -96,15 +97,14 @@ class Cost(Protocol):
         """Executed by the process in the background, ns."""
 
 
-Tariff = Callable[[str, float], Cost]
-"""``tariff(call, x)``: the cost of one call of a node. The calls are ``init``, ``node_handle``,
+Tariff = Callable[[str, float, Warmth], Cost]
+"""``tariff(call, x, warmth)``: the cost of one call of a node. The calls are ``init``, ``node_handle``,
 ``advertise``, ``subscribe``, ``advertise_service``, ``service_client``, ``publish`` (x = subscribers of the
 topic), ``sleep`` (x = microseconds slept) and ``spin_once`` (x = 1 for the first of a group, 0 after it).
 Costs beside the calls are ``receive`` (a message arrives), ``connect`` (a subscription is connected to a
 publisher), ``accept`` (a publisher to a subscription) and ``wait`` (x = microseconds without sleep).
-``publish`` and ``receive`` become ``publish_next`` and ``receive_next`` less than a millisecond after the
-node has sent or received, and any of the four gets the ending ``_often`` where the node rested for less than
-32 ms before."""
+The warmth is that of a node that publishes or receives: it follows less than a millisecond after another of
+its messages, and happens often where the node rested for less than 32 ms before."""
 
 Tariffs = Callable[[NodeId], Tariff | None]
 """``tariffs(node)``: the tariff of a node, requested once when it joins; None where calls take no time."""

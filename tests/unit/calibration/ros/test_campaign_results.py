@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from volery.base.errors import EstimateError, ModelError
+from volery.base.warmth import Warmth
 from volery.calibration.host_machine import Machine
 from volery.calibration.ros.call_costs import call_costs
 from volery.calibration.ros.campaign import Conditions, format_line, plot_svg, ros_law, write_entry
@@ -28,7 +29,7 @@ def test_an_entry_prices_as_was_measured(tmp_path: Path) -> None:
     publish = prices("publish", 3)
     assert publish.caller + publish.background == pytest.approx(PUBLISH + 3 * PER_SUBSCRIBER, rel=1e-3)
     assert publish.caller == pytest.approx((PUBLISH + 3 * PER_SUBSCRIBER) / 2, rel=1e-3)
-    again = prices("publish_next", 3)
+    again = prices("publish", 3, Warmth(follows=True))
     assert again.caller + again.background == pytest.approx(AGAIN + 3 * PER_SUBSCRIBER, rel=1e-3)
     sleep = prices("sleep", 100_000)
     assert (sleep.caller, sleep.background) == (0, pytest.approx(SLEEP + PER_US * 100_000, rel=1e-3))
@@ -40,8 +41,8 @@ def test_rounds_of_one_period_price_all_publications() -> None:
     for period_us in (20_000.0, 50_000.0):
         rounds = [Probe(period_us=period_us).round() for _ in range(3)]
         prices = Tariff(ros_law(call_costs(rounds), Conditions("rospy", MACHINE.description, 2600.0)), 2600)
-        for call in ("publish", "publish_next"):
-            assert prices(call, 3) == prices(f"{call}_often", 3)
+        for follows in (False, True):
+            assert prices("publish", 3, Warmth(follows)) == prices("publish", 3, Warmth(follows, often=True))
 
 
 def test_it_holds_at_its_frequency_only(tmp_path: Path) -> None:
@@ -76,7 +77,9 @@ def test_callbacks_of_rospy_are_priced_where_their_message_arrives(tmp_path: Pat
     prices = Tariff(load_catalogue(tmp_path / "all.yaml").processor("my-computer").ros_law("rospy"), 2600)
     assert prices("spin_once", 1.0)[:2] == prices("spin_once", 0.0)[:2] == (0, 0)
     assert prices("receive").background == pytest.approx(RECEIVE, rel=1e-3)
-    assert prices("receive_next_often").background == pytest.approx(WARMER * RECEIVE_NEXT, rel=1e-3)
+    assert prices("receive", 0.0, Warmth(follows=True, often=True)).background == pytest.approx(
+        WARMER * RECEIVE_NEXT, rel=1e-3
+    )
 
 
 def test_other_entries_of_the_file_are_kept(tmp_path: Path) -> None:

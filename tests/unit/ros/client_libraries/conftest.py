@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from volery.base.time import S
+from volery.base.warmth import Warmth
 from volery.cost import Price
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
@@ -31,7 +32,7 @@ class Stage:
         self.out: list[Any] = []
 
     def _tariff(self, node: Any) -> Any:
-        def price(call: str, x: float) -> Price:
+        def price(call: str, x: float, warmth: Warmth) -> Price:
             self.priced.append((node.name, call))
             return Price(0, 0)
 

@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 import pytest
 
 from volery.base.time import S
+from volery.base.warmth import Warmth
+from volery.cost.ros_law import ENDINGS
 from volery.kernel.processor import Processor
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
@@ -25,7 +27,7 @@ class Rig:
         self.kernel = VirtualKernel(self.events.append)
         self.processor = Processor(self.kernel, "cpu", cores=2)
         self.prices: dict[str, Price] = {}
-        self.asked: list[tuple[str, str, float]] = []
+        self.asked: list[tuple[str, str, float]] = []  # warm calls by the names of their figures
         self.delay = 0
         self.loses = False
         self.carried: list[tuple[NodeId, NodeId, int, bool]] = []
@@ -34,8 +36,8 @@ class Rig:
     def new_graph(self, **options: Any) -> EmbeddedGraph:
         return EmbeddedGraph(self.kernel, self.tariff, self.route, **options)
 
-    def tariff(self, node: NodeId) -> Callable[[str, float], Price]:
-        return lambda call, x: self.price(node, call, x)
+    def tariff(self, node: NodeId) -> Callable[[str, float, Warmth], Price]:
+        return lambda call, x, warmth: self.price(node, call + ENDINGS[warmth][0], x)
 
     def price(self, node: NodeId, call: str, x: float) -> Price:
         self.asked.append((node.name, call, x))

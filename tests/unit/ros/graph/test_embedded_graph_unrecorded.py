@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from volery.base.time import MS, S
+from volery.base.warmth import Warmth
 from volery.kernel.task import ExecutionContext
 from volery.kernel.virtual import VirtualKernel
 from volery.ros import messages
@@ -82,7 +83,7 @@ def test_an_unrecorded_graph_records_nothing_and_needs_no_prices_without_a_proce
     asked: list[str] = []
 
     def tariff(node: Any) -> Any:
-        def price(call: str, x: float) -> Any:
+        def price(call: str, x: float, warmth: Warmth) -> Any:
             asked.append(call)
             raise AssertionError(call)
 
