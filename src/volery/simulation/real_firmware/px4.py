@@ -602,7 +602,8 @@ def start(asked: Assignment) -> Instance:
     try:
         write_start_scripts(source, asked.folder, own | dict(asked.parameters))
     except OSError as error:
-        raise FirmwareError(f"{asked.name}: PX4's start scripts cannot be copied: {error}") from error
+        reason = error.args[0][0][2] if isinstance(error, shutil.Error) else error  # the first of many files
+        raise FirmwareError(f"{asked.name}: PX4's start scripts cannot be copied: {reason}") from error
     options = ["-i", "{instance}", "-d", "-s", "etc/init.d-posix/rcS", "-w", ".", "etc"]
     process = FirmwareProcess(
         asked.name,

@@ -284,6 +284,14 @@ def test_program_without_start_scripts_is_refused(tmp_path: Path) -> None:
         FlownFirmware("px4", program, tmp_path / "firmware")
 
 
+def test_start_scripts_that_cannot_be_copied_are_named_once(tmp_path: Path) -> None:
+    program = stand_in(tmp_path, RECORDING)
+    for name in ("rc.one", "rc.two"):
+        (tmp_path / "build" / "etc" / name).symlink_to("nowhere")
+    with pytest.raises(FirmwareError, match=r"scripts cannot be copied: \[Errno 2\] No such .*rc\.\w+'$"):
+        FlownFirmware("px4", program, tmp_path / "firmware")
+
+
 def test_rover_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="drone_1: a real PX4 flies multirotors here"):
         flown(tmp_path, spec=Rover())
