@@ -206,6 +206,7 @@ class VirtualKernel:
         return task
 
     def _begin(self, task: Task, body: Action) -> None:
+        # in the hub: begun by another task, a greenlet would inherit that task's depth of recursion
         if not task.done:
             task.flow = greenlet(partial(self._live, task, body), self._hub)
             self._resume(task)
@@ -276,19 +277,20 @@ class VirtualKernel:
             self._interact(task)
         if when <= self._now:
             return
-        event = (when << TICKET_BITS) + next(self._tickets)
+        event = (when << TICKET_BITS) + next(self._tickets)  # the last ticket: after all events of its time
         due = self._heap[0]
-        if event < due and event < self._horizon:
+        if event < due and event < self._horizon:  # nothing happens meanwhile, a post included
             self._now = when
             return
         task.woken = False
         task.waiting_for = "a time"
         task.event = event
-        self._targets[event] = task
-        target = self._targets[due]
+        targets = self._targets
+        targets[event] = task
+        target = targets[due]
         if due < self._horizon and target.event == due and isinstance(target, Task):
             heapreplace(self._heap, event)
-            del self._targets[due]
+            del targets[due]
             self._now = due >> TICKET_BITS
             self._current = target
             del due, target  # else this frame, resumed, would release objects that have left the caches
@@ -347,13 +349,13 @@ class VirtualKernel:
         while heap[0] < self._horizon:
             due = heap[0]
             target = targets[due]
-            if target.event != due:
+            if target.event != due:  # void: cancelled, set anew, or woken before its deadline
                 del targets[heappop(heap)]
             elif isinstance(target, Task):
                 del targets[heappop(heap)]
                 self._now = due >> TICKET_BITS
                 self._current = target
-                if target is not task:
+                if target is not task:  # else a timer has woken the task that is about to wait
                     target.flow.switch()
                 return
             elif isinstance(target, Timer):
@@ -370,9 +372,9 @@ class VirtualKernel:
         try:
             timer.action()
         except BaseException as error:
-            self.post(partial(_raise, error))
+            self.post(partial(_raise, error))  # to ``run``: this task is not its cause
         if self.root.cancelled:
-            self._horizon = VOID
+            self._horizon = VOID  # the hub ends the run before what is due next
 
     def _switch_to_hub(self) -> None:
         if self._hub is None:

@@ -11,7 +11,7 @@ import pytest
 from volery.base.errors import UsageError
 from volery.base.time import MS, S
 from volery.kernel.api import Kernel
-from volery.kernel.task import ExecutionContext, Task
+from volery.kernel.task import Cancelled, ExecutionContext, Task
 from volery.kernel.virtual import VirtualKernel
 from volery.kernel.waiting import Event, Queue, sleep
 from volery.kernel.wall import WallKernel
@@ -36,6 +36,26 @@ def test_a_cancelled_action_does_not_happen(kernel: Kernel) -> None:
     kernel.call_at(20 * MS, lambda: seen.append("end"))
     kernel.run(LONG)
     assert seen == ["end"]
+
+
+def test_a_cancellation_between_an_interaction_point_and_a_wait_ends_the_wait(
+    kernel: Kernel, spawn: Spawn
+) -> None:
+    ended: list[str] = []
+
+    def body() -> None:
+        kernel.interact()
+        kernel.cancel(kernel.root, "enough")
+        try:
+            kernel.park(None, "nothing")
+        except Cancelled as error:
+            ended.append(str(error))
+            raise
+
+    spawn(body)
+    kernel.run(LONG)
+    kernel.close()
+    assert ended == ["enough"]
 
 
 def test_every_begins_now_repeats_and_can_be_stopped_from_inside(kernel: Kernel) -> None:
