@@ -1,9 +1,10 @@
 """Program that loads an FMU and steps it for its parent, so that a crash of machine code is not the parent's.
 
-It is started as a script and imports nothing of volery. Usage: ``fmu_program.py PORT JSON``. It connects to
-PORT of loopback. ``JSON`` has the ``folder`` of the extracted FMU, its ``identifier``, ``token`` (guid) and
-FMI ``version`` (2 or 3), the ``step`` in seconds, ``parameters`` as [type, value reference, value], and of
-``inputs`` and ``outputs`` each the value references and the number of values.
+It is started as a script and imports nothing of volery. Usage: ``fmu_program.py DESCRIPTOR JSON``.
+``DESCRIPTOR`` is a Unix socket to the parent. ``JSON`` has the ``folder`` of the extracted FMU, its
+``identifier``, ``token`` (guid) and FMI ``version`` (2 or 3), the ``step`` in seconds, ``parameters`` as
+[type, value reference, value], and of ``inputs`` and ``outputs`` each the value references and the number of
+values.
 
 A request is the inputs, as doubles. The answer is an int32: 0, and the outputs as doubles follow, or the
 length of the text of an error, which follows; the program then ends. The first request initialises the FMU,
@@ -104,13 +105,14 @@ def _serve(link: socket.socket, fmu: _Fmi2 | _Fmi3, asked: dict[str, Any], first
         link.sendall(answer.pack(0, *fmu.get()))
 
 
-def _remove_at_end(folder: str) -> None:
-    """Let another process remove *folder* when this one is gone, however it ends."""
+def _remove_at_end(folder: str, link: socket.socket) -> None:
+    """Let another process, without *link*, remove *folder* when this one is gone, however it ends."""
     reading, writing = os.pipe()
     if os.fork():
         os.close(reading)
         return
     os.close(writing)
+    link.close()
     os.read(reading, 1)  # returns once the other end is closed, by the end of this process
     shutil.rmtree(folder, ignore_errors=True)
     os._exit(0)
@@ -128,9 +130,8 @@ def main() -> None:
     for ending in (signal.SIGINT, signal.SIGTERM):
         signal.signal(ending, signal.SIG_IGN)  # the end of the connection ends it, in order
     asked = json.loads(sys.argv[2])
-    _remove_at_end(asked["folder"])  # before there is a connection, which must end with this process
-    with socket.create_connection(("127.0.0.1", int(sys.argv[1]))) as link:
-        link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    with socket.socket(fileno=int(sys.argv[1])) as link:
+        _remove_at_end(asked["folder"], link)
         fmu = None
         usable = True
         first = _read(link, 8 * asked["inputs"][1])

@@ -13,7 +13,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 from volery.simulation.fmu.fmu_interface import FmuInterface
-from volery.simulation.real_firmware.firmware_process import FirmwareError, FirmwareProcess, Port
+from volery.simulation.real_firmware.firmware_process import FirmwareError, FirmwareProcess
 from volery.simulation.world.state_layout import STEP_S
 
 _START_LIMIT_S, _ANSWER_LIMIT_S = 60, 10
@@ -38,7 +38,7 @@ class RunningFmu:
         self._extracted = folder / _EXTRACTED
         self._inputs = struct.Struct(f"{interface.inputs.size}d")
         self._outputs = struct.Struct(f"=i{interface.outputs.size}d")
-        self._peer: socket.socket | None = None
+        self._initialised = False
         asked = {
             "folder": str(self._extracted),
             "identifier": interface.identifier,
@@ -50,18 +50,23 @@ class RunningFmu:
             "outputs": (interface.outputs.references, interface.outputs.size),
         }
         program = str(Path(__file__).with_name("fmu_program.py"))
+        self._peer, theirs = socket.socketpair()
+        self._limit(_START_LIMIT_S)
         try:
             self._extract()
             self.process = FirmwareProcess(
                 name,
-                [sys.executable, "-I", "-u", program, "{port0}", json.dumps(asked)],
+                [sys.executable, "-I", "-u", program, str(theirs.fileno()), json.dumps(asked)],
                 folder,
                 program=interface.file.name,
-                sockets=[Port("tcp", 0, 0)],
+                inherited=[theirs.fileno()],
             )
         except BaseException:
+            self._peer.close()
             self._remove()
             raise
+        finally:
+            theirs.close()
 
     def _extract(self) -> None:
         self._remove()
@@ -80,17 +85,9 @@ class RunningFmu:
         Raises:
             FirmwareError: It has ended, does not answer, or answers that it cannot.
         """
-        if self._peer is None:
-            self._peer = self._connection()
-            outputs = self._ask(self._peer, inputs)
-            _limit(self._peer, _ANSWER_LIMIT_S)
-            return outputs
-        return self._ask(self._peer, inputs)
-
-    def _ask(self, peer: socket.socket, inputs: Sequence[float]) -> tuple[float, ...]:
         try:
-            peer.sendall(self._inputs.pack(*inputs))
-            octets = peer.recv(self._outputs.size, socket.MSG_WAITALL)
+            self._peer.sendall(self._inputs.pack(*inputs))
+            octets = self._peer.recv(self._outputs.size, socket.MSG_WAITALL)
         except BlockingIOError:
             raise self.process.error("does not answer") from None
         except OSError:
@@ -98,11 +95,14 @@ class RunningFmu:
         if len(octets) == self._outputs.size:
             length, *outputs = self._outputs.unpack(octets)
             if not length:
+                if not self._initialised:
+                    self._initialised = True
+                    self._limit(_ANSWER_LIMIT_S)
                 return tuple(outputs)
         if not octets:
             raise self.process.parting("has closed its connection")
         with suppress(OSError):  # it is gone after its words
-            while more := peer.recv(4096):
+            while more := self._peer.recv(4096):
                 octets += more
         words = self.process.last_words()
         raise FirmwareError(
@@ -110,31 +110,13 @@ class RunningFmu:
             f"{f'; its last words: {words}' if words else ''}"
         )
 
-    def _connection(self) -> socket.socket:
-        listener = self.process.sockets[0]
-        listener.settimeout(1.0)
-        for _ in range(_START_LIMIT_S):
-            try:
-                peer, _ = listener.accept()
-            except TimeoutError:
-                if self.process.ending():
-                    break
-            else:
-                peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                _limit(peer, _START_LIMIT_S)
-                return peer
-        raise self.process.error("is not loaded within a minute")
+    def _limit(self, seconds: int) -> None:
+        """Let each wait for an answer end after *seconds*; in the kernel, which saves calls at each step."""
+        limit = struct.pack("ll", seconds, 0)
+        self._peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, limit)
 
     def close(self) -> None:
         """Let it free what it has, end it, and remove its extracted files."""
-        if self._peer is not None:
-            with suppress(OSError):
-                self._peer.shutdown(socket.SHUT_RDWR)
-            self._peer.close()
+        self._peer.close()
         self.process.end()
         self._remove()
-
-
-def _limit(peer: socket.socket, seconds: int) -> None:
-    """Let each wait for an answer end after *seconds*; in the kernel, which saves calls at each step."""
-    peer.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", seconds, 0))

@@ -69,6 +69,7 @@ class FirmwareProcess:
         command: Program and arguments; ``{instance}`` in them is replaced by the instance number.
         folder: Folder in which it runs, created if need be; it keeps its console, its logs and its memory.
         sockets: Ports at which this program has sockets: they listen (``tcp``) or are bound (``udp``).
+        inherited: Descriptors of this program that it has, too, by the same numbers.
         listens: Ports that the firmware opens itself.
         environment: Environment variables to add.
         lock: File that an instance locks while it runs, with ``{instance}`` in its name; empty: none.
@@ -85,7 +86,8 @@ class FirmwareProcess:
         command: Sequence[str],
         folder: Path,
         *,
-        sockets: Sequence[Port],
+        sockets: Sequence[Port] = (),
+        inherited: Sequence[int] = (),
         listens: Sequence[Port] = (),
         environment: Mapping[str, str] | None = None,
         lock: str = "",
@@ -116,11 +118,11 @@ class FirmwareProcess:
                     "isolate": ISOLATE,
                     "parent": os.getpid(),
                 }
-                self._start(asked, folder, console.fileno())
+                self._start(asked, folder, console.fileno(), inherited)
         except OSError as error:
             raise FirmwareError(f"{name}: {self.program} cannot be started in {folder}: {error}") from error
 
-    def _start(self, asked: dict[str, Any], folder: Path, console: int) -> None:
+    def _start(self, asked: dict[str, Any], folder: Path, console: int, inherited: Sequence[int]) -> None:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         launcher = [sys.executable, "-I", "-S", str(Path(__file__).with_name("launcher.py"))]
         with ours, theirs:
@@ -130,7 +132,7 @@ class FirmwareProcess:
                 stdin=subprocess.DEVNULL,
                 stdout=console,
                 stderr=subprocess.STDOUT,
-                pass_fds=[theirs.fileno()],
+                pass_fds=[theirs.fileno(), *inherited],
                 start_new_session=True,  # Ctrl-C is this program's to answer
             )
             self._task_folder = Path(f"/proc/{self.pid}/task")
