@@ -27,7 +27,7 @@ import volery
 from volery import AboveHome, Position
 from volery.base.frames import LocalFrame
 from volery.base.time import MS
-from volery.run.assembly.vehicles import ObservedVehicles
+from volery.run.assembly.observed_vehicles import ObservedVehicles
 from volery.trace.events import Event, Operation, VehicleState
 from volery.trace.stream import Stream
 

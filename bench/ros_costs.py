@@ -30,11 +30,12 @@ from volery.calibration.node_comparison import NodeComparison, compare, estimate
 from volery.calibration.node_processes import MeasuredRun, measurement_session
 from volery.calibration.ros.call_costs import CallCost, Round, call_costs
 from volery.calibration.ros.campaign import Conditions, Plan, format_line, ros_law, write_entry
-from volery.calibration.ros.probe_environment import Pace, check_client, own_master, probe_setup
+from volery.calibration.ros.probe_environment import Pace, check_client, probe_setup
 from volery.cli.commands.cost import comparison_tables
 from volery.cost import load_catalogue
 from volery.model.system import System
 from volery.model.system_loader import load
+from volery.ros.transports.ros1.master import own_roscore
 from volery.run.assembly.model_checks import vocabulary
 
 NODES = Path(__file__).parent / "ros_nodes"
@@ -61,8 +62,8 @@ class Campaign:
         system = self.system()
         nodes = prepare_nodes(system)
         self.stage = self._stack.enter_context(probe_setup(self.client))
-        master = self._stack.enter_context(own_master())
-        self._run = self._stack.enter_context(measurement_session(nodes, master, system.limits.duration_ns))
+        core = self._stack.enter_context(own_roscore())
+        self._run = self._stack.enter_context(measurement_session(nodes, core.uri, system.limits.duration_ns))
 
     def close(self) -> None:
         self._stack.close()
